@@ -1,0 +1,318 @@
+//! Trajectories run until an attractor has captured them: a lane that has finished takes the next
+//! start at a period's end.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::trap::{Band, Ellipse};
+use crate::integrate::stroboscopic::Buffer;
+use crate::integrate::{Moving, State, Strobe};
+use crate::lanes::sine::{Coarse, Degree, Fine, wrap};
+use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
+
+/// All regions that capture.
+#[derive(Clone, Debug, Default)]
+pub struct Traps {
+    /// Around the points of periodic attractors.
+    pub ellipses: Vec<Ellipse>,
+    /// Around running states.
+    pub bands: Vec<Band>,
+}
+
+/// How a trajectory ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fate {
+    /// Inside the traps of this attractor for two periods running.
+    Captured(usize),
+    /// The bound came first.
+    Open,
+    /// Left the range of numbers.
+    Failed,
+}
+
+/// A trajectory's end.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// How it ended.
+    pub fate: Fate,
+    /// Periods until the first of the two hits, or until the bound.
+    pub periods: u32,
+    /// Net turns over these periods.
+    pub turns: i64,
+    /// The state then, angle in [-pi, pi].
+    pub state: State,
+    /// Periods integrated.
+    pub work: u32,
+}
+
+/// Where starts come from: an index and a state, until there are none left.
+pub trait Source {
+    /// The next start.
+    fn next(&mut self) -> Option<(usize, State)>;
+    /// Takes the outcome of start `index`.
+    fn done(&mut self, index: usize, outcome: Outcome);
+}
+
+/// Runs all starts of `source` for at most `bound` periods; `cancel` ends it early.
+pub fn run(
+    strobe: &Strobe,
+    traps: &Traps,
+    bound: u32,
+    cancel: &AtomicBool,
+    source: &mut dyn Source,
+) {
+    dispatch::run(strobe.path, Capture { strobe, traps, bound, cancel, source });
+}
+
+/// All outcomes of `starts`, in their order.
+#[must_use]
+pub fn outcomes(strobe: &Strobe, traps: &Traps, bound: u32, starts: &[State]) -> Vec<Outcome> {
+    struct Slice<'a>(std::iter::Enumerate<std::slice::Iter<'a, State>>, Vec<Option<Outcome>>);
+    impl Source for Slice<'_> {
+        fn next(&mut self) -> Option<(usize, State)> {
+            self.0.next().map(|(i, s)| (i, *s))
+        }
+        fn done(&mut self, index: usize, outcome: Outcome) {
+            self.1[index] = Some(outcome);
+        }
+    }
+    let mut slice = Slice(starts.iter().enumerate(), vec![None; starts.len()]);
+    run(strobe, traps, bound, &AtomicBool::new(false), &mut slice);
+    slice.1.into_iter().flatten().collect()
+}
+
+struct Capture<'a> {
+    strobe: &'a Strobe,
+    traps: &'a Traps,
+    bound: u32,
+    cancel: &'a AtomicBool,
+    source: &'a mut dyn Source,
+}
+
+/// A hit: which attractor and point, when, and where the trajectory was.
+#[derive(Clone, Copy)]
+struct Hit {
+    attractor: usize,
+    point: usize,
+    clock: u64,
+    turns: f64,
+    theta: f64,
+    velocity: f64,
+}
+
+/// The trajectory in one lane.
+#[derive(Clone, Copy)]
+struct Tenant {
+    index: usize,
+    first_theta: f64,
+    born: u64,
+    hit: Option<Hit>,
+}
+
+impl Job for Capture<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Isa>(self, isa: S) {
+        if self.strobe.fine {
+            Block::new(self).run::<Fine, S::Lanes>(isa);
+        } else {
+            Block::new(self).run::<Coarse, S::Lanes>(isa);
+        }
+    }
+}
+
+struct Block<'a> {
+    job: Capture<'a>,
+    /// Ellipses in the coordinates of a lane: the kick instead of the velocity.
+    scaled: Vec<Ellipse>,
+    theta: Buffer,
+    kick: Buffer,
+    turns: Buffer,
+    height: Buffer,
+    tenants: [Option<Tenant>; MAX_WIDTH],
+    clock: u64,
+    next_expiry: u64,
+}
+
+impl<'a> Block<'a> {
+    fn new(job: Capture<'a>) -> Self {
+        let scale = job.strobe.schedule.kick;
+        let scaled = job
+            .traps
+            .ellipses
+            .iter()
+            .map(|e| Ellipse {
+                centre: [e.centre[0], e.centre[1] * scale],
+                shape: [e.shape[0], e.shape[1] / scale, e.shape[2] / scale],
+                ..*e
+            })
+            .collect();
+        Self {
+            job,
+            scaled,
+            theta: Buffer::default(),
+            kick: Buffer::default(),
+            turns: Buffer::default(),
+            height: Buffer::default(),
+            tenants: [None; MAX_WIDTH],
+            clock: 0,
+            next_expiry: u64::MAX,
+        }
+    }
+
+    #[inline(always)]
+    fn run<D: Degree, L: Lane>(mut self, token: L::Token) {
+        let mut occupied = 0;
+        for lane in 0..L::WIDTH {
+            occupied += usize::from(self.refill(lane));
+        }
+        while occupied > 0 {
+            let low = self.period::<D, L>(token);
+            self.clock += 1;
+            let bands = !self.job.traps.bands.is_empty();
+            if low < 1.0 || bands {
+                for lane in 0..L::WIDTH {
+                    if (self.height.0[lane] < 1.0 || bands) && self.captured(lane) {
+                        occupied -= usize::from(!self.refill(lane));
+                    }
+                }
+            }
+            if self.clock >= self.next_expiry {
+                occupied -= self.expire(L::WIDTH);
+            }
+            if self.job.cancel.load(Ordering::Relaxed) {
+                return;
+            }
+        }
+    }
+
+    /// One forcing period for all lanes; the lowest height above the traps' centres.
+    #[inline(always)]
+    fn period<D: Degree, L: Lane>(&mut self, token: L::Token) -> f64 {
+        let schedule = &self.job.strobe.schedule;
+        let mut lanes =
+            Moving { theta: L::load(token, &self.theta.0), kick: L::load(token, &self.kick.0) };
+        lanes.run::<D>(schedule);
+        let (theta, whole) = wrap(lanes.theta);
+        let mut height = L::splat(token, f64::INFINITY);
+        for e in &self.scaled {
+            let x = theta - theta.like(e.centre[0]);
+            let y = lanes.kick - theta.like(e.centre[1]);
+            let y1 = x.scale_add(e.shape[0], y.scale(e.shape[1]));
+            let y2 = y.scale(e.shape[2]);
+            height = y1.mul_add(y1, y2 * y2).min(height);
+        }
+        theta.store(&mut self.theta.0);
+        lanes.kick.store(&mut self.kick.0);
+        (L::load(token, &self.turns.0) + whole).store(&mut self.turns.0);
+        height.store(&mut self.height.0);
+        self.height.0[..L::WIDTH]
+            .iter()
+            .fold(f64::INFINITY, |low, h| if *h < low { *h } else { low })
+    }
+
+    /// Puts the next start into `lane`; false if there is none.
+    #[inline(never)]
+    fn refill(&mut self, lane: usize) -> bool {
+        let Some((index, [theta, velocity])) = self.job.source.next() else {
+            self.tenants[lane] = None;
+            (self.theta.0[lane], self.kick.0[lane]) = (0.0, 0.0);
+            return false;
+        };
+        self.theta.0[lane] = theta;
+        self.kick.0[lane] = velocity * self.job.strobe.schedule.kick;
+        self.turns.0[lane] = 0.0;
+        self.tenants[lane] =
+            Some(Tenant { index, first_theta: theta, born: self.clock, hit: None });
+        self.next_expiry = self.next_expiry.min(self.clock + u64::from(self.job.bound));
+        true
+    }
+
+    /// The trap that holds `lane`, as attractor and point.
+    fn trap(&self, lane: usize) -> Option<(usize, usize)> {
+        let state = [self.theta.0[lane], self.kick.0[lane]];
+        if let Some(e) = self.scaled.iter().find(|e| e.height(state) < 1.0) {
+            return Some((e.attractor, e.point));
+        }
+        let state = [state[0], state[1] / self.job.strobe.schedule.kick];
+        self.job.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0))
+    }
+
+    /// Whether `lane` has hit the same attractor, one point on, two periods running; if so its
+    /// outcome has been handed over.
+    #[inline(never)]
+    fn captured(&mut self, lane: usize) -> bool {
+        let (Some(mut tenant), Some((attractor, point))) = (self.tenants[lane], self.trap(lane))
+        else {
+            return false;
+        };
+        if let Some(hit) = tenant.hit {
+            let consecutive = hit.clock + 1 == self.clock && hit.attractor == attractor;
+            if consecutive && self.follows(attractor, hit.point, point) {
+                let end = (hit.theta, hit.velocity, hit.turns, hit.clock);
+                self.hand_over(tenant, Fate::Captured(attractor), end);
+                return true;
+            }
+        }
+        tenant.hit = Some(Hit {
+            attractor,
+            point,
+            clock: self.clock,
+            turns: self.turns.0[lane],
+            theta: self.theta.0[lane],
+            velocity: self.velocity(lane),
+        });
+        self.tenants[lane] = Some(tenant);
+        false
+    }
+
+    /// Whether `after` is the point that follows `before` on the cycle of `attractor`.
+    fn follows(&self, attractor: usize, before: usize, after: usize) -> bool {
+        let count = self
+            .scaled
+            .iter()
+            .filter(|e| e.attractor == attractor)
+            .map(|e| e.point + 1)
+            .max()
+            .unwrap_or(1);
+        after == (before + 1) % count
+    }
+
+    fn velocity(&self, lane: usize) -> f64 {
+        self.kick.0[lane] / self.job.strobe.schedule.kick
+    }
+
+    fn hand_over(&mut self, tenant: Tenant, fate: Fate, end: (f64, f64, f64, u64)) {
+        let (theta, velocity, turns, clock) = end;
+        let whole = turns + (theta - tenant.first_theta) / std::f64::consts::TAU;
+        let outcome = Outcome {
+            fate,
+            periods: (clock - tenant.born) as u32,
+            turns: whole.round() as i64,
+            state: [theta, velocity],
+            work: (self.clock - tenant.born) as u32,
+        };
+        self.job.source.done(tenant.index, outcome);
+    }
+
+    /// Ends the lanes whose bound has come; the number of lanes that stay empty.
+    #[inline(never)]
+    fn expire(&mut self, width: usize) -> usize {
+        let bound = u64::from(self.job.bound);
+        self.next_expiry = u64::MAX;
+        let mut emptied = 0;
+        for lane in 0..width {
+            let Some(tenant) = self.tenants[lane] else { continue };
+            let expiry = tenant.born + bound;
+            if expiry > self.clock {
+                self.next_expiry = self.next_expiry.min(expiry);
+                continue;
+            }
+            let (theta, velocity) = (self.theta.0[lane], self.velocity(lane));
+            let finite = theta.is_finite() && velocity.is_finite() && velocity.abs() < 1e6;
+            let fate = if finite { Fate::Open } else { Fate::Failed };
+            self.hand_over(tenant, fate, (theta, velocity, self.turns.0[lane], self.clock));
+            emptied += usize::from(!self.refill(lane));
+        }
+        emptied
+    }
+}

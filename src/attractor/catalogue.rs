@@ -1,0 +1,247 @@
+//! The attractors of a map, numbered by a key of their own and named by what they are.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::Complex;
+
+use super::chaos::ChaoticSet;
+use crate::integrate::State;
+use crate::integrate::accuracy::{distance, wrapped};
+use crate::model::Pendulum;
+use crate::orbit::PeriodicOrbit;
+use crate::orbit::rotation::Rotation;
+
+/// What a motion looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Hanging at rest.
+    Rest,
+    /// Standing on its head.
+    InvertedRest,
+    /// Periodic without net turns.
+    Oscillation,
+    /// Periodic with net turns.
+    Rotation,
+    /// Running on without closing: a closed curve of the stroboscopic map.
+    QuasiperiodicRotation,
+    /// Chaos that never goes over the top.
+    LibrationChaos,
+    /// Chaos that goes over the top in one sense only.
+    RotatingChaos,
+    /// Chaos with turns in both senses.
+    TumblingChaos,
+}
+
+impl Kind {
+    /// The word in files.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Rest => "rest",
+            Self::InvertedRest => "inverted_rest",
+            Self::Oscillation => "oscillation",
+            Self::Rotation => "rotation",
+            Self::QuasiperiodicRotation => "quasiperiodic_rotation",
+            Self::LibrationChaos => "libration_chaos",
+            Self::RotatingChaos => "rotating_chaos",
+            Self::TumblingChaos => "tumbling_chaos",
+        }
+    }
+
+    /// Whether it is one of the three kinds of chaos.
+    #[must_use]
+    pub const fn is_chaotic(self) -> bool {
+        matches!(self, Self::LibrationChaos | Self::RotatingChaos | Self::TumblingChaos)
+    }
+}
+
+/// An attractor.
+#[derive(Clone, Debug)]
+pub struct Attractor {
+    /// What it looks like.
+    pub kind: Kind,
+    /// Period in forcing periods; `None` where it has no meaning.
+    pub n: Option<usize>,
+    /// Net turns over that period.
+    pub w: Option<i64>,
+    /// Stroboscopic points: of a cycle in their order, of a chaotic attractor a sample.
+    pub points: Vec<State>,
+    /// Floquet multipliers; one for a running state without drive, none for chaos.
+    pub multipliers: Vec<Complex<f64>>,
+    /// Largest Lyapunov exponent per unit of tau, and its standard error where it is sampled.
+    pub exponent: f64,
+    /// Standard error of the exponent; 0 where it comes from multipliers.
+    pub exponent_stderr: f64,
+    /// Time after which it closes; `None` for chaos.
+    pub period: Option<f64>,
+    /// Sense of rotation of a set that has no `w`: 1, -1 or 0.
+    pub sense: i64,
+    /// A name that stays.
+    pub name: String,
+    /// Its mirror image in the catalogue: itself where it is symmetric.
+    pub twin: Option<usize>,
+}
+
+impl Attractor {
+    /// From a stable closed orbit.
+    #[must_use]
+    pub fn periodic(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Self {
+        let period = orbit.n as f64 * pendulum.period();
+        let kind = classify(pendulum, orbit);
+        // Newton's method leaves a rest at 1e-170: it is known exactly.
+        let points = match kind {
+            Kind::Rest if pendulum.torque == 0.0 => vec![[0.0, 0.0]],
+            Kind::InvertedRest if pendulum.torque == 0.0 => vec![[PI, 0.0]],
+            Kind::Rest | Kind::InvertedRest => vec![[orbit.points[0][0], 0.0]],
+            _ => orbit.points.clone(),
+        };
+        Self {
+            kind,
+            n: Some(orbit.n),
+            w: Some(orbit.w),
+            points,
+            multipliers: orbit.multipliers.0.to_vec(),
+            exponent: orbit.multipliers.exponent(period),
+            exponent_stderr: 0.0,
+            period: Some(period),
+            sense: orbit.w.signum(),
+            name: String::new(),
+            twin: None,
+        }
+    }
+
+    /// From a running state without drive; its one multiplier is that of the angle section.
+    #[must_use]
+    pub fn running(rotation: &Rotation) -> Self {
+        Self {
+            kind: Kind::Rotation,
+            n: Some(1),
+            w: Some(rotation.sense),
+            points: vec![[0.0, rotation.velocity]],
+            multipliers: vec![Complex::new(rotation.multiplier, 0.0)],
+            exponent: 0.0,
+            exponent_stderr: 0.0,
+            period: Some(rotation.period),
+            sense: rotation.sense,
+            name: String::new(),
+            twin: None,
+        }
+    }
+
+    /// From a set of trajectories that nothing captures.
+    #[must_use]
+    pub fn sampled(set: &ChaoticSet) -> Self {
+        Self {
+            kind: set.kind,
+            n: None,
+            w: None,
+            points: set.points.clone(),
+            multipliers: Vec::new(),
+            exponent: set.exponent,
+            exponent_stderr: set.exponent_stderr,
+            period: None,
+            sense: set.sense,
+            name: String::new(),
+            twin: None,
+        }
+    }
+
+    /// Mean angle of the cycle's points, each wrapped; its sign tells asymmetric twins apart.
+    fn lean(&self) -> f64 {
+        self.points.iter().map(|p| p[0]).sum::<f64>() / self.points.len().max(1) as f64
+    }
+
+    /// Whether the other is this one's image under `(th, v) -> (-th, -v)`.
+    fn mirrors(&self, other: &Self) -> bool {
+        if (self.kind, self.n, self.w) != (other.kind, other.n, other.w.map(|w| -w)) {
+            return false;
+        }
+        if self.n.is_none() {
+            return self.sense == -other.sense;
+        }
+        let image = |p: &State| [wrapped(-p[0]), -p[1]];
+        self.points.iter().all(|p| other.points.iter().any(|q| distance(image(p), *q) < 1e-7))
+    }
+
+    fn key(&self) -> (Kind, usize, i64, f64, f64) {
+        let first = self.points.first().copied().unwrap_or([0.0; 2]);
+        let w = self.w.unwrap_or(self.sense);
+        (self.kind, self.n.unwrap_or(0), w, first[0], first[1])
+    }
+}
+
+/// The kind of a closed orbit.
+fn classify(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Kind {
+    let [theta, velocity] = orbit.points[0];
+    let still = orbit.n == 1 && orbit.w == 0 && velocity.abs() < 1e-9;
+    // At a rest the torque balances gravity at every time: with drive only without torque.
+    let balanced = pendulum.is_autonomous() || theta.abs() < 1e-9 || PI - theta.abs() < 1e-9;
+    match (orbit.w, still && balanced) {
+        (0, true) if theta.abs() < FRAC_PI_2 => Kind::Rest,
+        (0, true) => Kind::InvertedRest,
+        (0, false) => Kind::Oscillation,
+        _ => Kind::Rotation,
+    }
+}
+
+/// Sorts by key, pairs twins and names all.
+///
+/// Names are "rest", "rotation 1:+1", "oscillation 2:0"; of asymmetric twin oscillations the one
+/// that leans to positive angles is "(+)"; if two share a name all the same, the angle of their
+/// first point is added.
+#[must_use]
+///
+/// Also returns the place that each of the given attractors has in the result.
+pub fn arrange(pendulum: &Pendulum, attractors: Vec<Attractor>) -> (Vec<Attractor>, Vec<usize>) {
+    let mut keyed: Vec<(usize, Attractor)> = attractors.into_iter().enumerate().collect();
+    keyed.sort_by(|(_, a), (_, b)| {
+        let (x, y) = (a.key(), b.key());
+        (x.0, x.1, x.2).cmp(&(y.0, y.1, y.2)).then(x.3.total_cmp(&y.3)).then(x.4.total_cmp(&y.4))
+    });
+    let mut place = vec![0; keyed.len()];
+    for (to, (from, _)) in keyed.iter().enumerate() {
+        place[*from] = to;
+    }
+    let mut sorted: Vec<Attractor> = keyed.into_iter().map(|(_, a)| a).collect();
+    let twins: Vec<Option<usize>> = sorted
+        .iter()
+        .map(|a| {
+            let is_twin = |b: &&Attractor| pendulum.is_mirror_symmetric() && a.mirrors(b);
+            sorted
+                .iter()
+                .find(is_twin)
+                .and_then(|b| sorted.iter().position(|other| std::ptr::eq(other, b)))
+        })
+        .collect();
+    let plain: Vec<String> =
+        sorted.iter().zip(&twins).enumerate().map(|(i, (a, t))| name(a, *t != Some(i))).collect();
+    for (i, (attractor, twin)) in sorted.iter_mut().zip(twins).enumerate() {
+        attractor.twin = twin;
+        attractor.name.clone_from(&plain[i]);
+        if plain.iter().filter(|other| **other == plain[i]).count() > 1 {
+            let theta = attractor.points.first().map_or(0.0, |p| p[0]);
+            attractor.name = format!("{} at {theta:+.4}", plain[i]);
+        }
+    }
+    (sorted, place)
+}
+
+fn name(attractor: &Attractor, asymmetric: bool) -> String {
+    let signed = |w: i64| if w == 0 { "0".to_owned() } else { format!("{w:+}") };
+    let side = |x: f64| if x < 0.0 { "(-)" } else { "(+)" };
+    let word = attractor.kind.word().replace('_', " ");
+    match (attractor.kind, attractor.n, attractor.w) {
+        (Kind::Rest | Kind::InvertedRest, ..) => word,
+        (_, Some(n), Some(0)) if asymmetric => {
+            format!("{word} {n}:0 {}", side(attractor.lean()))
+        }
+        (_, Some(n), Some(w)) => format!("{word} {n}:{}", signed(w)),
+        (Kind::RotatingChaos | Kind::QuasiperiodicRotation, ..) => {
+            format!("{word} {}", if attractor.sense < 0 { "-" } else { "+" })
+        }
+        (Kind::LibrationChaos, ..) if asymmetric => {
+            format!("{word} {}", side(attractor.lean()))
+        }
+        _ => word,
+    }
+}

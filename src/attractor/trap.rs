@@ -1,0 +1,236 @@
+//! Regions that nothing leaves: a trajectory inside one has been captured.
+//!
+//! Around a point of a periodic attractor with monodromy `M` the discrete Lyapunov equation
+//! `M^T S M - S = -I` gives an ellipse `x^T S x <= level` that `M` maps inside itself. A circle will
+//! not do: rotations grow threefold before they shrink. How far the ellipse reaches in the nonlinear
+//! map is sampled: the largest level such that every sample within it comes back lower.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix2, Matrix3, Vector3};
+
+use crate::integrate::accuracy::wrapped;
+use crate::integrate::{State, Strobe};
+use crate::orbit::PeriodicOrbit;
+
+/// An ellipse around one point of an attractor: inside where `y1^2 + y2^2 < 1`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ellipse {
+    /// Centre.
+    pub centre: State,
+    /// `y1 = shape[0] dtheta + shape[1] dv`, `y2 = shape[2] dv`.
+    pub shape: [f64; 3],
+    /// Index of the attractor in the catalogue.
+    pub attractor: usize,
+    /// Index of the point on the attractor's cycle.
+    pub point: usize,
+}
+
+impl Ellipse {
+    /// `y1^2 + y2^2` of a state with wrapped angle.
+    #[must_use]
+    pub fn height(&self, state: State) -> f64 {
+        let [a, b, c] = self.shape;
+        let (x, y) = (state[0] - self.centre[0], state[1] - self.centre[1]);
+        (a * x + b * y).powi(2) + (c * y).powi(2)
+    }
+}
+
+/// Directions that are sampled.
+const RAYS: usize = 96;
+/// Levels that are sampled, each `RATIO` of the one before in radius.
+const LEVELS: usize = 44;
+const RATIO: f64 = 0.82;
+/// Returns after which a sample must be lower: any of these will do.
+const RETURNS: [usize; 4] = [1, 2, 3, 4];
+/// How much lower.
+const LOWER: f64 = 0.999;
+/// The part of the sampled radius that is used.
+const MARGIN: f64 = 0.9;
+
+/// The ellipses of all points of `orbit`, empty where sampling finds no level that is safe.
+///
+/// Ellipses that cross `theta = pi` stand a second time, one turn on.
+#[must_use]
+pub fn ellipses(strobe: &Strobe, orbit: &PeriodicOrbit, attractor: usize) -> Vec<Ellipse> {
+    let mut traps = Vec::new();
+    for (point, (centre, monodromy)) in orbit.points.iter().zip(&orbit.monodromy).enumerate() {
+        let Some(root) = lyapunov_root(monodromy) else { return Vec::new() };
+        let Some(radius) = safe_radius(strobe, orbit.n, *centre, &root) else {
+            return Vec::new();
+        };
+        let shape = root.map(|x| x / radius);
+        let reach = radius * extent(&root);
+        for turn in [-TAU, 0.0, TAU] {
+            let centre = [centre[0] + turn, centre[1]];
+            if centre[0].abs() - reach <= std::f64::consts::PI {
+                traps.push(Ellipse { centre, shape, attractor, point });
+            }
+        }
+    }
+    traps
+}
+
+/// The upper triangular root `R` of `S = R^T R`, where `M^T S M - S = -I`, as `[r11, r12, r22]`.
+fn lyapunov_root(m: &Matrix2<f64>) -> Option<[f64; 3]> {
+    let (a, b, c, d) = (m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]);
+    // For S = [[s, t], [t, u]]: three linear equations.
+    let matrix = Matrix3::new(
+        a * a - 1.0,
+        2.0 * a * c,
+        c * c,
+        a * b,
+        a * d + b * c - 1.0,
+        c * d,
+        b * b,
+        2.0 * b * d,
+        d * d - 1.0,
+    );
+    let solution = matrix.lu().solve(&Vector3::new(-1.0, 0.0, -1.0))?;
+    let (s, t, u) = (solution[0], solution[1], solution[2]);
+    let rest = u - t * t / s;
+    (s > 0.0 && rest > 0.0).then(|| [s.sqrt(), t / s.sqrt(), rest.sqrt()])
+}
+
+/// Half the width in theta of the ellipse of radius 1.
+fn extent(root: &[f64; 3]) -> f64 {
+    let [a, b, c] = *root;
+    // dtheta = (y1 - b dv) / a with dv = y2 / c.
+    (1.0 + (b / c).powi(2)).sqrt() / a
+}
+
+/// The largest sampled radius within which every sample comes back lower.
+fn safe_radius(strobe: &Strobe, n: usize, centre: State, root: &[f64; 3]) -> Option<f64> {
+    let [a, b, c] = *root;
+    let widest = 3.0 / extent(root);
+    let radii: Vec<f64> = (0..LEVELS).map(|k| widest * RATIO.powi(k as i32)).collect();
+    let count = RAYS * LEVELS;
+    let (mut theta, mut velocity) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for radius in &radii {
+        for ray in 0..RAYS {
+            let angle = TAU * (ray as f64 + 0.5) / RAYS as f64;
+            let dv = radius * angle.sin() / c;
+            theta.push(centre[0] + (radius * angle.cos() - b * dv) / a);
+            velocity.push(centre[1] + dv);
+        }
+    }
+    let mut turns = vec![0.0; count];
+    let mut best: Option<f64> = None;
+    for _ in RETURNS {
+        strobe.advance(&mut theta, &mut velocity, &mut turns, n).ok()?;
+        let height = |i: usize| {
+            let (x, y) = (wrapped(theta[i] - centre[0]), velocity[i] - centre[1]);
+            (a * x + b * y).hypot(c * y)
+        };
+        // From the smallest level outward, up to the first one with a sample that rises.
+        let safe = (0..LEVELS)
+            .rev()
+            .take_while(|k| (0..RAYS).all(|ray| height(k * RAYS + ray) < LOWER * radii[*k]))
+            .last();
+        if let Some(k) = safe {
+            let radius = MARGIN * radii[k];
+            best = Some(best.map_or(radius, |b: f64| b.max(radius)));
+        }
+    }
+    best
+}
+
+/// A band around a running state: a curve `v = g(theta)` that trajectories close in on.
+#[derive(Clone, Debug)]
+pub struct Band {
+    /// `g` at the centres of equal cells of [-pi, pi).
+    pub curve: Vec<f64>,
+    /// Half the band's width in velocity.
+    pub half_width: f64,
+    /// Index of the attractor in the catalogue.
+    pub attractor: usize,
+}
+
+/// Cells of a band's curve.
+pub const BAND_CELLS: usize = 720;
+
+impl Band {
+    /// `g(theta)` by linear interpolation.
+    #[must_use]
+    pub fn at(&self, theta: f64) -> f64 {
+        let cells = self.curve.len() as f64;
+        let x = (theta / TAU + 0.5).rem_euclid(1.0) * cells - 0.5;
+        let (i, part) = (x.floor(), x - x.floor());
+        let left = self.curve[(i.rem_euclid(cells)) as usize];
+        let right = self.curve[((i + 1.0).rem_euclid(cells)) as usize];
+        left + part * (right - left)
+    }
+
+    /// Whether a state with wrapped angle is inside.
+    #[must_use]
+    pub fn contains(&self, state: State) -> bool {
+        (state[1] - self.at(state[0])).abs() < self.half_width
+    }
+
+    /// The band around states `curve` of a running state, `None` where no sampled width is safe.
+    #[must_use]
+    pub fn around(strobe: &Strobe, states: &[State], attractor: usize) -> Option<Self> {
+        let curve = tabulate(states)?;
+        let mut band = Self { curve, half_width: 1.0, attractor };
+        let columns = BAND_CELLS / 2;
+        let widths: Vec<f64> = (0..LEVELS).map(|k| 4.0 * RATIO.powi(k as i32)).collect();
+        let (mut theta, mut velocity) = (Vec::new(), Vec::new());
+        for width in &widths {
+            for column in 0..columns {
+                let at = TAU * ((column as f64 + 0.5) / columns as f64 - 0.5);
+                for side in [-1.0, 1.0] {
+                    theta.push(at);
+                    velocity.push(band.at(at) + side * width);
+                }
+            }
+        }
+        let mut turns = vec![0.0; theta.len()];
+        let mut best: Option<f64> = None;
+        for _ in 0..8 {
+            strobe.advance(&mut theta, &mut velocity, &mut turns, 1).ok()?;
+            let safe = (0..LEVELS)
+                .rev()
+                // Interpolation of the curve limits how narrow a band can be judged.
+                .skip_while(|k| widths[*k] < 1e-3)
+                .take_while(|k| {
+                    let part = k * 2 * columns..(k + 1) * 2 * columns;
+                    part.into_iter()
+                        .all(|i| (velocity[i] - band.at(theta[i])).abs() < LOWER * widths[*k])
+                })
+                .last();
+            if let Some(k) = safe {
+                let width = MARGIN * widths[k];
+                best = Some(best.map_or(width, |b: f64| b.max(width)));
+            }
+        }
+        band.half_width = best?;
+        Some(band)
+    }
+}
+
+/// `g` from states on the curve; `None` if they do not make a single-valued curve all round.
+fn tabulate(states: &[State]) -> Option<Vec<f64>> {
+    let mut sorted: Vec<State> = states.iter().map(|s| [wrapped(s[0]), s[1]]).collect();
+    sorted.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let (first, last) = (*sorted.first()?, *sorted.last()?);
+    sorted.push([first[0] + TAU, first[1]]);
+    sorted.insert(0, [last[0] - TAU, last[1]]);
+    let smooth = sorted.windows(2).all(|s| {
+        let (gap, jump) = (s[1][0] - s[0][0], (s[1][1] - s[0][1]).abs());
+        gap < 0.2 && jump < 0.02 + 8.0 * gap
+    });
+    if !smooth {
+        return None;
+    }
+    let value = |at: f64| {
+        let i = sorted.partition_point(|s| s[0] <= at).clamp(1, sorted.len() - 1);
+        let (a, b) = (sorted[i - 1], sorted[i]);
+        let part = if b[0] > a[0] { (at - a[0]) / (b[0] - a[0]) } else { 0.0 };
+        a[1] + part * (b[1] - a[1])
+    };
+    Some(
+        (0..BAND_CELLS)
+            .map(|i| value(TAU * ((i as f64 + 0.5) / BAND_CELLS as f64 - 0.5)))
+            .collect(),
+    )
+}

@@ -1,0 +1,68 @@
+//! Everything that can be wrong with a request, with the values that were given.
+
+use std::fmt;
+
+/// What was wrong, and what is allowed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Error {
+    /// A quantity is not finite, or outside its range.
+    Range {
+        /// The name of the quantity.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Arrays that belong together have different lengths.
+    Lengths {
+        /// What was given.
+        given: (usize, usize),
+        /// The names of the arrays.
+        names: (&'static str, &'static str),
+    },
+    /// `PENDMAP_SIMD` names no path of this processor.
+    Simd {
+        /// What was given.
+        name: String,
+    },
+    /// No number of steps reaches the tolerance.
+    Tolerance {
+        /// What was asked for.
+        tol: f64,
+        /// The smallest error reached.
+        reached: f64,
+    },
+    /// The caller asked to stop.
+    Interrupted,
+    /// The thread pool could not be made.
+    Threads(String),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range { name, value, allowed } => {
+                write!(f, "{name} is {value}: allowed is {allowed}")
+            }
+            Self::Lengths { given, names } => write!(
+                f,
+                "{} has {} values and {} has {}: they must be as many",
+                names.0, given.0, names.1, given.1
+            ),
+            Self::Simd { name } => write!(
+                f,
+                "PENDMAP_SIMD is '{name}': allowed are avx512, avx2, sse and portable, as far as \
+                 this processor has them"
+            ),
+            Self::Tolerance { tol, reached } => write!(
+                f,
+                "tol is {tol:e}: the smallest error that steps can reach here is {reached:.1e}"
+            ),
+            Self::Interrupted => f.write_str("interrupted"),
+            Self::Threads(why) => write!(f, "threads: {why}"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

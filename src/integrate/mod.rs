@@ -1,0 +1,21 @@
+//! From a state to a later one.
+//!
+//! - [`tableau`]: coefficients and their source
+//! - [`schedule`]: what all trajectories of a run of equal steps share, damping folded in
+//! - [`step`]: one step, for any number type
+//! - [`tangent`]: numbers with derivatives, for the variational equations
+//! - [`stroboscopic`]: many trajectories, one forcing period at a time
+//! - [`accuracy`]: how many steps a tolerance asks for
+//! - [`trajectory`]: one trajectory, sampled in time
+
+pub mod accuracy;
+pub mod schedule;
+pub mod step;
+pub mod stroboscopic;
+pub mod tableau;
+pub mod tangent;
+pub mod trajectory;
+
+pub use schedule::Schedule;
+pub use step::Moving;
+pub use stroboscopic::{State, Strobe};

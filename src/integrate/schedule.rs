@@ -1,0 +1,74 @@
+//! Everything about a run of equal steps that does not depend on the trajectory.
+//!
+//! Viscous damping is folded into the time of each step. With `s` the time since the step's start,
+//! `u = (1 - exp(-gamma s)) / gamma` and `w = th' exp(gamma s)`,
+//! `d th / du = w`, `d w / du = exp(2 gamma s) (torque - modulation sin th)`:
+//! no velocity on the right, so a Runge-Kutta-Nystrom method applies exactly. The factors
+//! `h_u^2 exp(2 gamma s)` of each stage go into the table, and the trajectory carries
+//! `kick = h_u th'`, so that a step has no other products than the method's own.
+
+use super::tableau::{C, STAGES};
+use crate::model::Pendulum;
+
+/// One step's loads, stage by stage, each times `h_u^2 exp(2 gamma s)`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StageLoads {
+    /// `1 + p cos(omega tau + phase)` at the stage.
+    pub modulation: [f64; STAGES],
+    /// The constant torque.
+    pub torque: [f64; STAGES],
+}
+
+/// A run of equal steps from one time to another, the same for every trajectory.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    steps: Vec<StageLoads>,
+    /// `exp(-gamma h)`: back from `w` to the velocity at a step's end.
+    pub decay: f64,
+    /// `h_u`: the velocity times this is the kick that a trajectory carries.
+    pub kick: f64,
+    duration: f64,
+}
+
+impl Schedule {
+    /// `steps` equal steps from `tau` to `tau + duration`.
+    #[must_use]
+    pub fn new(pendulum: &Pendulum, tau: f64, duration: f64, steps: usize) -> Self {
+        let gamma = pendulum.gamma;
+        let h = duration / steps as f64;
+        let kick = if gamma == 0.0 { h } else { -(-gamma * h).exp_m1() / gamma };
+        let stage_time =
+            C.map(|c| if gamma == 0.0 { c * h } else { -(-gamma * c * kick).ln_1p() / gamma });
+        let table = (0..steps)
+            .map(|k| {
+                let start = tau + duration * (k as f64 / steps as f64);
+                let mut loads = StageLoads::default();
+                for (i, s) in stage_time.into_iter().enumerate() {
+                    let factor = kick * kick * (2.0 * gamma * s).exp();
+                    loads.modulation[i] = factor * pendulum.drive.modulation(start + s);
+                    loads.torque[i] = factor * pendulum.torque;
+                }
+                loads
+            })
+            .collect();
+        Self { steps: table, decay: (-gamma * h).exp(), kick, duration }
+    }
+
+    /// `steps` equal steps over the forcing period that starts at `tau = 0`.
+    #[must_use]
+    pub fn period(pendulum: &Pendulum, steps: usize) -> Self {
+        Self::new(pendulum, 0.0, pendulum.period(), steps)
+    }
+
+    /// The steps, in order.
+    #[must_use]
+    pub fn steps(&self) -> &[StageLoads] {
+        &self.steps
+    }
+
+    /// Time covered.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.duration
+    }
+}

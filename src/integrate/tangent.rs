@@ -1,0 +1,105 @@
+//! Numbers that carry derivatives: the variational equations without writing them a second time.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use crate::lanes::sine::Degree;
+use crate::lanes::{Lane, Real};
+
+/// A value and its derivatives in `N` directions.
+#[derive(Clone, Copy, Debug)]
+pub struct Tangent<L, const N: usize> {
+    /// The value.
+    pub value: L,
+    /// Its derivative in each direction.
+    pub slope: [L; N],
+}
+
+// Loops and no closures: what the compiler leaves as a function of its own would lose the
+// instruction set that the caller was compiled for.
+
+impl<L: Lane, const N: usize> Add for Tangent<L, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(mut self, other: Self) -> Self {
+        for i in 0..N {
+            self.slope[i] = self.slope[i] + other.slope[i];
+        }
+        self.value = self.value + other.value;
+        self
+    }
+}
+
+impl<L: Lane, const N: usize> Sub for Tangent<L, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(mut self, other: Self) -> Self {
+        for i in 0..N {
+            self.slope[i] = self.slope[i] - other.slope[i];
+        }
+        self.value = self.value - other.value;
+        self
+    }
+}
+
+impl<L: Lane, const N: usize> Mul for Tangent<L, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(mut self, other: Self) -> Self {
+        for i in 0..N {
+            self.slope[i] = self.slope[i].mul_add(other.value, other.slope[i] * self.value);
+        }
+        self.value = self.value * other.value;
+        self
+    }
+}
+
+impl<L: Lane, const N: usize> Neg for Tangent<L, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(mut self) -> Self {
+        for slope in &mut self.slope {
+            *slope = -*slope;
+        }
+        self.value = -self.value;
+        self
+    }
+}
+
+impl<L: Lane, const N: usize> Real for Tangent<L, N> {
+    #[inline(always)]
+    fn scale_add(mut self, factor: f64, addend: Self) -> Self {
+        for i in 0..N {
+            self.slope[i] = self.slope[i].scale_add(factor, addend.slope[i]);
+        }
+        self.value = self.value.scale_add(factor, addend.value);
+        self
+    }
+
+    #[inline(always)]
+    fn affine(mut self, factor: f64, addend: f64) -> Self {
+        for slope in &mut self.slope {
+            *slope = slope.scale(factor);
+        }
+        self.value = self.value.affine(factor, addend);
+        self
+    }
+
+    #[inline(always)]
+    fn scale(mut self, factor: f64) -> Self {
+        for slope in &mut self.slope {
+            *slope = slope.scale(factor);
+        }
+        self.value = self.value.scale(factor);
+        self
+    }
+
+    #[inline(always)]
+    fn sine<D: Degree>(mut self) -> Self {
+        let cosine = self.value.cosine::<D>();
+        for slope in &mut self.slope {
+            *slope = *slope * cosine;
+        }
+        self.value = self.value.sine::<D>();
+        self
+    }
+}

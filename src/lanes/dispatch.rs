@@ -1,0 +1,131 @@
+//! One wheel, every processor: the instruction set is chosen when a call begins.
+
+use std::fmt;
+use std::str::FromStr;
+
+use pulp::{Scalar, Simd, WithSimd};
+
+use super::isa::Isa;
+use crate::error::Error;
+
+/// A path through the kernel. All give the same results within rounding; AVX-512 and AVX2 give the
+/// same bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// AVX-512: 48 lanes in six registers.
+    Avx512,
+    /// AVX2 with FMA: 24 lanes in six registers.
+    Avx2,
+    /// SSE4.2, without FMA: 12 lanes in six registers.
+    Sse,
+    /// Plain Rust, for any processor.
+    Portable,
+}
+
+impl Path {
+    /// Quickest first.
+    pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Sse, Self::Portable];
+
+    /// The word that `PENDMAP_SIMD` takes and `pendmap info` shows.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Avx512 => "avx512",
+            Self::Avx2 => "avx2",
+            Self::Sse => "sse",
+            Self::Portable => "portable",
+        }
+    }
+
+    /// Whether this processor can run it.
+    #[must_use]
+    pub fn available(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => pulp::x86::V4::try_new().is_some(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => pulp::x86::V3::try_new().is_some(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse => pulp::x86::V2::try_new().is_some(),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => false,
+        }
+    }
+
+    /// The path that `PENDMAP_SIMD` names, or else the quickest that this processor has.
+    ///
+    /// # Errors
+    /// [`Error::Simd`] if the variable names no path, or one that this processor lacks.
+    pub fn choose() -> Result<Self, Error> {
+        match std::env::var("PENDMAP_SIMD") {
+            Ok(name) if !name.is_empty() => {
+                let path: Self = name.parse()?;
+                if path.available() { Ok(path) } else { Err(Error::Simd { name }) }
+            }
+            _ => Ok(Self::ALL.into_iter().find(|path| path.available()).unwrap_or(Self::Portable)),
+        }
+    }
+}
+
+impl fmt::Display for Path {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Path {
+    type Err = Error;
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Self::ALL
+            .into_iter()
+            .find(|path| path.name() == name)
+            .ok_or_else(|| Error::Simd { name: name.to_owned() })
+    }
+}
+
+/// Work that is written once and compiled for every instruction set.
+pub trait Job {
+    /// What the work returns.
+    type Output;
+    /// The work; mark the implementation `#[inline(always)]`, and all that it calls in its loops.
+    fn run<S: Isa>(self, isa: S) -> Self::Output;
+}
+
+struct Entry<J, S>(J, S);
+
+impl<J: Job, S: Isa> WithSimd for Entry<J, S> {
+    type Output = J::Output;
+    #[inline(always)]
+    fn with_simd<T: Simd>(self, _: T) -> J::Output {
+        self.0.run(self.1)
+    }
+}
+
+/// Runs `job` on `path`, or on the portable one where the processor lacks it.
+pub fn run<J: Job>(path: Path, job: J) -> J::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use pulp::x86::{V2, V3, V4};
+        match path {
+            Path::Avx512 => {
+                if let Some(isa) = V4::try_new() {
+                    return Simd::vectorize(isa, Entry(job, isa));
+                }
+            }
+            Path::Avx2 => {
+                if let Some(isa) = V3::try_new() {
+                    return Simd::vectorize(isa, Entry(job, isa));
+                }
+            }
+            Path::Sse => {
+                if let Some(isa) = V2::try_new() {
+                    return Simd::vectorize(isa, Entry(job, isa));
+                }
+            }
+            Path::Portable => {}
+        }
+    }
+    let _ = path;
+    Scalar::new().vectorize(Entry(job, Scalar::new()))
+}

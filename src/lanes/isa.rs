@@ -1,0 +1,88 @@
+//! The instruction sets, and what each adds to `pulp`'s vectors.
+
+use pulp::{Scalar, Simd, cast};
+
+use super::pack::Bundle;
+use super::real::{Fused, Lane};
+
+/// An instruction set that trajectories run on.
+pub trait Isa: Simd {
+    /// Whether a product and a sum round once.
+    const FUSED: bool;
+    /// Trajectories side by side: enough registers to hide the latency of one.
+    type Lanes: Lane<Token = Self>;
+    /// One trajectory with the same arithmetic, bit for bit.
+    type Single: Lane<Token = ()>;
+
+    /// `a * b + c`, rounded once where [`Isa::FUSED`] and twice elsewhere.
+    fn multiply_add(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s;
+    /// Moves the lowest bit of each number to its sign and clears the others.
+    fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s;
+}
+
+impl Isa for Scalar {
+    const FUSED: bool = false;
+    type Lanes = Bundle<Self, 8>;
+    type Single = f64;
+
+    #[inline(always)]
+    fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+    #[inline(always)]
+    fn lowest_bit_to_sign(self, bits: u64) -> u64 {
+        bits << 63
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use pulp::x86::{V2, V3, V4};
+
+    use super::{Bundle, Fused, Isa, Simd, cast};
+
+    impl Isa for V2 {
+        const FUSED: bool = false;
+        type Lanes = Bundle<Self, 8>;
+        type Single = f64;
+
+        #[inline(always)]
+        fn multiply_add(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s {
+            self.add_f64s(self.mul_f64s(a, b), c)
+        }
+        #[inline(always)]
+        fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.sse2._mm_slli_epi64::<63>(cast(bits)))
+        }
+    }
+
+    impl Isa for V3 {
+        const FUSED: bool = true;
+        type Lanes = Bundle<Self, 8>;
+        type Single = Fused;
+
+        #[inline(always)]
+        fn multiply_add(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s {
+            self.mul_add_e_f64s(a, b, c)
+        }
+        #[inline(always)]
+        fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.avx2._mm256_slli_epi64::<63>(cast(bits)))
+        }
+    }
+
+    impl Isa for V4 {
+        const FUSED: bool = true;
+        type Lanes = Bundle<Self, 8>;
+        type Single = Fused;
+
+        #[inline(always)]
+        fn multiply_add(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s {
+            self.mul_add_e_f64s(a, b, c)
+        }
+        #[inline(always)]
+        fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.avx512f._mm512_slli_epi64::<63>(cast(bits)))
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Vectors of an instruction set as numbers: [`Pack`] is one register, [`Bundle`] several.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use super::isa::Isa;
+use super::real::{Lane, Real};
+use super::sine::{self, Degree};
+
+/// One vector register of the instruction set `S`.
+#[derive(Clone, Copy)]
+pub struct Pack<S: Isa> {
+    isa: S,
+    value: S::f64s,
+}
+
+/// `N` registers side by side. One alone waits for its own results; several hide that latency.
+#[derive(Clone, Copy)]
+pub struct Bundle<S: Isa, const N: usize>([Pack<S>; N]);
+
+impl<S: Isa> Pack<S> {
+    #[inline(always)]
+    fn new(isa: S, value: S::f64s) -> Self {
+        Self { isa, value }
+    }
+
+    #[inline(always)]
+    fn constant(self, value: f64) -> Self {
+        Self::new(self.isa, self.isa.splat_f64s(value))
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        Self::new(self.isa, self.isa.multiply_add(self.value, a.value, b.value))
+    }
+}
+
+// Loops and no closures: what the compiler leaves as a function of its own would lose the
+// instruction set that the caller was compiled for, and run 50 times slower.
+macro_rules! operator {
+    ($name:ident, $method:ident, $simd:ident) => {
+        impl<S: Isa, const N: usize> $name for Bundle<S, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(mut self, other: Self) -> Self {
+                for (a, b) in self.0.iter_mut().zip(&other.0) {
+                    a.value = a.isa.$simd(a.value, b.value);
+                }
+                self
+            }
+        }
+    };
+}
+
+operator!(Add, add, add_f64s);
+operator!(Sub, sub, sub_f64s);
+operator!(Mul, mul, mul_f64s);
+
+impl<S: Isa, const N: usize> Neg for Bundle<S, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(mut self) -> Self {
+        for a in &mut self.0 {
+            a.value = a.isa.neg_f64s(a.value);
+        }
+        self
+    }
+}
+
+impl<S: Isa, const N: usize> Real for Bundle<S, N> {
+    #[inline(always)]
+    fn scale_add(mut self, factor: f64, addend: Self) -> Self {
+        let factor = self.0[0].constant(factor);
+        for (a, b) in self.0.iter_mut().zip(&addend.0) {
+            *a = a.mul_add(factor, *b);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn affine(mut self, factor: f64, addend: f64) -> Self {
+        let factor = self.0[0].constant(factor);
+        let addend = self.0[0].constant(addend);
+        for a in &mut self.0 {
+            *a = a.mul_add(factor, addend);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn scale(mut self, factor: f64) -> Self {
+        let factor = self.0[0].constant(factor);
+        for a in &mut self.0 {
+            a.value = a.isa.mul_f64s(a.value, factor.value);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn sine<D: Degree>(self) -> Self {
+        sine::sine::<D, Self>(self)
+    }
+}
+
+impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
+    type Token = S;
+    const WIDTH: usize = N * S::F64_LANES;
+    const FUSED: bool = S::FUSED;
+
+    #[inline(always)]
+    fn splat(isa: S, value: f64) -> Self {
+        Self([Pack::new(isa, isa.splat_f64s(value)); N])
+    }
+
+    #[inline(always)]
+    fn load(isa: S, source: &[f64]) -> Self {
+        let width = S::F64_LANES;
+        let mut bundle = Self::splat(isa, 0.0);
+        for (i, pack) in bundle.0.iter_mut().enumerate() {
+            pack.value = isa.partial_load_f64s(&source[i * width..(i + 1) * width]);
+        }
+        bundle
+    }
+
+    #[inline(always)]
+    fn store(self, target: &mut [f64]) {
+        let width = S::F64_LANES;
+        for (i, pack) in self.0.iter().enumerate() {
+            let part = &mut target[i * width..(i + 1) * width];
+            pack.isa.partial_store_f64s(part, pack.value);
+        }
+    }
+
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Self([self.0[0].constant(value); N])
+    }
+
+    #[inline(always)]
+    fn mul_add(mut self, a: Self, b: Self) -> Self {
+        for i in 0..N {
+            self.0[i] = self.0[i].mul_add(a.0[i], b.0[i]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn min(mut self, other: Self) -> Self {
+        for (a, b) in self.0.iter_mut().zip(&other.0) {
+            a.value = a.isa.min_f64s(a.value, b.value);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn flip_where_odd(mut self, count: Self) -> Self {
+        for (a, c) in self.0.iter_mut().zip(&count.0) {
+            let isa = a.isa;
+            let parity = isa.lowest_bit_to_sign(isa.transmute_u64s_f64s(c.value));
+            let bits = isa.xor_u64s(isa.transmute_u64s_f64s(a.value), parity);
+            a.value = isa.transmute_f64s_u64s(bits);
+        }
+        self
+    }
+}

@@ -1,0 +1,49 @@
+//! Basin maps, attractors and damping identification of parametrically excited pendulums.
+//!
+//! The model is eq. 1.2 of Horton, Wiercigroch & Xu, "Transient tumbling chaos and damping
+//! identification for parametric pendulum", Phil. Trans. R. Soc. A (2008), with a constant torque:
+//! `th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque`.
+//!
+//! Which module answers which question:
+//!
+//! | question | module |
+//! |---|---|
+//! | What is the equation of motion? | [`model`] |
+//! | Where is a state some time later, how precisely, for how many at once? | [`integrate`] |
+//! | Which closed orbits are there, and are they stable? | [`orbit`] |
+//! | Where do motions end, and how is that recognised? | [`attractor`] |
+//! | What does the whole plane of initial conditions do? | [`maps`] |
+//! | How do many trajectories share a register? | [`lanes`] |
+//! | What was wrong with my request? | [`error`] |
+//!
+//! Imports run upwards in that list's reverse: `maps` -> `attractor`, `orbit` -> `integrate` ->
+//! `model` -> `lanes` -> `error`. Threads live in `maps` alone.
+//!
+//! ```
+//! use pendmap::maps::basins::{Options, basins};
+//! use pendmap::maps::control::Control;
+//! use pendmap::maps::starts::{Axis, Starts};
+//! use pendmap::model::Pendulum;
+//!
+//! # fn main() -> Result<(), pendmap::error::Error> {
+//! let pendulum = Pendulum::new(0.1, 0.6, 2.0, 0.0, 0.0)?;
+//! let starts = Starts::Grid {
+//!     theta: Axis::new("theta", -std::f64::consts::PI, std::f64::consts::PI, 40)?,
+//!     velocity: Axis::new("velocity", -3.0, 3.0, 40)?,
+//! };
+//! let map = basins(&pendulum, &starts, &Options::default(), &Control::default())?;
+//! let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
+//! assert_eq!(names, ["oscillation 2:0", "rotation 1:-1", "rotation 1:+1"]);
+//! # Ok(())
+//! # }
+//! ```
+
+pub mod attractor;
+pub mod error;
+pub mod integrate;
+pub mod lanes;
+pub mod maps;
+pub mod model;
+pub mod orbit;
+#[cfg(feature = "python")]
+mod python;

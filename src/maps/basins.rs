@@ -1,0 +1,271 @@
+//! Basins of attraction: attractors from a coarse set of starts, then every start to capture.
+
+use super::control::{Control, pool};
+use super::label::{FAILED, Labels, UNDECIDED, label};
+use super::layers::{FiniteTime, finite_time};
+use super::reliability::{Reliability, reliability};
+use super::starts::Starts;
+use super::texture::{Texture, texture};
+use crate::attractor::{Attractor, Catalogue};
+use crate::error::Error;
+use crate::integrate::{State, Strobe, accuracy};
+use crate::lanes::Path;
+use crate::model::Pendulum;
+
+/// Starts whose step error is measured.
+const ERROR_SAMPLE: usize = 400;
+/// Starts of the first search for attractors.
+const SEARCH_SAMPLE: usize = 400;
+/// Undecided starts that a further search begins from.
+const FURTHER_SAMPLE: usize = 256;
+/// Further searches at the most.
+const FURTHER: usize = 6;
+/// Periods after which a search begins to watch what is left.
+const SEARCH_BOUND: u32 = 1000;
+/// Where chaos coexists with other attractors, a start is given this many times the longest
+/// settling time that the search saw before it counts as chaotic.
+const PATIENCE: u32 = 10;
+const LEAST_BOUND: u32 = 200;
+/// The bound where none is given.
+const MAX_PERIODS: u32 = 4000;
+
+/// What to compute, and how well.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// The 95th percentile of the error after five periods.
+    pub tol: f64,
+    /// Periods after which a start is undecided.
+    pub max_periods: Option<u32>,
+    /// Periods of the finite-time layers.
+    pub layer_periods: Option<u32>,
+    /// Workers; 0 for one a processor.
+    pub threads: usize,
+    /// Shifts the samples.
+    pub seed: u64,
+    /// Whether to measure the share of labels that half the step or mirroring changes.
+    pub check: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { tol: 1e-6, max_periods: None, layer_periods: None, threads: 0, seed: 0, check: true }
+    }
+}
+
+/// Why labels tell nothing, where they do not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plane {
+    /// Labels tell basins apart.
+    Basins,
+    /// Without damping there are no attractors.
+    Conservative,
+    /// One chaotic attractor takes everything.
+    OnlyChaos,
+}
+
+/// A basin map.
+#[derive(Debug)]
+pub struct BasinMap {
+    /// The attractors; label 1 is the first.
+    pub attractors: Vec<Attractor>,
+    /// Labels, settling times and turns.
+    pub labels: Labels,
+    /// Turns and exponents over a fixed time, where labels tell nothing.
+    pub layers: Option<FiniteTime>,
+    /// Which of the cases this is.
+    pub plane: Plane,
+    /// Periods of the finite-time layers.
+    pub layer_periods: u32,
+    /// Share of the starts of each attractor.
+    pub fractions: Vec<f64>,
+    /// Texture of the labels.
+    pub texture: Texture,
+    /// What half the step and mirroring change.
+    pub reliability: Reliability,
+    /// Steps a period.
+    pub steps: usize,
+    /// The error that was reached, as [`accuracy::error_reached`] defines it.
+    pub reached_error: f64,
+    /// Bound after which a start counted as undecided or, near chaos, as chaotic.
+    pub bound: u32,
+    /// The instruction set.
+    pub path: Path,
+}
+
+impl BasinMap {
+    /// Share of starts with this label.
+    #[must_use]
+    pub fn share(&self, label: i16) -> f64 {
+        let count = self.labels.label.iter().filter(|l| **l == label).count();
+        count as f64 / self.labels.label.len().max(1) as f64
+    }
+
+    /// Mean number of periods integrated for a start.
+    #[must_use]
+    pub fn mean_periods(&self) -> f64 {
+        self.labels.work as f64 / self.labels.label.len().max(1) as f64
+    }
+}
+
+/// The basins of attraction of `pendulum` over `starts`.
+///
+/// # Errors
+/// [`Error::Range`] and [`Error::Tolerance`] for requests that cannot be met,
+/// [`Error::Interrupted`] if `control` was cancelled.
+pub fn basins(
+    pendulum: &Pendulum,
+    starts: &Starts,
+    options: &Options,
+    control: &Control,
+) -> Result<BasinMap, Error> {
+    let path = Path::choose()?;
+    if starts.is_empty() {
+        return Err(Error::Range { name: "starts", value: 0.0, allowed: "1 or more" });
+    }
+    let pool = pool(options.threads)?;
+    let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
+    let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, path)?;
+    let mut catalogue = Catalogue::new(&strobe);
+    let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
+    let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
+    catalogue.search(&strobe, &seeds, SEARCH_BOUND.min(max_periods), control.flag());
+    control.check()?;
+
+    let plane = if !pendulum.is_dissipative() {
+        Plane::Conservative
+    } else if catalogue.only_chaos().is_some() {
+        Plane::OnlyChaos
+    } else {
+        Plane::Basins
+    };
+    let mut map = BasinMap {
+        attractors: Vec::new(),
+        labels: Labels::empty(),
+        layers: None,
+        plane,
+        layer_periods: 0,
+        fractions: Vec::new(),
+        texture: Texture { basin_entropy: 0.0, neighbours_agree: 1.0, chance: 1.0 },
+        reliability: Reliability::default(),
+        steps: strobe.steps(),
+        reached_error,
+        bound: max_periods,
+        path,
+    };
+    if plane == Plane::Basins {
+        let (labels, bound) = to_capture(&strobe, &mut catalogue, starts, options, &pool, control)?;
+        map.texture = texture(&labels, starts);
+        map.bound = bound;
+        if options.check {
+            map.reliability =
+                reliability(&strobe, &catalogue, starts, &labels, bound, options.seed, &pool)?;
+        }
+        map.labels = labels;
+    } else {
+        let periods =
+            options.layer_periods.unwrap_or_else(|| layer_periods(&catalogue, pendulum, starts));
+        let layers = finite_time(&strobe, starts, periods as usize, &pool, control)?;
+        map.labels = Labels::unlabelled(&layers, plane == Plane::OnlyChaos, periods);
+        map.layers = Some(layers);
+        map.layer_periods = periods;
+        map.bound = periods;
+    }
+    map.attractors = catalogue.attractors;
+    map.fractions = (0..map.attractors.len()).map(|i| map.share(i as i16 + 1)).collect();
+    Ok(map)
+}
+
+/// Labels all starts; those that meet no known attractor begin new searches.
+fn to_capture(
+    strobe: &Strobe,
+    catalogue: &mut Catalogue,
+    starts: &Starts,
+    options: &Options,
+    pool: &rayon::ThreadPool,
+    control: &Control,
+) -> Result<(Labels, u32), Error> {
+    let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
+    let bound = |catalogue: &Catalogue| {
+        if catalogue.has_chaos() && options.max_periods.is_none() {
+            (PATIENCE * catalogue.longest_settle).clamp(LEAST_BOUND, max_periods)
+        } else {
+            max_periods
+        }
+    };
+    let mut now = bound(catalogue);
+    let mut labels = label(strobe, catalogue, starts, None, now, pool, control)?;
+    for _ in 0..FURTHER {
+        if labels.open.is_empty() {
+            break;
+        }
+        let stride = labels.open.len().div_ceil(FURTHER_SAMPLE);
+        let states: Vec<State> = labels.open.iter().step_by(stride).map(|(_, s)| *s).collect();
+        let keys: Vec<[u64; 2]> = catalogue.attractors.iter().map(key).collect();
+        if !catalogue.search(strobe, &states, SEARCH_BOUND.min(max_periods), control.flag()) {
+            break;
+        }
+        control.check()?;
+        // Attractors may have moved in the sorted list: the labels move with them.
+        let moved: Vec<i16> = keys
+            .iter()
+            .map(|old| catalogue.attractors.iter().position(|a| key(a) == *old))
+            .map(|at| at.map_or(UNDECIDED, |i| i as i16 + 1))
+            .collect();
+        for label in labels.label.iter_mut().filter(|l| **l > 0) {
+            *label = moved[*label as usize - 1];
+        }
+        now = bound(catalogue).max(now);
+        let picks: Vec<usize> = labels.open.iter().map(|(i, _)| *i).collect();
+        let again = label(strobe, catalogue, starts, Some(&picks), now, pool, control)?;
+        labels.replace(&picks, again);
+    }
+    Ok((labels, now))
+}
+
+/// What stays when the catalogue is sorted anew: the bits of the first point.
+fn key(attractor: &Attractor) -> [u64; 2] {
+    attractor.points.first().map_or([0; 2], |p| p.map(f64::to_bits))
+}
+
+/// Periods after which an exponent has stretched one cell to the size of the plane: later the
+/// picture is noise. Without attractors, long enough to tell islands from the chaotic sea.
+fn layer_periods(catalogue: &Catalogue, pendulum: &Pendulum, starts: &Starts) -> u32 {
+    let Some(chaos) = catalogue.only_chaos() else { return 30 };
+    let side = (starts.len() as f64).sqrt().max(2.0);
+    let per_period = catalogue.attractors[chaos].exponent * pendulum.period();
+    (side.ln() / per_period).ceil().clamp(3.0, 60.0) as u32
+}
+
+impl Labels {
+    fn empty() -> Self {
+        Self { label: Vec::new(), settle: Vec::new(), turns: Vec::new(), open: Vec::new(), work: 0 }
+    }
+
+    /// Of a plane without labels: all chaotic, or all undecided.
+    fn unlabelled(layers: &FiniteTime, chaotic: bool, periods: u32) -> Self {
+        let count = layers.turns.len();
+        let label = layers
+            .exponent
+            .iter()
+            .map(|e| if e.is_finite() { i16::from(chaotic) } else { FAILED })
+            .collect();
+        Self {
+            label,
+            settle: vec![super::label::NEVER; count],
+            turns: layers.turns.clone(),
+            open: Vec::new(),
+            work: count as u64 * u64::from(periods),
+        }
+    }
+
+    /// Puts the results for `picks` in their places.
+    fn replace(&mut self, picks: &[usize], again: Self) {
+        for (k, index) in picks.iter().enumerate() {
+            self.label[*index] = again.label[k];
+            self.settle[*index] = again.settle[k];
+            self.turns[*index] = again.turns[k];
+        }
+        self.open = again.open.into_iter().map(|(k, s)| (picks[k], s)).collect();
+        self.work += again.work;
+    }
+}

@@ -1,0 +1,189 @@
+//! Every start to the attractor that captures it, on all threads.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicI16, AtomicI32, AtomicUsize, Ordering};
+
+use super::control::Control;
+use super::starts::Starts;
+use crate::attractor::Catalogue;
+use crate::attractor::capture::{self, Fate, Outcome, Source};
+use crate::error::Error;
+use crate::integrate::{State, Strobe};
+
+/// Not decided within the bound.
+pub const UNDECIDED: i16 = 0;
+/// Failed or diverged.
+pub const FAILED: i16 = -1;
+/// Settle time of a start without one.
+pub const NEVER: i32 = -1;
+
+/// Starts that a worker takes at a time.
+const TAKE: usize = 32;
+/// Open trajectories are compared with the regions of chaotic attractors in such lots.
+const LOT: usize = 512;
+/// Stroboscopic points that tell whether a trajectory lives in a region.
+const LAST_POINTS: usize = 16;
+
+/// Labels and what goes with them, one entry a start.
+#[derive(Debug)]
+pub struct Labels {
+    /// Attractor number from 1, or [`UNDECIDED`] or [`FAILED`].
+    pub label: Vec<i16>,
+    /// Periods until captured, or [`NEVER`].
+    pub settle: Vec<i32>,
+    /// Net turns until then, or until the bound.
+    pub turns: Vec<i32>,
+    /// Undecided starts, by index.
+    pub open: Vec<(usize, State)>,
+    /// Periods integrated in all.
+    pub work: u64,
+}
+
+struct Shared<'a> {
+    strobe: &'a Strobe,
+    catalogue: &'a Catalogue,
+    starts: &'a Starts,
+    picks: Option<&'a [usize]>,
+    control: &'a Control,
+    next: AtomicUsize,
+    label: Vec<AtomicI16>,
+    settle: Vec<AtomicI32>,
+    turns: Vec<AtomicI32>,
+    open: Mutex<Vec<(usize, State)>>,
+}
+
+impl Shared<'_> {
+    fn count(&self) -> usize {
+        self.picks.map_or(self.starts.len(), <[usize]>::len)
+    }
+
+    fn start(&self, k: usize) -> State {
+        self.starts.get(self.picks.map_or(k, |picks| picks[k]))
+    }
+}
+
+struct Worker<'a> {
+    shared: &'a Shared<'a>,
+    range: std::ops::Range<usize>,
+    lot: Vec<(usize, State)>,
+    open: Vec<(usize, State)>,
+    work: u64,
+}
+
+impl Source for Worker<'_> {
+    fn next(&mut self) -> Option<(usize, State)> {
+        if self.range.is_empty() {
+            let begin = self.shared.next.fetch_add(TAKE, Ordering::Relaxed);
+            let end = (begin + TAKE).min(self.shared.count());
+            self.range = begin..end.max(begin);
+        }
+        self.range.next().map(|k| (k, self.shared.start(k)))
+    }
+
+    fn done(&mut self, index: usize, outcome: Outcome) {
+        let shared = self.shared;
+        let (label, settle) = match outcome.fate {
+            Fate::Captured(attractor) => (attractor as i16 + 1, outcome.periods as i32),
+            Fate::Failed => (FAILED, NEVER),
+            Fate::Open => {
+                self.lot.push((index, outcome.state));
+                (UNDECIDED, NEVER)
+            }
+        };
+        shared.label[index].store(label, Ordering::Relaxed);
+        shared.settle[index].store(settle, Ordering::Relaxed);
+        let turns = outcome.turns.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+        shared.turns[index].store(turns, Ordering::Relaxed);
+        self.work += u64::from(outcome.work);
+        shared.control.add(1);
+        if self.lot.len() >= LOT {
+            self.sort_lot();
+        }
+    }
+}
+
+impl Worker<'_> {
+    /// Gives the open trajectories of the lot to the regions that they live in.
+    fn sort_lot(&mut self) {
+        let shared = self.shared;
+        let lot = std::mem::take(&mut self.lot);
+        if !shared.catalogue.has_chaos() {
+            self.open.extend(lot);
+            return;
+        }
+        let mut theta: Vec<f64> = lot.iter().map(|(_, s)| s[0]).collect();
+        let mut velocity: Vec<f64> = lot.iter().map(|(_, s)| s[1]).collect();
+        let mut turns = vec![0.0; lot.len()];
+        let mut tracks = vec![Vec::with_capacity(LAST_POINTS); lot.len()];
+        for _ in 0..LAST_POINTS {
+            // Lengths agree, so this cannot fail.
+            let _ = shared.strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
+            for (track, (a, b)) in tracks.iter_mut().zip(theta.iter().zip(&velocity)) {
+                track.push([*a, *b]);
+            }
+        }
+        for ((index, state), track) in lot.into_iter().zip(tracks) {
+            match shared.catalogue.region_of(&track) {
+                Some(attractor) => {
+                    shared.label[index].store(attractor as i16 + 1, Ordering::Relaxed);
+                }
+                None => self.open.push((index, state)),
+            }
+        }
+    }
+}
+
+/// Runs all starts (or those of `picks`) to capture, for at most `bound` periods.
+///
+/// A start's result depends on nothing but the start, so neither the number of threads nor the
+/// order in which they take work shows.
+///
+/// # Errors
+/// [`Error::Interrupted`] if `control` was cancelled; [`Error::Threads`] without a pool.
+pub fn label(
+    strobe: &Strobe,
+    catalogue: &Catalogue,
+    starts: &Starts,
+    picks: Option<&[usize]>,
+    bound: u32,
+    pool: &rayon::ThreadPool,
+    control: &Control,
+) -> Result<Labels, Error> {
+    let count = picks.map_or(starts.len(), <[usize]>::len);
+    let shared = Shared {
+        strobe,
+        catalogue,
+        starts,
+        picks,
+        control,
+        next: AtomicUsize::new(0),
+        label: (0..count).map(|_| AtomicI16::new(UNDECIDED)).collect(),
+        settle: (0..count).map(|_| AtomicI32::new(NEVER)).collect(),
+        turns: (0..count).map(|_| AtomicI32::new(0)).collect(),
+        open: Mutex::new(Vec::new()),
+    };
+    control.begin(count);
+    let work: u64 = pool
+        .broadcast(|_| {
+            let mut worker =
+                Worker { shared: &shared, range: 0..0, lot: Vec::new(), open: Vec::new(), work: 0 };
+            capture::run(strobe, &catalogue.traps, bound, control.flag(), &mut worker);
+            worker.sort_lot();
+            if let Ok(mut open) = shared.open.lock() {
+                open.append(&mut worker.open);
+            }
+            worker.work
+        })
+        .into_iter()
+        .sum();
+    control.check()?;
+    let mut open = shared.open.into_inner().unwrap_or_default();
+    open.sort_by_key(|(index, _)| *index);
+    Ok(Labels {
+        label: shared.label.into_iter().map(AtomicI16::into_inner).collect(),
+        settle: shared.settle.into_iter().map(AtomicI32::into_inner).collect(),
+        turns: shared.turns.into_iter().map(AtomicI32::into_inner).collect(),
+        open,
+        work,
+    })
+}

@@ -1,0 +1,18 @@
+//! Pictures of whole planes, on all threads.
+//!
+//! - [`advance`]: plain integration of many starts
+//! - [`starts`]: the grid or list of initial conditions
+//! - [`basins`]: basins of attraction
+//! - [`label`]: every start to the attractor that captures it
+//! - [`layers`]: turns and exponents over a fixed time
+//! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
+//! - [`control`]: progress, cancellation, threads
+
+pub mod advance;
+pub mod basins;
+pub mod control;
+pub mod label;
+pub mod layers;
+pub mod reliability;
+pub mod starts;
+pub mod texture;

@@ -1,0 +1,77 @@
+//! Whether labels can be believed: what half the step, or mirroring, changes.
+
+use super::control::Control;
+use super::label::{Labels, label};
+use super::starts::Starts;
+use crate::attractor::Catalogue;
+use crate::error::Error;
+use crate::integrate::{State, Strobe};
+
+/// Labels that are tried again.
+const SAMPLE: usize = 2000;
+
+/// Shares of the sampled labels that change.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reliability {
+    /// Under half the step or mirroring.
+    pub either: f64,
+    /// Under half the step.
+    pub half_step: f64,
+    /// Under mirroring; `None` where a torque breaks the symmetry.
+    pub mirror: Option<f64>,
+    /// Labels sampled.
+    pub sampled: usize,
+}
+
+/// Labels a sample of the starts again with half the step, and from the mirrored start.
+///
+/// The arithmetic of the kernel is odd in the state, bit for bit, so a mirrored start would repeat
+/// every rounding error; it is moved by one unit in the last place, as any other way of computing it
+/// would do.
+///
+/// # Errors
+/// [`Error::Threads`] without a pool.
+pub fn reliability(
+    strobe: &Strobe,
+    catalogue: &Catalogue,
+    starts: &Starts,
+    labels: &Labels,
+    bound: u32,
+    seed: u64,
+    pool: &rayon::ThreadPool,
+) -> Result<Reliability, Error> {
+    let picks = starts.sample(SAMPLE, seed.wrapping_add(1));
+    let states: Vec<State> = picks.iter().map(|i| starts.get(*i)).collect();
+    let control = Control::default();
+    let again = |strobe: &Strobe, states: Vec<State>| {
+        label(strobe, catalogue, &Starts::List(states), None, bound, pool, &control)
+    };
+    let own: Vec<i16> = picks.iter().map(|i| labels.label[*i]).collect();
+    let halved = again(&strobe.refined(2), states.clone())?.label;
+    let mirrored = if strobe.pendulum.is_mirror_symmetric() {
+        let mirror = states.iter().map(|s| [(-s[0]).next_up(), (-s[1]).next_up()]).collect();
+        Some(again(strobe, mirror)?.label)
+    } else {
+        None
+    };
+    let twin = |label: i16| {
+        let index = usize::try_from(label - 1).ok();
+        let twin = index.and_then(|i| catalogue.attractors.get(i)).and_then(|a| a.twin);
+        twin.map_or(label, |t| t as i16 + 1)
+    };
+    let (mut either, mut half_step, mut mirror) = (0, 0, 0);
+    for (k, own) in own.iter().enumerate() {
+        let by_half = halved[k] != *own;
+        let by_mirror = mirrored.as_ref().is_some_and(|m| twin(m[k]) != *own);
+        half_step += usize::from(by_half);
+        mirror += usize::from(by_mirror);
+        either += usize::from(by_half || by_mirror);
+    }
+    let share = |count: usize| count as f64 / own.len().max(1) as f64;
+    Ok(Reliability {
+        either: share(either),
+        half_step: share(half_step),
+        mirror: mirrored.is_some().then(|| share(mirror)),
+        sampled: own.len(),
+    })
+}

@@ -1,0 +1,40 @@
+//! Floquet multipliers of a closed orbit.
+
+use nalgebra::{Complex, Matrix2};
+
+/// The eigenvalues of the derivative of `P^n`, the larger first.
+///
+/// Their product is `exp(-gamma n T)` whatever the orbit: damping alone shrinks phase area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Multipliers(pub [Complex<f64>; 2]);
+
+impl Multipliers {
+    /// The largest modulus: below 1 the orbit attracts.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        self.0[0].norm()
+    }
+
+    /// The largest Lyapunov exponent of an orbit that closes after `duration`.
+    #[must_use]
+    pub fn exponent(&self, duration: f64) -> f64 {
+        self.largest().ln() / duration
+    }
+}
+
+/// From the monodromy matrix and the exact product of its eigenvalues.
+///
+/// The trace comes from the matrix; the product is the exact one, since the difference of large
+/// entries loses it where the contraction is strong.
+#[must_use]
+pub fn multipliers(monodromy: &Matrix2<f64>, product: f64) -> Multipliers {
+    let half = 0.5 * monodromy.trace();
+    let square = half * half - product;
+    if square < 0.0 {
+        let imaginary = (-square).sqrt();
+        return Multipliers([Complex::new(half, imaginary), Complex::new(half, -imaginary)]);
+    }
+    let large = half + square.sqrt().copysign(half);
+    let small = if large == 0.0 { 0.0 } else { product / large };
+    Multipliers([Complex::new(large, 0.0), Complex::new(small, 0.0)])
+}

@@ -1,0 +1,10 @@
+//! Closed orbits: the precise stroboscopic map, Newton's method, Floquet multipliers.
+
+pub mod floquet;
+pub mod newton;
+pub mod poincare;
+pub mod rotation;
+
+pub use floquet::Multipliers;
+pub use newton::PeriodicOrbit;
+pub use poincare::PoincareMap;

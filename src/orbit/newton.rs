@@ -1,0 +1,122 @@
+//! Periodic orbits of the stroboscopic map by Newton's method.
+
+use nalgebra::Matrix2;
+
+use super::floquet::{Multipliers, multipliers};
+use super::poincare::{PoincareMap, closing_gap};
+use crate::integrate::State;
+use crate::integrate::accuracy::distance;
+
+/// Largest `|P^n(x) - x|` of an orbit that counts as found.
+pub const RESIDUAL: f64 = 1e-12;
+/// Largest relative deviation of the multipliers' product from `exp(-gamma n T)`.
+pub const PRODUCT: f64 = 1e-9;
+const ITERATIONS: usize = 16;
+/// By this iteration the gap must have fallen tenfold, or the start was too far.
+const PROMISING: usize = 5;
+/// Points closer than this are one point of the orbit.
+const SAME_POINT: f64 = 1e-8;
+
+/// A closed orbit of the stroboscopic map.
+#[derive(Clone, Debug)]
+pub struct PeriodicOrbit {
+    /// Smallest period, in forcing periods, modulo a turn.
+    pub n: usize,
+    /// Net turns over those periods.
+    pub w: i64,
+    /// The orbit's points in their order, the first with the lowest angle.
+    pub points: Vec<State>,
+    /// `|P^n(x) - x|`.
+    pub residual: f64,
+    /// Eigenvalues of the derivative of `P^n`.
+    pub multipliers: Multipliers,
+    /// Derivative of `P^n` at each point.
+    pub monodromy: Vec<Matrix2<f64>>,
+}
+
+impl PeriodicOrbit {
+    /// Whether both multipliers lie inside the unit circle.
+    #[must_use]
+    pub fn is_stable(&self) -> bool {
+        self.multipliers.largest() < 1.0
+    }
+
+    /// Whether `state` is one of its points, within `tolerance`.
+    #[must_use]
+    pub fn contains(&self, state: State, tolerance: f64) -> bool {
+        self.points.iter().any(|p| distance(*p, state) < tolerance)
+    }
+}
+
+/// Newton's method on `P^n(x) - x` from `start`; then the smallest period that divides `n`.
+///
+/// `None` if it does not converge to a residual below [`RESIDUAL`], wanders further than `reach`,
+/// or if the multipliers' product is not `exp(-gamma n T)`.
+#[must_use]
+pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<PeriodicOrbit> {
+    let point = polish(map, start, n, reach)?;
+    let image = |d: usize| map.iterate(point, d);
+    let smallest = (1..=n)
+        .filter(|d| n.is_multiple_of(*d))
+        .find(|d| *d == n || distance(image(*d).state, point) < SAME_POINT)?;
+    let point = if smallest == n { point } else { polish(map, point, smallest, reach)? };
+    complete(map, point, smallest)
+}
+
+fn polish(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<State> {
+    let mut point = start;
+    let mut best: Option<(f64, State)> = None;
+    let mut first = f64::INFINITY;
+    for iteration in 0..ITERATIONS {
+        let image = map.iterate(point, n);
+        let gap = closing_gap(point, image.state);
+        let size = gap.norm();
+        if iteration == 0 {
+            first = size;
+        }
+        if iteration == PROMISING && size > 0.1 * first && size > RESIDUAL {
+            break;
+        }
+        if !size.is_finite() || distance(point, start) > reach {
+            break;
+        }
+        match best {
+            // At the level of rounding the gap no longer falls: that is the end.
+            Some((least, _)) if size >= least && least < RESIDUAL => break,
+            Some((least, _)) if size >= least => {}
+            _ => best = Some((size, point)),
+        }
+        let step = (Matrix2::identity() - image.derivative).lu().solve(&gap)?;
+        let length = step.norm();
+        let damped = if length > 0.5 { 0.5 / length } else { 1.0 };
+        point = [point[0] + damped * step[0], point[1] + damped * step[1]];
+    }
+    let (least, point) = best?;
+    (least < RESIDUAL).then_some(point)
+}
+
+fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> {
+    let mut points = Vec::with_capacity(n);
+    let mut derivatives = Vec::with_capacity(n);
+    let mut w = 0;
+    let mut state = first;
+    for _ in 0..n {
+        points.push(state);
+        let image = map.once(state);
+        derivatives.push(image.derivative);
+        w += image.turns;
+        state = image.state;
+    }
+    let residual = closing_gap(first, state).norm();
+    let lowest = (0..n).min_by(|a, b| points[*a][0].total_cmp(&points[*b][0]))?;
+    points.rotate_left(lowest);
+    derivatives.rotate_left(lowest);
+    let monodromy: Vec<Matrix2<f64>> = (0..n)
+        .map(|start| (0..n).fold(Matrix2::identity(), |m, k| derivatives[(start + k) % n] * m))
+        .collect();
+    let exact = (-map.pendulum.gamma * n as f64 * map.pendulum.period()).exp();
+    let multipliers = multipliers(&monodromy[0], exact);
+    let product = derivatives.iter().map(Matrix2::determinant).product::<f64>();
+    ((product / exact - 1.0).abs() < PRODUCT && residual < 10.0 * RESIDUAL)
+        .then_some(PeriodicOrbit { n, w, points, residual, multipliers, monodromy })
+}

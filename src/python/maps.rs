@@ -1,0 +1,85 @@
+//! Bindings of `maps`.
+
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::watch::watched;
+use super::{Parameters, convert, pendulum};
+use crate::error::Error;
+use crate::maps::basins::{Options, basins};
+use crate::maps::starts::{Axis, Starts};
+
+/// `(low, high, count)` as Python hands it over.
+type AxisTuple = (f64, f64, usize);
+
+/// Numerical choices as Python hands them over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Choices {
+    tol: f64,
+    max_periods: Option<u32>,
+    layer_periods: Option<u32>,
+    threads: usize,
+    seed: u64,
+    check: bool,
+}
+
+impl From<Choices> for Options {
+    fn from(choices: Choices) -> Self {
+        let Choices { tol, max_periods, layer_periods, threads, seed, check } = choices;
+        Self { tol, max_periods, layer_periods, threads, seed, check }
+    }
+}
+
+/// Basins over a grid.
+#[pyfunction]
+pub fn basins_grid<'py>(
+    py: Python<'py>,
+    parameters: Parameters,
+    theta: AxisTuple,
+    velocity: AxisTuple,
+    choices: Choices,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let theta = Axis::new("theta", theta.0, theta.1, theta.2)?;
+    let velocity = Axis::new("velocity", velocity.0, velocity.1, velocity.2)?;
+    run(py, parameters, Starts::Grid { theta, velocity }, choices, progress)
+}
+
+/// Basins of a list of starts.
+#[pyfunction]
+pub fn basins_list<'py>(
+    py: Python<'py>,
+    parameters: Parameters,
+    theta: PyReadonlyArray1<'py, f64>,
+    velocity: PyReadonlyArray1<'py, f64>,
+    choices: Choices,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (theta, velocity) = (theta.as_slice()?, velocity.as_slice()?);
+    if theta.len() != velocity.len() {
+        let given = (theta.len(), velocity.len());
+        return Err(Error::Lengths { given, names: ("theta", "velocity") }.into());
+    }
+    if let Some(value) = theta.iter().chain(velocity).find(|x| !x.is_finite()) {
+        let allowed = "finite starts only";
+        return Err(Error::Range { name: "start", value: *value, allowed }.into());
+    }
+    let states = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
+    run(py, parameters, Starts::List(states), choices, progress)
+}
+
+fn run<'py>(
+    py: Python<'py>,
+    parameters: Parameters,
+    starts: Starts,
+    choices: Choices,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let pendulum = pendulum(parameters)?;
+    let options = Options::from(choices);
+    let map =
+        watched(py, progress.as_ref(), |control| basins(&pendulum, &starts, &options, control))?;
+    convert::basin_map(py, map)
+}

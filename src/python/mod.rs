@@ -1,0 +1,67 @@
+//! The Python module `pendmap._core`. Each function extracts, detaches, calls and converts.
+
+// PyO3 hands arguments over by value, and its signatures read best with the lifetime spelled out.
+#![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
+
+mod convert;
+mod maps;
+mod motion;
+mod watch;
+
+use pyo3::prelude::*;
+
+use crate::error::Error;
+use crate::lanes::Path;
+use crate::model::Pendulum;
+
+/// One mapping of errors for all functions: what the caller gave is a `ValueError`.
+impl From<Error> for PyErr {
+    fn from(error: Error) -> Self {
+        use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+        match error {
+            Error::Interrupted => PyKeyboardInterrupt::new_err(()),
+            Error::Threads(_) => PyRuntimeError::new_err(error.to_string()),
+            _ => PyValueError::new_err(error.to_string()),
+        }
+    }
+}
+
+/// `(gamma, p, omega, phase, torque)` as Python hands it over.
+type Parameters = (f64, f64, f64, f64, f64);
+
+fn pendulum(parameters: Parameters) -> Result<Pendulum, Error> {
+    let (gamma, p, omega, phase, torque) = parameters;
+    Pendulum::new(gamma, p, omega, phase, torque)
+}
+
+/// The instruction set that a call would use now.
+#[pyfunction]
+fn simd() -> PyResult<&'static str> {
+    Ok(Path::choose()?.name())
+}
+
+/// The instruction sets that this processor has, quickest first.
+#[pyfunction]
+fn simd_available() -> Vec<&'static str> {
+    Path::ALL.into_iter().filter(|path| path.available()).map(Path::name).collect()
+}
+
+/// Number of threads that a call uses if none is given.
+#[pyfunction]
+fn default_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_function(wrap_pyfunction!(simd, module)?)?;
+    module.add_function(wrap_pyfunction!(simd_available, module)?)?;
+    module.add_function(wrap_pyfunction!(default_threads, module)?)?;
+    module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
+    module.add_function(wrap_pyfunction!(motion::choose_steps, module)?)?;
+    module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::basins_grid, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::basins_list, module)?)?;
+    Ok(())
+}

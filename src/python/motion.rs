@@ -1,0 +1,78 @@
+//! Bindings of `integrate`.
+
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::watch::watched;
+use super::{Parameters, convert, pendulum};
+use crate::error::Error;
+use crate::integrate::trajectory::{self, Request};
+use crate::integrate::{State, Strobe, accuracy};
+use crate::lanes::Path;
+use crate::maps::advance::advance as advance_all;
+
+/// Angle in [-pi, pi], velocity and net turns.
+type Advanced<'py> =
+    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>);
+
+/// Many starts, the same number of forcing periods on.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub fn advance<'py>(
+    py: Python<'py>,
+    parameters: Parameters,
+    theta: PyReadonlyArray1<'py, f64>,
+    velocity: PyReadonlyArray1<'py, f64>,
+    periods: usize,
+    steps_per_period: usize,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Advanced<'py>> {
+    let pendulum = pendulum(parameters)?;
+    if steps_per_period == 0 {
+        let allowed = "1 or more";
+        return Err(Error::Range { name: "steps_per_period", value: 0.0, allowed }.into());
+    }
+    let mut theta = theta.as_slice()?.to_vec();
+    let mut velocity = velocity.as_slice()?.to_vec();
+    let path = Path::choose()?;
+    let strobe = Strobe::new(&pendulum, steps_per_period, path);
+    let turns = watched(py, progress.as_ref(), |control| {
+        advance_all(&strobe, &mut theta, &mut velocity, periods, threads, control)
+    })?;
+    Ok((theta.into_pyarray(py), velocity.into_pyarray(py), turns.into_pyarray(py)))
+}
+
+/// The fewest steps a period that reach `tol` on these starts, and the error reached.
+#[pyfunction]
+pub fn choose_steps(
+    parameters: Parameters,
+    theta: PyReadonlyArray1<'_, f64>,
+    velocity: PyReadonlyArray1<'_, f64>,
+    tol: f64,
+) -> PyResult<(usize, f64)> {
+    let pendulum = pendulum(parameters)?;
+    let states: Vec<State> =
+        theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
+    let (strobe, error) = accuracy::choose(&pendulum, &states, tol, Path::choose()?)?;
+    Ok((strobe.steps(), error))
+}
+
+/// One trajectory.
+#[pyfunction]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    parameters: Parameters,
+    start: (f64, f64),
+    until: f64,
+    tol: f64,
+    samples: usize,
+    lyapunov: bool,
+) -> PyResult<Bound<'py, PyDict>> {
+    let pendulum = pendulum(parameters)?;
+    let request = Request { start: [start.0, start.1], until, tol, samples, lyapunov };
+    let run =
+        watched(py, None, |control| trajectory::simulate(&pendulum, &request, control.flag()))?;
+    convert::trajectory(py, run)
+}

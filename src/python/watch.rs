@@ -1,0 +1,58 @@
+//! Long calls: without the interpreter lock, with Ctrl-C and progress.
+
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::error::Error;
+use crate::maps::control::Control;
+
+/// How often signals and progress are looked at.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Runs `work` on a thread of its own and waits for it, detached from the interpreter; at every
+/// pause it checks for signals and calls `progress(done, total)`.
+pub fn watched<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&Control) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    let control = Control::default();
+    py.detach(|| {
+        thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            let shared = &control;
+            scope.spawn(move || {
+                // The receiver waits until this arrives, so it is still there.
+                let _ = sender.send(work(shared));
+            });
+            let mut stop: Option<PyErr> = None;
+            loop {
+                match receiver.recv_timeout(PAUSE) {
+                    Ok(result) => return stop.map_or_else(|| result.map_err(PyErr::from), Err),
+                    Err(RecvTimeoutError::Timeout) if stop.is_none() => {
+                        if let Err(error) = Python::attach(|py| report(py, progress, shared)) {
+                            shared.cancel();
+                            stop = Some(error);
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => {
+                        return Err(PyRuntimeError::new_err("a worker thread ended unexpectedly"));
+                    }
+                }
+            }
+        })
+    })
+}
+
+fn report(py: Python<'_>, progress: Option<&Py<PyAny>>, control: &Control) -> PyResult<()> {
+    py.check_signals()?;
+    if let Some(progress) = progress {
+        progress.call1(py, control.progress())?;
+    }
+    Ok(())
+}
