@@ -34,6 +34,7 @@ impl From<Choices> for Options {
 
 /// Basins over a grid.
 #[pyfunction]
+#[pyo3(signature = (parameters, theta, velocity, choices, progress=None))]
 pub fn basins_grid<'py>(
     py: Python<'py>,
     parameters: Parameters,
@@ -49,6 +50,7 @@ pub fn basins_grid<'py>(
 
 /// Basins of a list of starts.
 #[pyfunction]
+#[pyo3(signature = (parameters, theta, velocity, choices, progress=None))]
 pub fn basins_list<'py>(
     py: Python<'py>,
     parameters: Parameters,

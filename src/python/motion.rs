@@ -18,7 +18,8 @@ type Advanced<'py> =
 
 /// Many starts, the same number of forcing periods on.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (parameters, theta, velocity, periods, steps_per_period, threads, progress=None))]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn advance<'py>(
     py: Python<'py>,
     parameters: Parameters,

@@ -1,0 +1,51 @@
+# Everything happens in .venv; Rust (1.89 or later) and Python (3.11 or later) must be there already.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+CORE := $(shell find src -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
+
+.PHONY: demo test lint bench clean develop
+
+demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
+	$(BIN)/pendmap basins --p 1.7
+
+develop: $(VENV)/.develop ## set up everything for work on pendmap itself
+
+test: $(VENV)/.develop ## set up everything and run all tests
+	cargo test --locked --quiet
+	$(BIN)/python -m pytest -q
+
+lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of imports
+	cargo fmt --check
+	cargo clippy --locked --quiet --all-targets -- -D warnings
+	cargo clippy --locked --quiet --all-targets --features python -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --quiet --no-deps
+	! grep -rlE '\b(pyo3|numpy)\b' src --include=*.rs | grep -vE '^src/(python/|lib.rs)'
+	! grep -rl '\brayon\b' src --include=*.rs | grep -vE '^src/(maps|fit)/'
+	$(BIN)/ruff check --quiet
+	$(BIN)/ruff format --check --quiet
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest pendmap._core --ignore-disjoint-bases
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.develop ## criterion, then the comparisons with other tools
+	$(BIN)/pip install --quiet -r benchmarks/requirements.txt
+	cargo bench --locked
+	for script in integration maps autonomous threads_memory; do \
+		$(BIN)/python benchmarks/$$script.py || exit 1; done
+
+$(VENV)/bin/maturin:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+
+$(VENV)/.demo: $(VENV)/bin/maturin $(CORE)
+	. $(BIN)/activate && maturin develop --release --locked --quiet
+	touch $@
+
+$(VENV)/.develop: $(VENV)/bin/maturin $(CORE)
+	. $(BIN)/activate && maturin develop --release --locked --quiet --extras dev
+	touch $@ $(VENV)/.demo
+
+clean: ## remove what was built
+	cargo clean
+	rm -rf $(VENV)

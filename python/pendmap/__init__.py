@@ -1,0 +1,59 @@
+"""Basin maps, attractors and damping identification of parametrically excited pendulums.
+
+>>> import pendmap
+>>> pendulum = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
+>>> result = pendmap.basins(pendulum, pendmap.Grid.square(40))
+>>> [str(name) for name in result.attractor.values]
+['oscillation 2:0', 'rotation 1:-1', 'rotation 1:+1']
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pendmap.errors import InputError
+from pendmap.model import PRESETS, Pendulum
+
+if TYPE_CHECKING:
+    from pendmap.grid import Axis, Grid
+    from pendmap.maps import basins, basins_of
+    from pendmap.store import load, save
+    from pendmap.trajectory import advance, simulate
+
+__all__ = [
+    "PRESETS",
+    "Axis",
+    "Grid",
+    "InputError",
+    "Pendulum",
+    "advance",
+    "basins",
+    "basins_of",
+    "load",
+    "save",
+    "simulate",
+]
+
+_HOMES = {
+    "Axis": "grid",
+    "Grid": "grid",
+    "advance": "trajectory",
+    "basins": "maps",
+    "basins_of": "maps",
+    "load": "store",
+    "save": "store",
+    "simulate": "trajectory",
+}
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
+    """Import what needs numpy and xarray when it is first used: the command answers sooner."""
+    if name in _HOMES:
+        import importlib
+
+        return getattr(importlib.import_module(f"pendmap.{_HOMES[name]}"), name)
+    raise AttributeError(f"module 'pendmap' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,58 @@
+from collections.abc import Callable
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+_Parameters = tuple[float, float, float, float, float]
+_Axis = tuple[float, float, int]
+_Floats = NDArray[np.float64]
+_Progress = Callable[[int, int], object]
+
+class _Choices(TypedDict):
+    tol: float
+    max_periods: int | None
+    layer_periods: int | None
+    threads: int
+    seed: int
+    check: bool
+
+def simd() -> str: ...
+def simd_available() -> list[str]: ...
+def default_threads() -> int: ...
+def advance(
+    parameters: _Parameters,
+    theta: _Floats,
+    velocity: _Floats,
+    periods: int,
+    steps_per_period: int,
+    threads: int,
+    progress: _Progress | None = None,
+) -> tuple[_Floats, _Floats, NDArray[np.int64]]: ...
+def choose_steps(
+    parameters: _Parameters, theta: _Floats, velocity: _Floats, tol: float
+) -> tuple[int, float]: ...
+def simulate(
+    parameters: _Parameters,
+    start: tuple[float, float],
+    until: float,
+    tol: float,
+    samples: int,
+    lyapunov: bool,
+) -> dict[str, Any]: ...
+def basins_grid(
+    parameters: _Parameters,
+    theta: _Axis,
+    velocity: _Axis,
+    choices: _Choices,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def basins_list(
+    parameters: _Parameters,
+    theta: _Floats,
+    velocity: _Floats,
+    choices: _Choices,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...

@@ -1,0 +1,107 @@
+"""``pendmap basins``: the basins of attraction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap.cli.options import (
+    Outputs,
+    model_options,
+    output_options,
+    pendulum_from,
+    progress_options,
+)
+from pendmap.cli.show import progress_bar, show
+from pendmap.cli.types import AXIS, NUMBER, AxisText
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["command"]
+
+_DEFAULT = 1000
+
+
+@click.command("basins")
+@model_options
+@click.option("--theta", type=AXIS, help="Initial angles, rad.  [default: -pi:pi:1000]")
+@click.option("--velocity", type=AXIS, help="Initial velocities.  [default: -3:3:1000]")
+@click.option("--grid", type=click.IntRange(min=1), help="Cells on each side of the window.")
+@click.option("--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]")
+@click.option("--max-periods", type=click.IntRange(min=1), help="Bound after which a start is undecided.")
+@click.option("--layer-periods", type=click.IntRange(min=1), help="Periods of the finite-time layers.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Shifts the samples.  [default: 0]")
+@progress_options
+@output_options()
+def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
+    """Map the basins of attraction over initial angle and velocity.
+
+    Writes basins.nc, basins.png and basins.rrd if no output is named.
+    """
+    pendulum = pendulum_from(given)
+    outputs = Outputs.take(given, "basins")
+    axes = _axes(given.pop("theta"), given.pop("velocity"), given.pop("grid"))
+
+    from pendmap.grid import Axis, Grid
+    from pendmap.maps import basins
+
+    grid = Grid(*(Axis(*axis) for axis in axes))
+    with progress_bar("basins", shown=outputs.shows_progress) as progress:
+        dataset = basins(pendulum, grid, progress=progress, **given)
+    show(dataset, outputs, fields)
+
+
+def _axes(
+    theta: AxisText | None, velocity: AxisText | None, count: int | None
+) -> tuple[AxisText, AxisText]:
+    from math import pi
+
+    if count is not None and (theta is not None or velocity is not None):
+        raise click.UsageError("--grid: allowed alone; --theta and --velocity name their own cells")
+    cells = _DEFAULT if count is None else count
+    return theta or AxisText(-pi, pi, cells), velocity or AxisText(-3.0, 3.0, cells)
+
+
+def fields(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the JSON object of a basin map."""
+    a = dataset.attrs
+    names = (
+        "undecided failed cells mean_periods seconds reached_error basin_entropy unreliable "
+        "labels_sampled unreliable_half_step unreliable_mirror mean_settle longest_settle "
+        "neighbours_agree neighbours_chance plane layer_periods steps_per_period max_periods "
+        "tol simd threads seed pendmap_version format_version"
+    ).split()
+    return {
+        "attractors": [_attractor(dataset, k) for k in range(dataset.sizes["attractor"])],
+        **{name: a.get(name) for name in names},
+        "summary": a["summary"].split("\n"),
+    }
+
+
+def _attractor(dataset: xr.Dataset, k: int) -> dict[str, Any]:
+    row = dataset.isel(attractor=k)
+    n = int(row["n"])
+    closed = n > 0
+    multipliers = [[float(x) for x in pair] for pair in row["multipliers"].values]
+    multipliers = [pair for pair in multipliers if pair[0] == pair[0]]  # noqa: PLR0124 (not NaN)
+    mine = dataset["point_attractor"].values == int(row["id"])
+    points = zip(dataset["point_theta"].values[mine], dataset["point_velocity"].values[mine], strict=True)
+    return {
+        "id": int(row["id"]),
+        "name": str(row["attractor"].values),
+        "kind": str(row["kind"].values),
+        "n": n if closed else None,
+        "w": int(row["w"]) if closed else None,
+        "theta": float(row["theta_point"]),
+        "velocity": float(row["velocity_point"]),
+        "points": [list(point) for point in points] if closed else None,
+        "multipliers": multipliers or None,
+        "exponent": float(row["exponent"]),
+        "exponent_stderr": float(row["exponent_stderr"]),
+        "period": float(row["period"]),
+        "fraction": float(row["fraction"]),
+        "stderr": float(row["stderr"]),
+        "twin": int(row["twin"]) or None,
+    }

@@ -1,0 +1,87 @@
+"""The group of commands, and what becomes of errors."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import sys
+
+import click
+
+from pendmap.errors import InputError
+
+__all__ = ["command", "run"]
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+_COMMANDS = {
+    "info": "Show the version, the instruction set used, the threads.",
+    "simulate": "Integrate one trajectory: time history, phase plane, Poincaré section.",
+    "basins": "Map the basins of attraction.",
+    "plot": "Draw a result again, without computing.",
+    "view": "Open a recording in the Rerun viewer.",
+}
+
+
+class _Commands(click.Group):
+    """Commands that are imported when they are called: ``--help`` imports none of them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        if cmd_name not in _COMMANDS:
+            return None
+        module = importlib.import_module(f"pendmap.cli.{cmd_name}_command")
+        loaded: click.Command = module.command
+        return loaded
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        with formatter.section("Commands"):
+            formatter.write_dl(list(_COMMANDS.items()))
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="pendmap", message="pendmap %(version)s")
+def command() -> None:
+    """Basin maps and attractors of parametrically excited pendulums.
+
+    th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque
+    """
+
+
+def run() -> None:
+    """Run the command line and exit: 0 done, 2 bad input, 130 interrupted."""
+    sys.exit(_exit_code())
+
+
+def _exit_code() -> int:
+    try:
+        result = command.main(prog_name="pendmap", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return BAD_INPUT
+    except click.ClickException as error:
+        return _refuse(error.format_message())
+    except InputError as error:
+        return _refuse(str(error))
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("pendmap: interrupted, nothing was written", err=True)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever reads has seen enough: no message, and none from the interpreter at the end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    except MemoryError:
+        return _refuse("not enough memory: choose a smaller grid")
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _refuse(f"{where}{error.strerror or error}")
+    return result if isinstance(result, int) else 0
+
+
+def _refuse(message: str) -> int:
+    click.echo(f"pendmap: {' '.join(message.split())}", err=True)
+    return BAD_INPUT

@@ -1,0 +1,63 @@
+"""``pendmap plot``: a result drawn again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pendmap.cli.types import OutputFile
+
+__all__ = ["command"]
+
+
+@click.command("plot")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    "--plot",
+    "out",
+    type=OutputFile([".png", ".svg", ".pdf"]),
+    help="Figure to write: .png .svg .pdf.  [default: FILE with .png]",
+)
+@click.option("--layer", help="One part alone: labels, settle, turns, exponent; history, phase, section.")
+@click.option("--size", help="Width x height in inches, like 8x4.")
+@click.option("--dpi", type=click.IntRange(20, 1200), help="Pixels an inch of a .png.")
+@click.option("--colormap", help="Colours of the fields, by matplotlib's names.")
+@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+def command(  # noqa: PLR0913 (the options above)
+    *,
+    file: Path,
+    out: Path | None,
+    layer: str | None,
+    size: str | None,
+    dpi: int | None,
+    colormap: str | None,
+    quiet: bool,
+) -> None:
+    """Draw a result again, in another size, colours or layer, without computing."""
+    inches = _size(size)
+    target = out or OutputFile([".png"]).convert(file.with_suffix(".png"), None, None)
+
+    from pendmap import figures
+    from pendmap.store import load
+
+    dataset = load(file)
+    try:
+        figures.draw(dataset, target, layer=layer, size=inches, dpi=dpi, colormap=colormap)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    if not quiet:
+        click.echo(f"Written: {target}")
+
+
+def _size(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        width, height = (float(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise click.UsageError(f"--size {text!r}: allowed is WIDTHxHEIGHT in inches") from None
+    if not (1 <= width <= 100 and 1 <= height <= 100):  # noqa: PLR2004
+        raise click.UsageError(f"--size {text!r}: allowed are 1 to 100 inches")
+    return width, height

@@ -1,0 +1,63 @@
+"""``pendmap simulate``: one trajectory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap.cli.options import (
+    Outputs,
+    model_options,
+    output_options,
+    pendulum_from,
+)
+from pendmap.cli.show import show
+from pendmap.cli.types import NUMBER
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["command"]
+
+
+@click.command("simulate")
+@model_options
+@click.option("--theta", type=NUMBER, default=1.0, help="Angle at tau = 0, rad.  [default: 1]")
+@click.option("--velocity", type=NUMBER, default=0.0, help="Velocity at tau = 0.  [default: 0]")
+@click.option("--until", type=NUMBER, default=100.0, help="Last time, in 1/w0.  [default: 100]")
+@click.option("--tol", type=NUMBER, default=1e-9, help="Error after 5 periods.  [default: 1e-9]")
+@click.option("--samples", type=click.IntRange(min=1), help="Samples a period.  [default: 64]")
+@click.option("--lyapunov", is_flag=True, help="Also the largest Lyapunov exponent.")
+@click.option("--quiet", is_flag=True, help="No summary.")
+@output_options()
+def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
+    """Integrate one trajectory: time history, phase plane, Poincaré section.
+
+    Writes simulate.nc, simulate.png and simulate.rrd if no output is named.
+    """
+    pendulum = pendulum_from(given)
+    outputs = Outputs.take(given, "simulate")
+
+    from pendmap.trajectory import simulate
+
+    start = (given.pop("theta"), given.pop("velocity"), given.pop("until"))
+    show(simulate(pendulum, *start, **given), outputs, fields)
+
+
+def fields(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the JSON object of a trajectory: its end, unwrapped."""
+    a = dataset.attrs
+    result: dict[str, Any] = {
+        "t": a["until"],
+        "theta": float(dataset["theta"].values[-1]),
+        "velocity": float(dataset["velocity"].values[-1]),
+        # A constant torque and viscous damping never hold a pendulum fast.
+        "stuck": False,
+        "turns": a["turns"],
+        "reached_error": a["reached_error"],
+        "end_error": a["end_error"],
+    }
+    if "exponent" in a:
+        result |= {"exponent": a["exponent"], "stderr": a["exponent_stderr"]}
+    return result

@@ -1,0 +1,112 @@
+"""Numbers, axes and files as they are typed."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["AXIS", "NUMBER", "AxisText", "OutputFile"]
+
+_WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
+
+
+def _number(text: str) -> float:
+    """Read a number; ``pi``, ``-pi``, ``2pi``, ``2*pi``, ``pi/2`` are numbers too."""
+    match = _WITH_PI.fullmatch(text.strip())
+    if match:
+        sign, factor, divisor = match.groups()
+        value = (float(factor) if factor else 1.0) * math.pi / float(divisor or 1)
+        return -value if sign == "-" else value
+    return float(text)
+
+
+class _Number(click.ParamType):
+    name = "number"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        try:
+            number = _number(str(value))
+        except (ValueError, ZeroDivisionError):
+            self.fail(f"{value!r} is not a number (pi is understood)", param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r}: allowed is any finite number", param, ctx)
+        return number
+
+
+class AxisText(NamedTuple):
+    """``A:B:N`` as typed."""
+
+    low: float
+    high: float
+    count: int
+
+
+class _Axis(click.ParamType):
+    name = "A:B:N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> AxisText:
+        if isinstance(value, AxisText):
+            return value
+        wanted = "allowed is A:B:N, N cells between A and B, like -pi:pi:1000"
+        parts = str(value).split(":")
+        if len(parts) != 3:  # noqa: PLR2004
+            self.fail(f"{value!r}: {wanted}", param, ctx)
+        try:
+            low, high, count = _number(parts[0]), _number(parts[1]), int(parts[2])
+        except (ValueError, ZeroDivisionError):
+            self.fail(f"{value!r}: {wanted}", param, ctx)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
+        if count < 1:
+            self.fail(f"{value!r}: {count} cells, allowed is 1 or more", param, ctx)
+        return AxisText(low, high, count)
+
+
+class OutputFile(click.ParamType):
+    """A file to write: its suffix and folder are checked before anything is computed."""
+
+    name = "file"
+
+    def __init__(self, suffixes: Sequence[str]) -> None:
+        self.suffixes = tuple(suffixes)
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Path:
+        path = Path(str(value))
+        if path.suffix.lower() not in self.suffixes:
+            allowed = ", ".join(self.suffixes)
+            self.fail(f"{str(path)!r}: suffix {path.suffix!r}, allowed are {allowed}", param, ctx)
+        if not path.parent.is_dir():
+            self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
+        if path.is_dir() and path.suffix.lower() != ".zarr":
+            self.fail(f"{str(path)!r}: is a folder", param, ctx)
+        if not _writable(path):
+            self.fail(f"{str(path)!r}: cannot be written there", param, ctx)
+        return path
+
+
+def _writable(path: Path) -> bool:
+    """Whether a new file can be made beside ``path``."""
+    probe = path.with_name(f".{path.name}.probe")
+    try:
+        probe.touch(exist_ok=True)
+        probe.unlink()
+    except OSError:
+        return False
+    return True
+
+
+NUMBER = _Number()
+AXIS = _Axis()

@@ -1,0 +1,85 @@
+"""Figures for papers; the only place that imports matplotlib.
+
+``draw`` looks at what a dataset holds and draws the figure for it. It needs no display.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import matplotlib as mpl
+import xarray as xr
+
+from pendmap.figures import basins, style, trajectory
+from pendmap.pictures.files import whole_file
+
+__all__ = ["SUFFIXES", "draw"]
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""The kinds of file that can be drawn."""
+
+_KINDS = {"basins": basins.figure, "trajectory": trajectory.figure}
+
+
+def draw(
+    dataset: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+    colormap: str | None = None,
+) -> Path:
+    """Draw a dataset into a file.
+
+    Of a basin map: the labels, with the attractors marked and named with their shares, and the
+    settle time beside them; where the labels are unreliable, settle time and net turns lead; where
+    labels tell nothing, the net turns and the finite-time exponent. Of a trajectory: time history,
+    phase plane, Poincare section.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What ``pendmap.basins`` or ``pendmap.simulate`` returned; ``attrs["kind"]`` tells which.
+    path : str or path
+        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
+    layer : str, optional
+        Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map;
+        ``history``, ``phase`` or ``section`` of a trajectory.
+    size : (float, float), optional
+        Width and height in inches; by default as large as the parts need.
+    dpi : float, optional
+        Pixels per inch, 200 by default.
+    colormap : str, optional
+        Name of a matplotlib colour map for the map's scalar layers.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind of dataset, suffix, layer or colour map, and for an impossible size or
+        resolution.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> figures.draw(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
+    """
+    kind = dataset.attrs.get("kind")
+    if kind not in _KINDS:
+        known = ", ".join(_KINDS)
+        raise ValueError(
+            f"cannot draw a dataset of kind {kind!r}; kinds that can be drawn: {known}"
+        )
+    resolution = style.resolution(dpi)
+    style.check_size(size)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        made = _KINDS[kind](dataset, layer=layer, size=size, dpi=resolution, colormap=colormap)
+        style.write(made, part)
+    return Path(path)

@@ -1,0 +1,123 @@
+"""The figure of one trajectory: time history, phase plane, Poincare section."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pendmap.figures import style
+from pendmap.pictures import layers as layering
+from pendmap.pictures import plane
+
+__all__ = ["PARTS", "figure"]
+
+PARTS = ("history", "phase", "section")
+"""Parts of the figure by the name a user types."""
+
+LATE = 0.2
+"""The last share of a trajectory, drawn dark, so that what it settles to stands out."""
+
+_EARLY_COLOUR, _LATE_COLOUR = "#a9b8cc", "#1d3557"
+
+
+def figure(
+    dataset: xr.Dataset,
+    *,
+    layer: str | None,
+    size: tuple[float, float] | None,
+    dpi: float,
+    colormap: str | None,
+) -> Figure:
+    """Return the figure of a trajectory; see :func:`pendmap.figures.draw`."""
+    if layer is not None and layer not in PARTS:
+        raise ValueError(f"no layer {layer!r} in a trajectory; it has {', '.join(PARTS)}")
+    if colormap is not None:
+        raise ValueError(f"colormap {colormap!r}: a trajectory's figure has no colour map")
+    width, height = size or ((5.6, 5.3) if layer in ("phase", "section") else (8.6, 6.9))
+    if size is None and layer == "history":
+        height = 3.6
+    across, down = width - style.LEFT - style.RIGHT, height - style.TOP - style.BOTTOM
+    gap_x, gap_y = 0.8, 0.9
+    if min(across, down) < 0.5 or (layer is None and (across < 2.0 or down < 2.2)):
+        least = "3.0 x 3.8" if layer is None else "1.5 x 2.1"
+        raise ValueError(f"size {size} leaves no room for the panels; at least {least} inches")
+    sheet = style.headed((width, height), dpi, "Trajectory", _subtitle(dataset))
+    draw = {"history": _history, "phase": _phase, "section": _section}
+    if layer is not None:
+        draw[layer](style.place(sheet, style.LEFT, style.BOTTOM, across, down), dataset, "")
+        return sheet
+    half, top = (across - gap_x) / 2, 0.36 * (down - gap_y)
+    low = down - gap_y - top
+    first = style.place(sheet, style.LEFT, height - style.TOP - top, across, top)
+    second = style.place(sheet, style.LEFT, style.BOTTOM, half, low)
+    third = style.place(sheet, style.LEFT + half + gap_x, style.BOTTOM, half, low)
+    for axes, part, mark in zip((first, second, third), PARTS, "abc", strict=True):
+        draw[part](axes, dataset, f"({mark}) ")
+    return sheet
+
+
+def _subtitle(dataset: xr.Dataset) -> str:
+    attrs = dataset.attrs
+    start = f"from \N{GREEK SMALL LETTER THETA} = {float(attrs['theta0']):.6g}, "
+    start += f"{style.VELOCITY} = {float(attrs['velocity0']):.6g}"
+    return f"{layering.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}")
+
+
+def _history(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
+    time, theta = dataset["time"].values, dataset["theta"].values
+    late = _late(time)
+    axes.plot(time[: late + 1], theta[: late + 1], color=_EARLY_COLOUR, lw=1.0)
+    axes.plot(time[late:], theta[late:], color=_LATE_COLOUR, lw=1.0)
+    axes.margins(x=0.0, y=0.06)
+    low, high = axes.get_ylim()
+    if high - low < 0.2:
+        axes.set_ylim(low - 0.1, high + 0.1)
+    ticks = plane.angle_ticks(*axes.get_ylim())
+    axes.set_yticks([y for y, _ in ticks], [text for _, text in ticks])
+    if time[-1] > time[0]:
+        ticks = plane.plain_ticks(time[0], time[-1])
+        axes.set_xticks([x for x, _ in ticks], [text for _, text in ticks])
+    axes.set_xlabel("\N{GREEK SMALL LETTER TAU}")
+    axes.set_ylabel(style.THETA)
+    axes.set_title(mark + "time history")
+
+
+def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
+    theta, velocity = dataset["theta"].values, dataset["velocity"].values
+    late = _late(dataset["time"].values)
+    early = plane.broken_at_wrap(theta[: late + 1], velocity[: late + 1])
+    last = plane.broken_at_wrap(theta[late:], velocity[late:])
+    axes.plot(early[:, 0], early[:, 1], color=_EARLY_COLOUR, lw=0.5)
+    axes.plot(last[:, 0], last[:, 1], color=_LATE_COLOUR, lw=0.7)
+    style.phase_plane(axes, (-math.pi, math.pi), _range(velocity))
+    axes.set_title(mark + "phase plane")
+
+
+def _section(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
+    theta, velocity = dataset["section_theta"].values, dataset["section_velocity"].values
+    time = dataset["time"].values
+    late = dataset["section_time"].values >= time[_late(time)] if time.size else []
+    size = 1.3 if theta.size > 500 else 2.6
+    for which, colour in ((~np.asarray(late, bool), _EARLY_COLOUR), (late, _LATE_COLOUR)):
+        axes.plot(theta[which], velocity[which], "o", ms=size, mew=0, color=colour)
+    style.phase_plane(axes, (-math.pi, math.pi), _range(dataset["velocity"].values))
+    axes.set_title(mark + "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section, once a period")
+
+
+def _late(time: npt.NDArray[np.float64]) -> int:
+    """Return the first index of the last part."""
+    if time.size < 2:
+        return 0
+    return int(np.searchsorted(time, time[-1] - LATE * (time[-1] - time[0])))
+
+
+def _range(velocity: npt.NDArray[np.float64]) -> tuple[float, float]:
+    """Return limits with a margin, never empty."""
+    low, high = float(np.min(velocity)), float(np.max(velocity))
+    pad = max(0.06 * (high - low), 0.05)
+    return low - pad, high + pad

@@ -1,0 +1,146 @@
+"""The layers of a basin map: which of them tell something, which lead, and what each is called."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+__all__ = [
+    "VARIABLES",
+    "finite_time",
+    "layers",
+    "named",
+    "parameters",
+    "reliable",
+    "unit",
+    "warning",
+    "what",
+]
+
+VARIABLES = {
+    "labels": "label",
+    "settle": "settle_periods",
+    "turns": "net_turns",
+    "exponent": "finite_time_exponent",
+}
+"""Layers by the name a user types, and the variable that holds each."""
+
+_TAU = "\N{GREEK SMALL LETTER TAU}"
+_SYMBOLS = {
+    "gamma": "\N{GREEK SMALL LETTER GAMMA}",
+    "p": "p",
+    "omega": "\N{GREEK SMALL LETTER OMEGA}",
+    "phase": "phase",
+    "torque": "torque",
+}
+
+
+def reliable(dataset: xr.Dataset) -> bool:
+    """Whether the labels stand up to half the step and to mirroring."""
+    return bool(int(dataset.attrs.get("labels_reliable", 1)))
+
+
+def finite_time(dataset: xr.Dataset) -> bool:
+    """Whether labels tell nothing: one chaotic attractor takes every start, or nothing attracts."""
+    return bool(dataset.attrs.get("layers") == "finite_time")
+
+
+def warning(dataset: xr.Dataset) -> str:
+    """Return the line that marks labels as unreliable."""
+    share = 100 * float(dataset.attrs.get("unreliable", math.nan))
+    return f"labels unreliable: {share:.3g} % change under half the step or mirroring"
+
+
+def transients(dataset: xr.Dataset) -> str:
+    """Return mean and longest settle time and the basin entropy in one line, as far as known."""
+    attrs = dataset.attrs
+    known = [
+        (
+            f"mean {float(attrs[key]):.3g}"
+            if key == "mean_settle"
+            else f"longest {float(attrs[key]):g}"
+        )
+        for key in ("mean_settle", "longest_settle")
+        if math.isfinite(float(attrs.get(key, math.nan)))
+    ]
+    settle = [f"settle time: {', '.join(known)} periods"] if known else []
+    entropy = float(attrs.get("basin_entropy", math.nan))
+    return "; ".join(
+        [*settle, *([f"basin entropy {entropy:.3g}"] if math.isfinite(entropy) else [])]
+    )
+
+
+def exponents(dataset: xr.Dataset) -> str:
+    """Return the largest exponents of the chaotic attractors in one line; empty where unknown."""
+    chaotic = [str(kind).endswith("chaos") for kind in dataset["kind"].values]
+    known = [x for x in dataset["exponent"].values[chaotic] if math.isfinite(x)]
+    listed = ", ".join(f"{x:.3g}" for x in known)
+    return f"largest exponent {listed} per unit {_TAU}" if known else ""
+
+
+def layers(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Return the layers of a map that tell something, the leading ones first.
+
+    Usually labels, then settle time and net turns. Where the labels are unreliable, settle time and
+    net turns come before them; where labels tell nothing, there are only the net turns and the
+    finite-time exponent. Settle time is left out where no start settles.
+    """
+    if finite_time(dataset):
+        order: tuple[str, ...] = ("turns", "exponent")
+    elif reliable(dataset):
+        order = ("labels", "settle", "turns", "exponent")
+    else:
+        order = ("settle", "turns", "labels", "exponent")
+    present = [layer for layer in order if VARIABLES[layer] in dataset]
+    if "settle" in present and int(dataset["settle_periods"].max()) < 0:
+        present.remove("settle")
+    return tuple(present)
+
+
+def named(dataset: xr.Dataset, layer: str) -> str:
+    """Return the name of the layer that ``layer`` names, itself or by its variable.
+
+    Raises
+    ------
+    ValueError
+        If the map has no such layer; the message lists those it has.
+    """
+    for name, variable in VARIABLES.items():
+        if layer in (name, variable) and variable in dataset:
+            return name
+    known = ", ".join(name for name, variable in VARIABLES.items() if variable in dataset)
+    raise ValueError(f"no layer {layer!r} in this map; it has {known}")
+
+
+def what(dataset: xr.Dataset, layer: str) -> str:
+    """Return what a layer shows, in words, for a title."""
+    periods = dataset.attrs.get("layer_periods", "N")
+    turns = f"after {periods} periods" if finite_time(dataset) else "until settled"
+    return {
+        "labels": "basins of attraction",
+        "settle": "settle time",
+        "turns": f"net turns {turns}",
+        "exponent": f"finite-time exponent over {periods} periods",
+    }[layer]
+
+
+def unit(layer: str) -> str:
+    """Return what a scalar layer counts, for a colour bar."""
+    return {
+        "settle": "periods to settle",
+        "turns": "net turns",
+        "exponent": f"exponent per unit {_TAU}",
+    }[layer]
+
+
+def parameters(attrs: Mapping[Any, Any]) -> str:
+    """Return the pendulum's parameters in one line; phase and torque only where they are not 0."""
+    always = ("gamma", "p", "omega")
+    return ",  ".join(
+        f"{symbol} = {float(attrs[key]):.6g}".replace("-", "\N{MINUS SIGN}")
+        for key, symbol in _SYMBOLS.items()
+        if key in attrs and (key in always or float(attrs[key]) != 0.0)
+    )

@@ -1,0 +1,106 @@
+"""The phase plane as it is drawn: cells, ticks, thinned maps, copies of points, wrapped curves."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+__all__ = ["angle_ticks", "broken_at_wrap", "cell_edges", "copies", "plain_ticks", "thinned"]
+
+Floats = npt.NDArray[np.float64]
+Ticks = list[tuple[float, str]]
+TWO_PI = 2.0 * math.pi
+
+
+def cell_edges(centres: npt.ArrayLike) -> tuple[float, float]:
+    """Return the outer edges of cells with equidistant centres; a lone cell counts as 1 wide."""
+    x = np.asarray(centres, dtype=float)
+    half = 0.5 * (x[-1] - x[0]) / (x.size - 1) if x.size > 1 else 0.5
+    return float(x[0] - half), float(x[-1] + half)
+
+
+def thinned(array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
+    """Return every k-th row and column, k the smallest that leaves at most ``limit`` of each.
+
+    The cells are chosen before anything is converted, so that a large map is never copied whole.
+    """
+    strides = {d: -(-n // limit) for d, n in array.sizes.items()}
+    cut = {d: slice((k - 1) // 2, None, k) for d, k in strides.items()}
+    return np.asarray(array.isel(cut).values)
+
+
+def copies(points: Floats, low: float, high: float) -> Floats:
+    """Return the points, shape (m, 2), and their copies 2 pi k further that are in [low, high]."""
+    slack = 1e-9 * max(1.0, abs(low), abs(high))
+    first = math.floor((low - math.pi) / TWO_PI)
+    last = math.ceil((high + math.pi) / TWO_PI)
+    every = np.concatenate([points + np.array([k * TWO_PI, 0.0]) for k in range(first, last + 1)])
+    inside: Floats = every[(every[:, 0] >= low - slack) & (every[:, 0] <= high + slack)]
+    return inside
+
+
+def angle_ticks(low: float, high: float) -> Ticks:
+    """Return places and labels of ticks at multiples of pi; plain numbers in a small window."""
+    for quarters in (1, 2, 4, 8, 16, 32, 64):
+        step = quarters * math.pi / 4
+        if 2.0 <= (high - low) / step <= 6.5:
+            first, last = _between(low, high, step)
+            return [(k * step, _multiple_of_pi(k * quarters)) for k in range(first, last + 1)]
+    return plain_ticks(low, high)
+
+
+def plain_ticks(low: float, high: float) -> Ticks:
+    """Return about five round places between ``low`` and ``high`` with their labels."""
+    raw = (high - low) / 6
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(m * power for m in (1, 2, 2.5, 5, 10) if m * power >= raw * 0.999)
+    first, last = _between(low, high, step)
+    return [
+        (k * step, f"{k * step:.6g}".replace("-", "\N{MINUS SIGN}")) for k in range(first, last + 1)
+    ]
+
+
+def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
+    """Return a curve on the cylinder, its angle wrapped to (-pi, pi] and cut where it wraps.
+
+    Parameters
+    ----------
+    theta : array_like, shape (n,)
+        Angle in rad, unwrapped.
+    velocity : array_like, shape (n,)
+        Nondimensional velocity.
+
+    Returns
+    -------
+    ndarray, shape (n + 3 m, 2)
+        Each of the m crossings adds the point on one edge, a row of nan, and that on the other.
+    """
+    angle, rate = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
+    turn = np.ceil((angle - math.pi) / TWO_PI)
+    curve: Floats = np.stack([angle - TWO_PI * turn, rate], axis=1)
+    at = np.flatnonzero(np.diff(turn))
+    edge = np.where(turn[at + 1] > turn[at], math.pi, -math.pi)
+    part = (edge + TWO_PI * turn[at] - angle[at]) / (angle[at + 1] - angle[at])
+    crossing = rate[at] + part * (rate[at + 1] - rate[at])
+    gap = np.full_like(edge, np.nan)
+    extra = np.stack([edge, crossing, gap, gap, -edge, crossing], axis=1).reshape(-1, 2)
+    return np.insert(curve, np.repeat(at + 1, 3), extra, axis=0)
+
+
+def _between(low: float, high: float, step: float) -> tuple[int, int]:
+    return math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
+
+
+def _multiple_of_pi(quarters: int) -> str:
+    """Return ``quarters * pi / 4`` as it is written, such as -3 pi/2."""
+    if quarters == 0:
+        return "0"
+    divisor = math.gcd(quarters, 4)
+    top, bottom = abs(quarters) // divisor, 4 // divisor
+    sign = "\N{MINUS SIGN}" if quarters < 0 else ""
+    below = f"/{bottom}" if bottom > 1 else ""
+    return f"{sign}{top if top > 1 else ''}\N{GREEK SMALL LETTER PI}{below}"

@@ -1,0 +1,112 @@
+"""Results in files: NetCDF, and Zarr where it is installed."""
+
+from __future__ import annotations
+
+import shutil
+import uuid
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import xarray as xr
+
+from pendmap.errors import InputError
+from pendmap.pictures.files import whole_file
+
+if TYPE_CHECKING:
+    import os
+
+__all__ = ["SUFFIXES", "load", "save"]
+
+SUFFIXES: Final = (".nc", ".zarr")
+_LARGE: Final = 4096
+
+
+def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a result; the file is complete or absent.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result of pendmap.
+    path : str or path
+        Its suffix chooses the format: .nc (NetCDF 4) or .zarr.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not known, or .zarr is asked for and zarr is not installed.
+    OSError
+        If the file cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() == ".zarr":
+        return _save_zarr(dataset, target)
+    with whole_file(target, SUFFIXES) as part:
+        dataset.to_netcdf(part, engine="netcdf4", encoding=_encoding(dataset))
+    return target
+
+
+def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
+    large = (name for name, v in dataset.data_vars.items() if v.size > _LARGE)
+    # Whole rows in chunks of about a megabyte, so that compression works on a part at a time.
+    return {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in large}
+
+
+def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
+    try:
+        import zarr  # noqa: F401, PLC0415 (an extra: only where it is asked for)
+    except ImportError:
+        raise InputError(f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works") from None
+    if not target.parent.is_dir():
+        raise FileNotFoundError(2, "the folder does not exist", str(target.parent))
+    part = target.with_name(f".{target.stem}-{uuid.uuid4().hex[:8]}.part.zarr")
+    old = part.with_suffix(".old")
+    try:
+        dataset.to_zarr(part, mode="w", zarr_format=3, consolidated=False)
+        if target.exists():
+            target.rename(old)
+        part.rename(target)
+    finally:
+        for leftover in (part, old):
+            shutil.rmtree(leftover, ignore_errors=True)
+    return target
+
+
+def load(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a result back into memory.
+
+    Parameters
+    ----------
+    path : str or path
+        A file that :func:`save` wrote.
+
+    Raises
+    ------
+    InputError
+        If it is not a result of pendmap, or of a later format.
+    OSError
+        If it cannot be read.
+    """
+    source = Path(path)
+    if not source.exists():
+        raise FileNotFoundError(2, "no such file", str(source))
+    if source.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{source}: suffix {source.suffix!r}: allowed are {', '.join(SUFFIXES)}")
+    try:
+        if source.suffix.lower() == ".zarr":
+            dataset = xr.open_zarr(source, consolidated=False).load()
+        else:
+            dataset = xr.load_dataset(source, engine="netcdf4")
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+    version = dataset.attrs.get("format_version")
+    if version is None or "kind" not in dataset.attrs:
+        raise InputError(f"{source}: is not a result of pendmap")
+    if int(version) > 1:
+        raise InputError(f"{source}: has format {version}, this pendmap reads format 1")
+    return dataset

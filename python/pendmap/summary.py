@@ -1,0 +1,108 @@
+"""What a basin map says, in a few lines of text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["summarise"]
+
+_NEARLY_CHANCE = 0.15
+
+
+def summarise(dataset: xr.Dataset) -> str:
+    """Return the findings of a basin map, a sentence a line.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
+    """
+    plane = dataset.attrs["plane"]
+    if plane == "conservative":
+        lines = [_conservative(dataset)]
+    elif plane == "only_chaos":
+        lines = [_only_chaos(dataset)]
+    else:
+        lines = [*_attractors(dataset), *_settling(dataset), *_texture(dataset)]
+    for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
+        share = dataset.attrs[key]
+        if share > 0 and plane != "conservative":
+            bound = f" within {dataset.attrs['max_periods']} periods" if key == "undecided" else ""
+            lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
+    a = dataset.attrs
+    lines.append(
+        f"{a['cells']} starts, {a['mean_periods']:.1f} periods each on average, "
+        f"{a['steps_per_period']} steps a period, error reached {a['reached_error']:.1e}, "
+        f"{a['seconds']:.2f} s on {a['threads']} threads ({a['simd']})."
+    )
+    return "\n".join(lines)
+
+
+def _conservative(dataset: xr.Dataset) -> str:
+    return (
+        "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns and "
+        f"the finite-time exponent after {dataset.attrs['layer_periods']} periods are shown instead."
+    )
+
+
+def _only_chaos(dataset: xr.Dataset) -> str:
+    name = str(dataset["attractor"].values[0])
+    exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
+    return (
+        f"One chaotic attractor takes everything: {name}, exponent {exponent:.4f} +- {error:.4f} "
+        f"per unit of tau. Labels tell nothing here: net turns and the finite-time exponent after "
+        f"{dataset.attrs['layer_periods']} periods are shown instead."
+    )
+
+
+def _attractors(dataset: xr.Dataset) -> list[str]:
+    lines = []
+    names = [str(name) for name in dataset["attractor"].values]
+    for k, name in enumerate(names):
+        row = {key: dataset[key].values[k] for key in ("fraction", "stderr", "twin", "exponent")}
+        twin = int(row["twin"])
+        mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
+        lines.append(
+            f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
+            f"exponent {row['exponent']:.4f}{mirror}."
+        )
+    if not lines:
+        lines.append("No attractor was found.")
+    return lines
+
+
+def _settling(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    if a["longest_settle"] < 0:
+        return []
+    return [f"Settling takes {a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most."]
+
+
+def _texture(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    lines = []
+    if "theta" in dataset.dims and a["cells"] > 1:
+        agree, chance = a["neighbours_agree"], a["neighbours_chance"]
+        above = (agree - chance) / max(1 - chance, 1e-12)
+        verdict = " (hardly better than chance)" if chance < 1 and above < _NEARLY_CHANCE else ""
+        lines.append(
+            f"Basin entropy {a['basin_entropy']:.3f}; neighbouring cells agree in "
+            f"{100 * agree:.1f} %, chance alone gives {100 * chance:.1f} %{verdict}."
+        )
+    if a["labels_sampled"]:
+        halved = f"half the step changes {100 * a['unreliable_half_step']:.1f} %"
+        mirror = a.get("unreliable_mirror")
+        mirrored = "" if mirror is None else f", mirroring {100 * mirror:.1f} %"
+        lines.append(f"Of {a['labels_sampled']} sampled labels {halved}{mirrored}.")
+    if not a["labels_reliable"]:
+        lines.append(
+            f"LABELS OF SINGLE CELLS ARE NOT RELIABLE HERE ({100 * a['unreliable']:.1f} % change): "
+            "read the shares, the settling time and the net turns."
+        )
+        twins = dataset["twin"].values
+        if any(t not in {0, k + 1} for k, t in enumerate(twins)):
+            lines.append("Mirror images have equal shares by symmetry.")
+    return lines

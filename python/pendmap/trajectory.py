@@ -1,0 +1,203 @@
+"""Single trajectories, and many of them advanced at once."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core
+from pendmap.errors import InputError
+from pendmap.maps import FORMAT_VERSION
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.model import Pendulum
+
+__all__ = ["advance", "simulate"]
+
+_SAMPLES = 64
+_MOST_SAMPLES = 2_000_000
+
+
+def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum,
+    theta: float,
+    velocity: float,
+    until: float,
+    *,
+    tol: float = 1e-9,
+    samples: int | None = None,
+    lyapunov: bool = False,
+) -> xr.Dataset:
+    """One trajectory, its time history and its stroboscopic (Poincare) section.
+
+    Parameters
+    ----------
+    pendulum : Pendulum
+        The model.
+    theta, velocity : float
+        State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
+    until : float
+        Last time, in units of ``1 / w0``; above 0.
+    tol : float
+        The step is halved until that changes the state after 5 periods (or at the end, if that is
+        sooner) by no more than this; 1e-13 to 1e-2. What was reached is in ``reached_error``, the
+        difference at the end in ``end_error``.
+    samples : int, optional
+        Samples a period; 64 by default, fewer where that would be more than two million in all.
+    lyapunov : bool
+        Whether to estimate the largest Lyapunov exponent along the trajectory, with a standard
+        error from the spread of 20 batches, the first tenth left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``theta`` (not wrapped) and ``velocity`` over ``time``; ``section_theta`` (wrapped to
+        (-pi, pi]) and ``section_velocity`` over ``period``.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or outside its range.
+    """
+    if not (math.isfinite(until) and until > 0):
+        raise InputError(f"until is {until:g}: allowed is a time above 0")
+    periods = until / pendulum.period
+    if samples is None:
+        samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
+    if not 1 <= samples <= 10_000:  # noqa: PLR2004
+        raise InputError(f"samples is {samples}: allowed are 1 to 10000 a period")
+    if periods * samples > 100 * _MOST_SAMPLES:
+        raise InputError(f"until is {until:g}: {periods:.3g} periods do not fit into memory")
+    try:
+        start = (float(theta), float(velocity))
+        raw = _core.simulate(
+            pendulum.parameters, start, float(until), float(tol), samples, lyapunov
+        )
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    angle = raw["theta"][::samples]
+    wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
+    dataset = xr.Dataset(
+        {
+            "theta": ("time", raw["theta"], {"units": "rad", "long_name": "angle, not wrapped"}),
+            "velocity": ("time", raw["velocity"], {"units": "1", "long_name": "dtheta/dtau"}),
+            "section_theta": ("period", wrapped, {"units": "rad"}),
+            "section_velocity": ("period", raw["velocity"][::samples], {"units": "1"}),
+            "section_time": ("period", raw["time"][::samples], {"units": "tau"}),
+        },
+        coords={
+            "time": ("time", raw["time"], {"units": "1 / w0", "long_name": "tau"}),
+            "period": ("period", np.arange(wrapped.size)),
+        },
+    )
+    exponent = raw["exponent"]
+    turns = round((float(raw["theta"][-1]) - theta) / math.tau)
+    dataset.attrs = {
+        "kind": "trajectory",
+        "title": pendulum.title,
+        "gamma": pendulum.gamma,
+        "p": pendulum.p,
+        "omega": pendulum.omega,
+        "phase": pendulum.phase,
+        "torque": pendulum.torque,
+        "theta0": float(theta),
+        "velocity0": float(velocity),
+        "until": float(until),
+        "tol": float(tol),
+        "reached_error": raw["reached_error"],
+        "end_error": raw["end_error"],
+        "steps_per_period": raw["steps_per_period"],
+        "turns": turns,
+        **({} if exponent is None else {"exponent": exponent[0], "exponent_stderr": exponent[1]}),
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    dataset.attrs["summary"] = _summary(dataset)
+    return dataset
+
+
+def _summary(dataset: xr.Dataset) -> str:
+    a = dataset.attrs
+    theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
+    lines = [
+        f"At tau = {a['until']:g}: theta = {theta:.9g} rad ({a['turns']} net turns), "
+        f"velocity = {velocity:.9g}.",
+        f"Halving the step changes the state by {a['reached_error']:.1e} after 5 periods and by "
+        f"{a['end_error']:.1e} at the end ({a['steps_per_period']} steps a period).",
+    ]
+    if a["end_error"] > max(1e-3, a["tol"]):
+        lines.append("The end is not predictable at this length: read the motion, not its last state.")
+    if "exponent" in a:
+        lines.append(
+            f"Largest Lyapunov exponent {a['exponent']:.5f} +- {a['exponent_stderr']:.5f} per unit of tau."
+        )
+    return "\n".join(lines)
+
+
+def advance(  # noqa: PLR0913
+    pendulum: Pendulum,
+    theta: ArrayLike,
+    velocity: ArrayLike,
+    periods: int,
+    *,
+    tol: float = 1e-6,
+    steps_per_period: int | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Advance many starts by the same number of periods, and nothing else.
+
+    Parameters
+    ----------
+    pendulum : Pendulum
+        The model.
+    theta, velocity : array_like, shape (N,)
+        Angles in rad and velocities at ``tau = 0``.
+    periods : int
+        Forcing periods (of ``2 pi`` where p = 0); 0 or more.
+    tol : float
+        As for :func:`pendmap.basins`; chooses the steps where ``steps_per_period`` is not given.
+    steps_per_period : int, optional
+        Steps a period.
+    threads : int, optional
+        Number of threads; by default one a processor.
+    progress : callable, optional
+        Called now and then with the number of starts done and in all.
+
+    Returns
+    -------
+    theta, velocity : ndarray, shape (N,)
+        Angles wrapped to [-pi, pi] and velocities.
+    turns : ndarray of int, shape (N,)
+        Net full turns.
+
+    Raises
+    ------
+    InputError
+        If the lengths differ, a start is not finite, or a value is outside its range.
+    """
+    angles = np.ascontiguousarray(theta, dtype=np.float64)
+    speeds = np.ascontiguousarray(velocity, dtype=np.float64)
+    if angles.ndim != 1 or angles.shape != speeds.shape:
+        raise InputError("theta and velocity: allowed are two arrays (N,) of one length")
+    if not (np.isfinite(angles).all() and np.isfinite(speeds).all()):
+        raise InputError("theta and velocity: allowed are finite starts only")
+    if periods < 0:
+        raise InputError(f"periods is {periods}: allowed is 0 or more")
+    try:
+        if steps_per_period is None:
+            step = max(1, angles.size // 400)
+            sample = angles[::step].copy(), speeds[::step].copy()
+            steps_per_period, _ = _core.choose_steps(pendulum.parameters, *sample, tol)
+        return _core.advance(
+            pendulum.parameters, angles, speeds, periods, steps_per_period, threads or 0, progress
+        )
+    except ValueError as error:
+        raise InputError(str(error)) from None

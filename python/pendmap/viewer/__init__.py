@@ -1,0 +1,85 @@
+"""Recordings for the Rerun viewer; the only place that imports rerun.
+
+``record`` looks at what a dataset holds and writes its recording; ``open_viewer`` shows one.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import xarray as xr
+
+from pendmap.pictures.files import whole_file
+from pendmap.viewer import basins, frame, trajectory
+from pendmap.viewer.window import (
+    NoDisplayError,
+    NotARecordingError,
+    RecordingNotFoundError,
+    ViewerError,
+    open_viewer,
+)
+
+__all__ = [
+    "SUFFIXES",
+    "NoDisplayError",
+    "NotARecordingError",
+    "RecordingNotFoundError",
+    "ViewerError",
+    "open_viewer",
+    "record",
+]
+
+SUFFIXES = (".rrd",)
+"""The kind of file a recording is."""
+
+_KINDS = {
+    "basins": (basins.blueprint, basins.log),
+    "trajectory": (trajectory.blueprint, trajectory.log),
+}
+
+
+def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write the recording of a dataset, with the layout in which the viewer shows it.
+
+    Of a basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
+    ``/turns/data/turns``, ``/exponent/data/exponent`` (those layers that tell something, the
+    leading one in front), ``/legend`` and ``/summary``. Of a trajectory: ``/state/{theta,omega,energy}``,
+    ``/pendulum/data/{arm,bob,pivot,trail}``, ``/phase/data/{curve,now}``, ``/poincare/data/points``
+    and ``/summary``, on the timelines ``sim_time`` (nondimensional time, shown as seconds) and
+    ``period``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What ``pendmap.basins`` or ``pendmap.simulate`` returned; ``attrs["kind"]`` tells which.
+    path : str or path
+        The file to write, ``.rrd``; an existing one is replaced.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind of dataset or suffix.
+    OSError
+        If the file cannot be written.
+    """
+    kind = dataset.attrs.get("kind")
+    if kind not in _KINDS:
+        known = ", ".join(_KINDS)
+        raise ValueError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
+    layout, log = _KINDS[kind]
+    with whole_file(path, SUFFIXES) as part, frame.strict():
+        recording = frame.recording(dataset)
+        try:
+            with recording:
+                recording.save(part, default_blueprint=layout(dataset))
+                frame.describe(recording, dataset)
+                log(recording, dataset)
+        finally:
+            recording.disconnect()
+    return Path(path)

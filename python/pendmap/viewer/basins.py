@@ -1,0 +1,303 @@
+"""The recording of a basin map: labels, attractors, settle time, net turns, exponent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import rerun as rr
+import rerun.blueprint as rrb
+import xarray as xr
+
+from pendmap import palette
+from pendmap.pictures import layers as layering
+from pendmap.pictures import legend, plane
+from pendmap.viewer import frame
+
+__all__ = ["blueprint", "log"]
+
+CELLS = 4096
+"""Rows and columns of an image at most: graphics processors take no larger ones for sure."""
+
+SAMPLE = 1000
+"""Rows and columns of the sample from which the limits of a colour scale are taken."""
+
+ROOTS = {"labels": "basin", "settle": "settle", "turns": "turns", "exponent": "exponent"}
+"""Where each layer is logged."""
+
+_LEAF = {"labels": "labels", "settle": "steps", "turns": "turns", "exponent": "exponent"}
+_COLOUR_MAPS = {"settle": "viridis", "exponent": "magma"}
+_TURNS_MOST = 30000
+
+
+def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
+    """Return the layout: one tab a layer, the leading one in front, legend and summary beside."""
+    shown = layering.layers(dataset)
+    listed = legend.entries(dataset)
+    rows = -(-len(listed) // 4)
+    tabs = [
+        _frame(dataset).view(
+            ROOTS[one], _title(dataset, one), below=110.0 * rows if one == "labels" else 0.0
+        )
+        for one in shown
+    ]
+    if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
+        tabs.append(
+            _around_attractors(listed).view(ROOTS["labels"], "Its attractor, once a period")
+        )
+    aside = rrb.Vertical(
+        rrb.TextDocumentView(origin="/legend", name="Legend"),
+        rrb.TextDocumentView(origin="/summary", name="Summary"),
+        row_shares=[1, 1],
+    )
+    return frame.screen(rrb.Tabs(*tabs, active_tab=0), aside, shares=[5, 2])
+
+
+def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
+    """Log every layer that tells something, the attractors and the legend."""
+    around = _frame(dataset)
+    shown = layering.layers(dataset)
+    listed = legend.entries(dataset)
+    frame.summary(stream, dataset)
+    frame.text(stream, "legend", _legend(dataset, listed))
+    for one in shown:
+        around.log(stream, ROOTS[one])
+        _LOGS[one](stream, dataset, around)
+        if one == "labels" or not layering.finite_time(dataset):
+            _attractors(stream, ROOTS[one], listed, around, named=one == "labels")
+    if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
+        alone = _around_attractors(listed)
+        alone.log(stream, ROOTS["labels"])
+        _attractors(stream, ROOTS["labels"], listed, alone, named=False)
+
+
+def _frame(dataset: xr.Dataset) -> frame.Frame:
+    return frame.Frame(
+        plane.cell_edges(dataset["theta"].values), plane.cell_edges(dataset["velocity"].values)
+    )
+
+
+def _around_attractors(listed: list[legend.Entry]) -> frame.Frame:
+    """Return a frame that holds every attractor's points, where no map is drawn with them."""
+    velocity = np.concatenate([entry.points[:, 1] for entry in listed])
+    low, high = float(velocity.min()), float(velocity.max())
+    pad = max(0.06 * (high - low), 0.05)
+    return frame.Frame((-np.pi, np.pi), (low - pad, high + pad))
+
+
+def _title(dataset: xr.Dataset, layer: str) -> str:
+    if layer == "labels" and not layering.reliable(dataset):
+        return "Labels (unreliable)"
+    text = layering.what(dataset, layer) + (" (periods)" if layer == "settle" else "")
+    return text[0].upper() + text[1:]
+
+
+def _image(
+    stream: rr.RecordingStream, around: frame.Frame, layer: str, image: Any, shape: tuple[int, ...]
+) -> None:
+    path = f"{ROOTS[layer]}/data/{_LEAF[layer]}"
+    stream.log(path, around.of_pixels(shape), static=True)
+    stream.log(path, image, static=True)
+
+
+def _labels(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
+    """Log the labels, shifted by 1: 0 failed, 1 undecided, 2 the first attractor."""
+    label = plane.thinned(dataset["label"], CELLS)
+    colours = legend.colours(dataset)
+    kind = np.uint8 if len(colours) <= 256 else np.uint16
+    shifted = np.add(label, 1, dtype=np.int16).astype(kind)
+    names = {
+        int(i) + 1: str(n)
+        for i, n in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
+    }
+    names |= {0: "failed", 1: "undecided"}
+    context = [(i, legend.typeset(name), colours[i]) for i, name in sorted(names.items())]
+    stream.log(ROOTS["labels"], rr.AnnotationContext(context), static=True)
+    _image(stream, around, "labels", rr.SegmentationImage(shifted, opacity=1.0), label.shape)
+    _swatches(stream, legend.entries(dataset), around)
+
+
+def _settle(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
+    """Log the periods to settle; cells that never do have 0, and their label's colour on top."""
+    settle = plane.thinned(dataset["settle_periods"], CELLS)
+    absent = settle < 0
+    sample = plane.thinned(dataset["settle_periods"], SAMPLE)
+    known = sample[sample >= 0]
+    low, high = 0.0, max(1.0, float(np.quantile(known, 0.995)) if known.size else 1.0)
+    kind = np.uint16 if int(settle.max()) < 65536 else np.float32
+    _scalar(stream, around, "settle", np.maximum(settle, 0).astype(kind), (low, high))
+    _cover(stream, dataset, around, "settle", absent)
+
+
+def _exponent(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
+    """Log the finite-time exponent."""
+    values = plane.thinned(dataset["finite_time_exponent"], CELLS).astype(np.float32, copy=False)
+    absent = ~np.isfinite(values)
+    sample = plane.thinned(dataset["finite_time_exponent"], SAMPLE)
+    known = sample[np.isfinite(sample)]
+    low, high = (float(q) for q in np.quantile(known, [0.005, 0.995])) if known.size else (0.0, 1.0)
+    if high <= low:
+        low, high = low - 0.5, high + 0.5
+    _scalar(stream, around, "exponent", values, (low, high))
+    _cover(stream, dataset, around, "exponent", absent)
+
+
+def _scalar(
+    stream: rr.RecordingStream,
+    around: frame.Frame,
+    layer: str,
+    values: npt.NDArray[Any],
+    limits: tuple[float, float],
+) -> None:
+    low, high = limits
+    look: dict[str, Any] = {
+        "colormap": _COLOUR_MAPS[layer],
+        "depth_range": [low, high],
+        "meter": 1.0,
+        "magnification_filter": "nearest",
+    }
+    _image(stream, around, layer, rr.DepthImage(values, **look), values.shape)
+    column = np.linspace(low, high, 256, dtype=np.float32)[:, None]
+    around.bar(stream, ROOTS[layer], rr.DepthImage(column, **look), low=low, high=high)
+
+
+def _turns(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
+    """Log the net turns as classes, each named by its number: class = turns + offset."""
+    turns = plane.thinned(dataset["net_turns"], CELLS)
+    label = plane.thinned(dataset["label"], CELLS)
+    most = int(min(max(-int(turns.min()), int(turns.max()), 1), _TURNS_MOST))
+    offset = most + 1
+    classes = np.clip(turns, -most, most)
+    classes += offset
+    classes = classes.astype(np.uint16)
+    classes[label < 0] = 0
+    sample = plane.thinned(dataset["net_turns"], SAMPLE)
+    top = max(1.0, float(np.quantile(np.abs(sample), 0.98)))
+    span = np.arange(-most, most + 1)
+    colours = palette.diverging(span / top)
+    context: list[Any] = [(0, "failed", palette.rgb("failed"))]
+    context += [
+        (int(t) + offset, f"{t:+d} turns".replace("-", "\N{MINUS SIGN}"), c)
+        for t, c in zip(span, colours, strict=True)
+    ]
+    stream.log(ROOTS["turns"], rr.AnnotationContext(context), static=True)
+    _image(stream, around, "turns", rr.SegmentationImage(classes, opacity=1.0), classes.shape)
+    stream.log("turns/data/turns", rr.AnyValues(class_of_no_turn=offset), static=True)
+    column = np.round(np.linspace(-top, top, 256)).astype(int) + offset
+    bar = rr.SegmentationImage(column.astype(np.uint16)[:, None], opacity=1.0)
+    around.bar(stream, ROOTS["turns"], bar, low=-top, high=top)
+
+
+def _cover(
+    stream: rr.RecordingStream,
+    dataset: xr.Dataset,
+    around: frame.Frame,
+    layer: str,
+    absent: npt.NDArray[np.bool_],
+) -> None:
+    """Log the labels, shifted by 2, of cells without a value over a layer; 0 shows through."""
+    if not absent.any():
+        return
+    label = plane.thinned(dataset["label"], CELLS)
+    cover = np.where(absent, label + 2, 0).astype(np.uint16)
+    colours = legend.colours(dataset)
+    path = f"{ROOTS[layer]}/data/without"
+    names = {1: "failed", 2: "undecided"} | {
+        int(i) + 2: str(n)
+        for i, n in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
+    }
+    context: list[Any] = [(0, "", (0, 0, 0, 0))]
+    context += [(i, name, colours[i - 1]) for i, name in sorted(names.items())]
+    stream.log(path, rr.AnnotationContext(context), static=True)
+    stream.log(path, around.of_pixels(cover.shape), static=True)
+    stream.log(path, rr.SegmentationImage(cover, opacity=1.0, draw_order=1.0), static=True)
+
+
+def _attractors(
+    stream: rr.RecordingStream,
+    root: str,
+    listed: list[legend.Entry],
+    around: frame.Frame,
+    *,
+    named: bool,
+) -> None:
+    """Log the attractors' points, those of orbits in two rings and with the name at the first."""
+    path = f"{root}/data/attractors"
+    spots: list[tuple[float, float]] = []
+    orbits: list[tuple[float, float]] = []
+    names: list[tuple[tuple[float, float], str]] = []
+    colours: list[tuple[int, int, int]] = []
+    tints: list[tuple[int, int, int]] = []
+    sizes: list[float] = []
+    for entry in listed:
+        at = plane.copies(entry.points, *around.x)
+        at = at[(at[:, 1] >= around.y[0]) & (at[:, 1] <= around.y[1])]
+        here = [(float(x), float(v)) for x, v in at]
+        spots += here
+        colours += [palette.rgb(entry.name, entry.kind)] * len(here)
+        sizes += [1.2 if entry.chaotic else 5.0] * len(here)
+        if here and not entry.chaotic:
+            orbits += here
+            names.append((here[0], legend.typeset(entry.name)))
+            tints.append(_tint(palette.rgb(entry.name, entry.kind)))
+    rings = (("outline", 8.0, (30, 30, 30), 41.0), ("ring", 6.8, (250, 250, 250), 42.0))
+    for name, size, colour, order in rings if orbits else ():
+        radius = rr.Radius.ui_points(size)
+        ring = rr.Points2D(orbits, colors=[colour], radii=radius, draw_order=order)
+        stream.log(f"{path}/{name}", ring, static=True)
+    if spots:
+        radii = rr.Radius.ui_points(sizes)
+        points = rr.Points2D(spots, colors=colours, radii=radii, draw_order=43.0)
+        stream.log(path, points, static=True)
+    if named and names:
+        places, texts = [at for at, _ in names], [text for _, text in names]
+        frame.write(stream, f"{path}/names", places, texts, colours=tints)
+
+
+def _swatches(stream: rr.RecordingStream, listed: list[legend.Entry], around: frame.Frame) -> None:
+    """Log the legend below the map: a spot of each colour with the name under it."""
+    at = [
+        (125.0 + 250.0 * (k % 4), around.height + 170.0 + 110.0 * (k // 4))
+        for k in range(len(listed))
+    ]
+    if not at:
+        return
+    spots = rr.Points2D(
+        at,
+        colors=[palette.rgb(e.name, e.kind) for e in listed],
+        radii=rr.Radius.ui_points(8.0),
+    )
+    stream.log("basin/axes/legend", spots, static=True)
+    names = [legend.typeset(e.name) for e in listed]
+    frame.write(stream, "basin/axes/legend/names", [(x, y + 16.0) for x, y in at], names)
+
+
+def _tint(colour: tuple[int, int, int]) -> tuple[int, int, int]:
+    """Return a colour halfway to white, for letters upon the map."""
+    red, green, blue = ((255 + part) // 2 for part in colour)
+    return red, green, blue
+
+
+def _legend(dataset: xr.Dataset, listed: list[legend.Entry]) -> str:
+    """Return the legend as a table."""
+    lines = [f"**{layering.parameters(dataset.attrs)}**", ""]
+    if not layering.reliable(dataset):
+        lines += [f"**{layering.warning(dataset)}**", ""]
+    if not listed:
+        lines += ["No attractors."]
+        return "\n".join(lines)
+    twins = any(e.twin for e in listed)
+    lines += [
+        f"| attractor | share | colour |{' mirror twin |' * twins}",
+        "|---" * (3 + twins) + "|",
+    ]
+    lines += [
+        f"| {legend.typeset(e.name)} | {e.share} | {palette.describe(e.name, e.kind)} |"
+        + f" {legend.typeset(e.twin)} |" * twins
+        for e in listed
+    ]
+    return "\n".join(lines)
+
+
+_LOGS = {"labels": _labels, "settle": _settle, "turns": _turns, "exponent": _exponent}

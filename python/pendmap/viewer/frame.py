@@ -1,0 +1,218 @@
+"""What all recordings share: the recording itself, and the frame of a phase plane on the screen."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+import xarray as xr
+
+from pendmap.pictures import layers as layering
+from pendmap.pictures import plane
+
+__all__ = ["INK", "Frame", "describe", "recording", "screen", "strict", "summary", "text", "write"]
+
+INK = (150, 150, 150)
+"""Lines and labels in a mid tone: the background may be light or dark."""
+
+SIDE = 1000.0
+"""Width of a frame on the screen, in the view's own units."""
+
+TIMELINE = "sim_time"
+
+
+def recording(dataset: xr.Dataset) -> rr.RecordingStream:
+    """Return an empty recording, identified by the dataset's content."""
+    content = hashlib.blake2b(repr(sorted(dataset.attrs.items())).encode(), digest_size=12)
+    content.update(
+        np.ascontiguousarray(dataset["label" if "label" in dataset else "theta"].values).data
+    )
+    name = content.hexdigest()
+    stream = rr.RecordingStream("pendmap", recording_id=name, send_properties=False)
+    stream.set_log_time_enabled(False)
+    return stream
+
+
+@contextlib.contextmanager
+def strict() -> Iterator[None]:
+    """Let the recording library raise where it would only warn and leave something out."""
+    before = rr.strict_mode()
+    rr.set_strict_mode(True)
+    try:
+        yield
+    finally:
+        rr.set_strict_mode(before)
+
+
+def describe(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
+    """Log the recording's name and, as properties, all attributes of the dataset."""
+    attrs = dataset.attrs
+    stream.send_recording_name(
+        f"{attrs.get('title', attrs['kind'])} ({layering.parameters(attrs)})"
+    )
+    plain = {
+        str(k): _plain(v) for k, v in attrs.items() if k != "summary" and _plain(v) is not None
+    }
+    stream.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **plain))
+
+
+def summary(stream: rr.RecordingStream, dataset: xr.Dataset, *further: str) -> None:
+    """Log the dataset's summary, line for line, and further paragraphs."""
+    lines = [*str(dataset.attrs.get("summary", "")).splitlines(), *further]
+    text(stream, "summary", "\n\n".join(lines))
+
+
+def text(stream: rr.RecordingStream, path: str, markdown: str) -> None:
+    """Log a page of text."""
+    stream.log(path, rr.TextDocument(markdown, media_type="text/markdown"), static=True)
+
+
+def screen(*views: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blueprint:
+    """Return the layout of a window: these views side by side, none that the viewer would add."""
+    return rrb.Blueprint(
+        rrb.Horizontal(*views, column_shares=list(shares)),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A rectangle of the phase plane, and where it lies in a 2D view.
+
+    A 2D view counts downward and draws both directions to one scale. So everything under
+    ``root/data`` is logged in physical units, one static transform there brings it to the screen,
+    and the frame with its ticks is drawn under ``root/axes``, ``SIDE`` wide.
+
+    Attributes
+    ----------
+    x : (float, float)
+        Range of the angle in rad.
+    y : (float, float)
+        Range of the nondimensional velocity.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    @property
+    def height(self) -> float:
+        """Height on the screen: that of the range, but neither a slit nor a tower."""
+        return SIDE * min(max((self.y[1] - self.y[0]) / (self.x[1] - self.x[0]), 0.3), 1.3)
+
+    def to_screen(self) -> rr.Transform3D:
+        """Return the transform from physical units to the screen."""
+        sx = SIDE / (self.x[1] - self.x[0])
+        sy = self.height / (self.y[1] - self.y[0])
+        return rr.Transform3D(
+            translation=[-sx * self.x[0], sy * self.y[1], 0.0], mat3x3=np.diag([sx, -sy, 1.0])
+        )
+
+    def of_pixels(self, shape: tuple[int, ...]) -> rr.Transform3D:
+        """Return the transform from an image's pixels, row 0 lowest, to physical units."""
+        sx = (self.x[1] - self.x[0]) / shape[1]
+        sy = (self.y[1] - self.y[0]) / shape[0]
+        return rr.Transform3D(
+            translation=[self.x[0], self.y[0], 0.0], mat3x3=np.diag([sx, sy, 1.0])
+        )
+
+    def view(
+        self, root: str, name: str, *, below: float = 0.0, **options: Any
+    ) -> rrb.Spatial2DView:
+        """Return the view of this frame, with room for ticks, a bar and, ``below``, a legend."""
+        return rrb.Spatial2DView(
+            origin=f"/{root}",
+            name=name,
+            visual_bounds=rrb.VisualBounds2D(
+                x_range=[-190.0, SIDE + 190.0], y_range=[-60.0, self.height + 150.0 + below]
+            ),
+            **options,
+        )
+
+    def log(self, stream: rr.RecordingStream, root: str) -> None:
+        """Log the transform, the frame, its ticks and the names of its axes."""
+        stream.log(f"{root}/data", self.to_screen(), static=True)
+        w, h = SIDE, self.height
+        lines: list[list[list[float]]] = [[[0, 0], [w, 0], [w, h], [0, h], [0, 0]]]
+        places: list[list[float]] = []
+        labels: list[str] = []
+        for value, label in plane.angle_ticks(*self.x):
+            at = w * (value - self.x[0]) / (self.x[1] - self.x[0])
+            lines.append([[at, h], [at, h + 12]])
+            places.append([at, h + 20])
+            labels.append(label)
+        for value, label in plane.plain_ticks(*self.y):
+            at = h * (self.y[1] - value) / (self.y[1] - self.y[0])
+            lines.append([[-12, at], [0, at]])
+            places.append([-55, at - 22])
+            labels.append(label)
+        places += [[w / 2, h + 75], [-135, h / 2 - 22]]
+        labels += [
+            "\N{GREEK SMALL LETTER THETA} (rad)",
+            "d\N{GREEK SMALL LETTER THETA}/d\N{GREEK SMALL LETTER TAU}",
+        ]
+        thin = rr.Radius.ui_points(0.75)
+        stream.log(
+            f"{root}/axes/frame", rr.LineStrips2D(lines, colors=[INK], radii=thin), static=True
+        )
+        write(stream, f"{root}/axes/ticks", places, labels)
+
+    def bar(
+        self,
+        stream: rr.RecordingStream,
+        root: str,
+        image: Any,
+        *,
+        low: float,
+        high: float,
+    ) -> None:
+        """Log a colour bar: an image one pixel wide, lowest value first, with ticks beside it."""
+        path = f"{root}/axes/bar"
+        rows = 256
+        transform = rr.Transform3D(
+            translation=[SIDE + 35.0, self.height, 0.0],
+            mat3x3=np.diag([35.0, -self.height / rows, 1.0]),
+        )
+        stream.log(f"{path}/colours", transform, static=True)
+        stream.log(f"{path}/colours", image, static=True)
+        ticks = plane.plain_ticks(low, high)
+        at = [self.height * (high - value) / (high - low) for value, _ in ticks]
+        write(stream, f"{path}/ticks", [[SIDE + 120.0, y - 22] for y in at], [t for _, t in ticks])
+
+
+def write(
+    stream: rr.RecordingStream,
+    path: str,
+    places: Sequence[Sequence[float]],
+    labels: Sequence[str],
+    *,
+    colours: Sequence[tuple[int, int, int]] = (INK,),
+) -> None:
+    """Log labels, each centred below its place."""
+    points = rr.Points2D(
+        np.asarray(places, dtype=np.float32).reshape(-1, 2),
+        labels=list(labels),
+        colors=list(colours),
+        radii=[0.0],
+        show_labels=True,
+    )
+    stream.log(path, points, static=True)
+
+
+def _plain(value: Any) -> float | str | None:
+    """Return a property's value as a number or text, None where it is neither.
+
+    A property keeps one type in all recordings of a process, so that whole numbers are floats too.
+    """
+    if isinstance(value, str):
+        return value
+    return float(value) if isinstance(value, (bool, int, float, np.generic)) else None

@@ -1,0 +1,145 @@
+"""Opening the viewer's window on a recording."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+__all__ = [
+    "NoDisplayError",
+    "NotARecordingError",
+    "RecordingNotFoundError",
+    "ViewerError",
+    "open_viewer",
+]
+
+MAGIC = b"RRF2"
+"""How a recording begins."""
+
+PATIENCE = 2.0
+"""Seconds in which a viewer that cannot start is expected to say so."""
+
+
+_RUNNING: list[subprocess.Popen[bytes]] = []  # viewers left running, lest they count as forgotten
+
+
+class ViewerError(RuntimeError):
+    """The viewer cannot be started."""
+
+
+class NoDisplayError(ViewerError):
+    """There is no display to open a window on."""
+
+
+class RecordingNotFoundError(ViewerError, FileNotFoundError):
+    """The recording does not exist."""
+
+
+class NotARecordingError(ViewerError, ValueError):
+    """The file is not a recording."""
+
+
+def open_viewer(path: str | os.PathLike[str]) -> int:
+    """Start the viewer on a recording and leave it running.
+
+    Parameters
+    ----------
+    path : str or path
+        An ``.rrd`` file.
+
+    Returns
+    -------
+    int
+        The process number of the viewer, which runs on by itself.
+
+    Raises
+    ------
+    RecordingNotFoundError
+        If there is no such file.
+    NotARecordingError
+        If the file is something else, or empty.
+    NoDisplayError
+        If there is no display; the message says what to do instead.
+    ViewerError
+        If the viewer is not installed or ends at once; the message carries what it said.
+    """
+    file = _checked(Path(path))
+    _check_display(file)
+    command = [str(_program()), "--bind", "127.0.0.1", "--port", str(_free_port()), str(file)]
+    with tempfile.TemporaryFile() as said:
+        viewer = subprocess.Popen(  # noqa: S603
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            if viewer.poll() is not None:
+                said.seek(0)
+                raise _ended(file, said.read().decode(errors="replace"))
+            time.sleep(0.05)
+    _RUNNING.append(viewer)
+    return viewer.pid
+
+
+def _checked(file: Path) -> Path:
+    if not file.exists():
+        raise RecordingNotFoundError(f"{str(file)!r} does not exist")
+    if file.is_dir():
+        raise NotARecordingError(f"{str(file)!r} is a folder, not an .rrd recording")
+    with file.open("rb") as stream:
+        if stream.read(len(MAGIC)) != MAGIC:
+            raise NotARecordingError(f"{str(file)!r} is not an .rrd recording")
+    return file.resolve()
+
+
+def _check_display(file: Path) -> None:
+    if not sys.platform.startswith("linux"):
+        return
+    if not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")):
+        raise NoDisplayError(_elsewhere(file, "there is no display (DISPLAY is not set)"))
+
+
+def _elsewhere(file: Path, why: str) -> str:
+    return (
+        f"cannot open a window: {why}; copy {str(file)!r} to a computer with a screen"
+        f" and open it there with 'pendmap view {file.name}'"
+    )
+
+
+def _program() -> Path:
+    """Return the viewer itself; the ``rerun`` on PATH is only a script around it."""
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    package = importlib.util.find_spec("rerun_cli")
+    for folder in package.submodule_search_locations or [] if package else []:
+        program = Path(folder) / name
+        if program.is_file():
+            return program
+    found = shutil.which("rerun")
+    if found is None:
+        raise ViewerError("the viewer is not installed; it comes with the package rerun-sdk")
+    return Path(found)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+    return port
+
+
+def _ended(file: Path, said: str) -> ViewerError:
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    reason = next((line for line in reversed(lines) if "rror" in line), "it gave no reason")
+    if any(word in said for word in ("EventLoopError", "X server", "WAYLAND_DISPLAY")):
+        return NoDisplayError(_elsewhere(file, "the display does not answer"))
+    return ViewerError(f"the viewer ended at once: {reason[:300]}")

@@ -1,0 +1,418 @@
+"""Small datasets in the project's schema, made with numpy alone.
+
+``painted`` draws bands of made-up basins, for tests of layout and bookkeeping; ``integrated`` and
+``chaotic`` integrate the equation of motion with a plain fourth-order Runge-Kutta method, for
+pictures of something real; ``swing`` is one trajectory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+TWO_PI = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class Painted:
+    """One attractor of a synthetic map: what the attractor table says of it."""
+
+    name: str
+    kind: str
+    n: int = 1
+    w: int = 0
+    points: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    twin: int = 0
+
+
+def wrap(theta: Floats) -> Floats:
+    """Wrap angles in rad to (-pi, pi]."""
+    return -((math.pi - theta) % TWO_PI - math.pi) * 1.0
+
+
+def centres(low: float, high: float, count: int) -> Floats:
+    """Return the centres of ``count`` cells between ``low`` and ``high``."""
+    return low + (np.arange(count) + 0.5) * (high - low) / count
+
+
+def assemble(
+    attractors: Sequence[Painted],
+    label: npt.NDArray[np.int16],
+    settle: npt.NDArray[np.int32],
+    turns: npt.NDArray[np.int32],
+    *,
+    exponent: npt.NDArray[np.float32] | None = None,
+    theta: tuple[float, float] = (-math.pi, math.pi),
+    velocity: tuple[float, float] = (-3.0, 3.0),
+    **attrs: Any,
+) -> xr.Dataset:
+    """Put arrays and attractors together as ``pendmap.basins`` returns them."""
+    rows, columns = label.shape
+    cells = label.size
+    shares = np.array([np.count_nonzero(label == k + 1) / cells for k in range(len(attractors))])
+    first = np.array(
+        [
+            a.points[0] if len(a.points) and "chaos" not in a.kind else (np.nan, np.nan)
+            for a in attractors
+        ]
+    ).reshape(-1, 2)
+    points = np.concatenate([a.points for a in attractors] + [np.empty((0, 2))])
+    owners = np.concatenate(
+        [np.full(len(a.points), k + 1) for k, a in enumerate(attractors)] + [np.empty(0)]
+    )
+    variables: dict[str, Any] = {
+        "label": (("velocity", "theta"), label),
+        "settle_periods": (("velocity", "theta"), settle),
+        "net_turns": (("velocity", "theta"), turns),
+        "id": ("attractor", np.arange(1, len(attractors) + 1)),
+        "kind": ("attractor", np.array([a.kind for a in attractors], dtype=object)),
+        "n": ("attractor", np.array([a.n for a in attractors], dtype=int)),
+        "w": ("attractor", np.array([a.w for a in attractors], dtype=int)),
+        "theta_point": ("attractor", first[:, 0]),
+        "velocity_point": ("attractor", first[:, 1]),
+        "period": ("attractor", np.array([a.n * math.pi for a in attractors], dtype=float)),
+        "exponent": (
+            "attractor",
+            np.array([0.17 if "chaos" in a.kind else -0.05 for a in attractors], dtype=float),
+        ),
+        "fraction": ("attractor", shares),
+        "stderr": ("attractor", np.sqrt(shares * (1 - shares) / cells)),
+        "twin": ("attractor", np.array([a.twin for a in attractors], dtype=int)),
+        "multipliers": (
+            ("attractor", "eigenvalue", "part"),
+            np.full((len(attractors), 2, 2), 0.5),
+        ),
+        "point_attractor": ("point", owners.astype(int)),
+        "point_theta": ("point", points[:, 0]),
+        "point_velocity": ("point", points[:, 1]),
+    }
+    if exponent is not None:
+        variables["finite_time_exponent"] = (("velocity", "theta"), exponent)
+    settled = settle[settle >= 0]
+    values = {
+        "kind": "basins",
+        "title": "Basins of attraction",
+        "gamma": 0.1,
+        "p": 1.0,
+        "omega": 2.0,
+        "phase": 0.0,
+        "torque": 0.0,
+        "tol": 1e-6,
+        "reached_error": 4.2e-7,
+        "steps_per_period": 14,
+        "max_periods": 2000,
+        "layer_periods": 20,
+        "layers": "labels",
+        "cells": cells,
+        "undecided": float(np.count_nonzero(label == 0) / cells),
+        "failed": float(np.count_nonzero(label == -1) / cells),
+        "mean_periods": float(settled.mean()) if settled.size else 0.0,
+        "mean_settle": float(settled.mean()) if settled.size else 0.0,
+        "longest_settle": int(settled.max()) if settled.size else 0,
+        "basin_entropy": 0.21,
+        "unreliable": 0.002,
+        "unreliable_half_step": 0.001,
+        "unreliable_mirror": 0.002,
+        "labels_reliable": 1,
+        "seconds": 1.5,
+        "simd": "avx2",
+        "threads": 2,
+        "pendmap_version": "0.1.0",
+        "format_version": 1,
+        "section": "tau = 0 mod T, where the drive's argument is the phase",
+        "summary": "A synthetic map.\nIts second line tells a little more.",
+    }
+    return xr.Dataset(
+        variables,
+        coords={
+            "theta": centres(*theta, columns),
+            "velocity": centres(*velocity, rows),
+            "attractor": np.array([a.name for a in attractors], dtype=object),
+        },
+        attrs=values | attrs,
+    )
+
+
+USUAL = (
+    Painted("rest", "rest", 1, 0, np.array([[0.0, 0.0]]), twin=1),
+    Painted("rotation 1:+1", "rotation", 1, 1, np.array([[-0.56, 2.63]]), twin=3),
+    Painted("rotation 1:-1", "rotation", 1, -1, np.array([[0.56, -2.63]]), twin=2),
+    Painted(
+        "oscillation 2:0", "oscillation", 2, 0, np.array([[-1.65, 0.21], [1.65, -0.21]]), twin=4
+    ),
+    Painted("oscillation 1:0 (+)", "oscillation", 1, 0, np.array([[1.0, 1.2]]), twin=6),
+    Painted("oscillation 1:0 (-)", "oscillation", 1, 0, np.array([[-1.0, -1.2]]), twin=5),
+    Painted("rotation 2:+2", "rotation", 2, 2, np.array([[-0.3, 2.8], [-0.7, 2.4]]), twin=8),
+    Painted("rotation 2:-2", "rotation", 2, -2, np.array([[0.3, -2.8], [0.7, -2.4]]), twin=7),
+    Painted(
+        "oscillation 3:0",
+        "oscillation",
+        3,
+        0,
+        np.array([[0.4, 0.2], [-0.8, 0.1], [0.5, -0.6]]),
+        twin=9,
+    ),
+    Painted("inverted rest", "inverted_rest", 1, 0, np.array([[math.pi, 0.0]]), twin=10),
+    Painted("libration chaos", "libration_chaos", 0, 0, np.array([[0.1, 1.5], [0.2, 1.6]])),
+    Painted("rotating chaos +", "rotating_chaos", 0, 0, np.array([[2.0, 2.1], [2.1, 2.2]])),
+)
+
+
+def painted(
+    attractors: Sequence[Painted] = USUAL[:4],
+    shape: tuple[int, int] = (30, 40),
+    *,
+    undecided: int = 0,
+    failed: int = 0,
+    **options: Any,
+) -> xr.Dataset:
+    """Return a map of wavy bands, one an attractor; its first cells undecided, its last failed."""
+    rows, columns = shape
+    y = np.arange(rows)[:, None] / rows
+    x = np.arange(columns)[None, :] / columns
+    wave = (y + 0.15 * np.sin(TWO_PI * x)) % 1.0
+    label = (
+        np.floor(wave * len(attractors)).astype(np.int16) + 1
+        if attractors
+        else np.zeros(shape, np.int16)
+    )
+    settle = (3 + 60 * wave**4 * (1 + x)).astype(np.int32)
+    turns = np.round(12 * np.sin(TWO_PI * y) * np.cos(TWO_PI * x)).astype(np.int32)
+    label.reshape(-1)[:undecided] = 0
+    if failed:
+        label.reshape(-1)[-failed:] = -1
+    chaotic = [k + 1 for k, a in enumerate(attractors) if "chaos" in a.kind]
+    settle[(label <= 0) | np.isin(label, chaotic)] = -1
+    return assemble(attractors, label, settle, turns, **options)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Stroboscopic states of many starts: shape (periods + 1, starts); angle in rad, unwrapped."""
+
+    theta: npt.NDArray[np.float32]
+    velocity: npt.NDArray[np.float32]
+    growth: Floats
+
+
+def strobe(
+    theta: Floats,
+    velocity: Floats,
+    periods: int,
+    *,
+    gamma: float,
+    p: float,
+    omega: float,
+    steps: int = 40,
+) -> Run:
+    """Integrate th'' + gamma th' + (1 + p cos omega tau) sin th = 0 and a tangent vector with RK4.
+
+    ``growth`` is the logarithm of the tangent vector's growth over all periods, shape (starts,).
+    """
+    state = np.stack([theta, velocity, np.ones_like(theta), np.zeros_like(theta)])
+    thetas, velocities = [theta.astype(np.float32)], [velocity.astype(np.float32)]
+    growth = np.zeros_like(theta)
+    h = TWO_PI / omega / steps
+
+    def slope(tau: float, x: Floats) -> Floats:
+        drive = 1.0 + p * math.cos(omega * tau)
+        return np.stack(
+            [
+                x[1],
+                -gamma * x[1] - drive * np.sin(x[0]),
+                x[3],
+                -gamma * x[3] - drive * np.cos(x[0]) * x[2],
+            ]
+        )
+
+    for _ in range(periods):
+        for i in range(steps):
+            tau = i * h
+            k1 = slope(tau, state)
+            k2 = slope(tau + h / 2, state + h / 2 * k1)
+            k3 = slope(tau + h / 2, state + h / 2 * k2)
+            k4 = slope(tau + h, state + h * k3)
+            state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        size = np.hypot(state[2], state[3])
+        growth += np.log(size)
+        state[2:] /= size
+        thetas.append(state[0].astype(np.float32))
+        velocities.append(state[1].astype(np.float32))
+    return Run(np.array(thetas), np.array(velocities), growth)
+
+
+def _name(n: int, w: int, *, at_rest: bool) -> tuple[str, str]:
+    if at_rest:
+        return "rest", "rest"
+    if w:
+        return f"rotation {n}:{w:+d}", "rotation"
+    return f"oscillation {n}:0", "oscillation"
+
+
+def integrated(
+    *, p: float, gamma: float = 0.1, omega: float = 2.0, cells: int = 60, periods: int = 120
+) -> xr.Dataset:
+    """Return the basins of a pendulum whose attractors are periodic, ``cells`` a side."""
+    theta, velocity = np.meshgrid(centres(-math.pi, math.pi, cells), centres(-3, 3, cells))
+    run = strobe(theta.ravel(), velocity.ravel(), periods, gamma=gamma, p=p, omega=omega)
+    angle = wrap(run.theta.astype(float)).astype(np.float32)
+    label = np.zeros(cells * cells, dtype=np.int16)
+    settle = np.full(cells * cells, -1, dtype=np.int32)
+    found: list[Painted] = []
+    for i in range(label.size):
+        if label[i] or len(found) >= 12:
+            continue
+        for n in range(1, 9):
+            if (
+                abs(wrap(angle[-1, i] - angle[-1 - n, i]))
+                + abs(run.velocity[-1, i] - run.velocity[-1 - n, i])
+                < 2e-3
+            ):
+                break
+        else:
+            continue
+        w = round(float(run.theta[-1, i] - run.theta[-1 - n, i]) / TWO_PI)
+        points = np.stack([angle[-n:, i], run.velocity[-n:, i]], axis=1).astype(float)
+        near = np.full(angle.shape, np.inf, dtype=np.float32)
+        for x, v in points:
+            np.minimum(near, np.abs(wrap(angle - x)) + np.abs(run.velocity - v), out=near)
+        mine = (label == 0) & (near[-1] < 0.02)
+        label[mine] = len(found) + 1
+        late = near[:, mine] > 0.1
+        settle[mine] = late.shape[0] - np.argmax(late[::-1], axis=0)
+        settle[mine & ~np.any(near > 0.1, axis=0)] = 0
+        found.append(Painted(*_name(n, w, at_rest=bool(np.abs(points).max() < 1e-2)), n, w, points))
+    stop = np.where(settle >= 0, settle, periods).clip(0, periods)
+    reached = run.theta[stop, np.arange(label.size)]
+    turns = np.round((reached - run.theta[0]) / TWO_PI).astype(np.int32)
+    twins = [_twin(a, found) for a in found]
+    named = [
+        Painted(a.name, a.kind, a.n, a.w, a.points, twin)
+        for a, twin in zip(found, twins, strict=True)
+    ]
+    label = label.reshape(cells, cells)
+    swap = np.array([0, *twins], dtype=np.int16)
+    unreliable = float(np.mean(swap[label] != label[::-1, ::-1]))
+    return assemble(
+        named,
+        label,
+        settle.reshape(cells, cells),
+        turns.reshape(cells, cells),
+        gamma=gamma,
+        p=p,
+        omega=omega,
+        max_periods=periods,
+        unreliable=unreliable,
+        unreliable_mirror=unreliable,
+        labels_reliable=int(unreliable <= 0.05),
+        basin_entropy=0.65 if unreliable > 0.05 else 0.12,
+        summary=(
+            f"{len(found)} attractors at gamma = {gamma:g}, p = {p:g}, omega = {omega:g}, "
+            f"found on {cells} x {cells} cells.\n"
+            f"Mean settle time {settle[settle >= 0].mean():.1f} periods, longest {settle.max()}.\n"
+            f"{unreliable:.1%} of the labels change under mirroring."
+        ),
+    )
+
+
+def _twin(one: Painted, found: Sequence[Painted]) -> int:
+    for k, other in enumerate(found):
+        if abs(wrap(one.points[0] + other.points)).sum(axis=1).min() < 0.02:
+            return k + 1
+    return 0
+
+
+def chaotic(
+    *, p: float = 1.7, gamma: float = 0.1, omega: float = 0.87, cells: int = 60, periods: int = 10
+) -> xr.Dataset:
+    """Return a map whose labels tell nothing: chaos takes all, or nothing attracts (gamma = 0)."""
+    theta, velocity = np.meshgrid(centres(-math.pi, math.pi, cells), centres(-3, 3, cells))
+    drive = {"gamma": gamma, "p": p, "omega": omega}
+    run = strobe(theta.ravel(), velocity.ravel(), periods, steps=60, **drive)
+    shape = (cells, cells)
+    found: list[Painted] = []
+    if gamma > 0:
+        long = strobe(np.array([0.5, 1.0]), np.array([0.1, 0.2]), 600, steps=60, **drive)
+        points = np.stack(
+            [wrap(long.theta[50:].ravel().astype(float)), long.velocity[50:].ravel()], axis=1
+        )
+        found = [Painted("tumbling chaos", "tumbling_chaos", 0, 0, points, 1)]
+    return assemble(
+        found,
+        np.full(shape, len(found), dtype=np.int16),
+        np.full(shape, -1, dtype=np.int32),
+        np.round((run.theta[-1] - run.theta[0]) / TWO_PI).astype(np.int32).reshape(shape),
+        exponent=(run.growth / (periods * TWO_PI / omega)).astype(np.float32).reshape(shape),
+        layers="finite_time",
+        layer_periods=periods,
+        undecided=0.0 if found else 1.0,
+        summary="One chaotic attractor takes every start."
+        if found
+        else "Without damping there are no attractors.",
+        **drive,
+    )
+
+
+def swing(
+    *,
+    p: float = 1.7,
+    gamma: float = 0.1,
+    omega: float = 0.87,
+    theta: float = 1.0,
+    velocity: float = 0.0,
+    periods: int = 60,
+    steps: int = 60,
+) -> xr.Dataset:
+    """Return one trajectory as ``pendmap.simulate`` does, ``steps`` samples a forcing period."""
+    h = TWO_PI / omega / steps
+    time = np.arange(periods * steps + 1) * h
+    states = np.empty((time.size, 2))
+    x = np.array([theta, velocity])
+    states[0] = x
+
+    def slope(tau: float, y: Floats) -> Floats:
+        return np.array([y[1], -gamma * y[1] - (1 + p * math.cos(omega * tau)) * math.sin(y[0])])
+
+    for i, tau in enumerate(time[:-1]):
+        k1 = slope(tau, x)
+        k2 = slope(tau + h / 2, x + h / 2 * k1)
+        k3 = slope(tau + h / 2, x + h / 2 * k2)
+        k4 = slope(tau + h, x + h * k3)
+        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states[i + 1] = x
+    return xr.Dataset(
+        {
+            "theta": ("time", states[:, 0]),
+            "velocity": ("time", states[:, 1]),
+            "section_time": ("period", time[::steps]),
+            "section_theta": ("period", wrap(states[::steps, 0])),
+            "section_velocity": ("period", states[::steps, 1]),
+        },
+        coords={"time": time, "period": np.arange(periods + 1)},
+        attrs={
+            "kind": "trajectory",
+            "title": "Trajectory",
+            "gamma": gamma,
+            "p": p,
+            "omega": omega,
+            "phase": 0.0,
+            "torque": 0.0,
+            "theta0": theta,
+            "velocity0": velocity,
+            "until": float(time[-1]),
+            "tol": 1e-6,
+            "reached_error": 1e-7,
+            "steps_per_period": steps,
+            "turns": round(float(states[-1, 0] - states[0, 0]) / TWO_PI),
+            "summary": "A trajectory.\nIt tumbles.",
+            "pendmap_version": "0.1.0",
+            "format_version": 1,
+        },
+    )

@@ -1,0 +1,28 @@
+//! The crate against what is known without it: exact solutions, symmetries, conserved quantities,
+//! and the reference values of `tests/truths.json`.
+//!
+//! - [`exact`], [`order`]: solutions in closed form, energy, order of convergence
+//! - [`sine`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
+//! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
+//! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
+//! - [`maps`]: whole planes
+//! - [`properties`]: what holds for every pendulum
+//! - [`input`]: what is refused, and in which words
+
+#![allow(dead_code)]
+mod attractors;
+mod bifurcations;
+mod chaos;
+mod exact;
+mod input;
+mod lanes;
+mod maps;
+mod orbits;
+mod order;
+mod properties;
+mod sine;
+mod special;
+mod support;
+mod tangent;
+mod traps;
+mod truths;

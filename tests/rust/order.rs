@@ -1,0 +1,87 @@
+//! The order of convergence, measured: eight, whatever the damping, drive and torque.
+
+use std::f64::consts::PI;
+
+use pendmap::integrate::accuracy::distance;
+use pendmap::integrate::tableau::{A, B, BP, C, ORDER, STAGES};
+use pendmap::integrate::{Moving, Schedule};
+use pendmap::lanes::sine::Fine;
+use pendmap::model::Pendulum;
+
+use crate::support::{advanced, fine_strobe, path, spread};
+
+/// Root mean square over starts of the error after one period, for each number of steps.
+fn errors(pendulum: &Pendulum, steps: &[usize]) -> Vec<f64> {
+    let starts = spread(64, PI, 3.0);
+    let exact = advanced(&fine_strobe(pendulum, 600, path()), &starts, 1);
+    steps
+        .iter()
+        .map(|n| {
+            let ends = advanced(&fine_strobe(pendulum, *n, path()), &starts, 1);
+            let squares = ends.iter().zip(&exact).map(|(a, b)| distance(*a, *b).powi(2));
+            (squares.sum::<f64>() / starts.len() as f64).sqrt()
+        })
+        .collect()
+}
+
+#[test]
+fn the_step_has_order_eight() {
+    let cases = [
+        ("damping, drive and torque", (0.3, 1.1, 2.0, 0.4, 0.5)),
+        ("no damping", (0.0, 1.1, 2.0, 0.0, 0.0)),
+        ("no damping, torque", (0.0, 0.7, 1.7, 0.0, 0.3)),
+        ("heavy damping", (1.5, 0.9, 2.0, 0.0, 0.0)),
+        ("no drive", (0.2, 0.0, 1.0, 0.0, 0.4)),
+    ];
+    for (name, (gamma, p, omega, phase, torque)) in cases {
+        let pendulum = Pendulum::new(gamma, p, omega, phase, torque).expect("in range");
+        let scale = pendulum.period() / PI;
+        let steps = [24.0, 34.0, 48.0].map(|n| (n * scale).round() as usize);
+        let errors = errors(&pendulum, &steps);
+        let slope = |i: usize, j: usize| {
+            (errors[i] / errors[j]).ln() / (steps[j] as f64 / steps[i] as f64).ln()
+        };
+        let order = slope(0, 2);
+        eprintln!("{name}: {errors:?} order {order} {} {}", slope(0, 1), slope(1, 2));
+        assert!((order - f64::from(ORDER)).abs() < 0.35, "{name}: order {order}, errors {errors:?}");
+    }
+}
+
+#[test]
+fn the_tableau_meets_the_simple_order_conditions() {
+    // sum b c^k = 1/((k+1)(k+2)), sum b' c^k = 1/(k+1), sum_j a_ij = c_i^2/2.
+    for k in 0..ORDER {
+        let moment = |weights: &[f64; STAGES]| {
+            weights.iter().zip(&C).map(|(w, c)| w * c.powi(k)).sum::<f64>()
+        };
+        let k = f64::from(k);
+        if k < f64::from(ORDER) - 1.0 {
+            assert!((moment(&B) - 1.0 / ((k + 1.0) * (k + 2.0))).abs() < 1e-15, "b, {k}");
+        }
+        assert!((moment(&BP) - 1.0 / (k + 1.0)).abs() < 1e-15, "b', {k}");
+    }
+    for (row, c) in A.iter().zip(&C) {
+        assert!((row.iter().sum::<f64>() - 0.5 * c * c).abs() < 2e-14);
+    }
+}
+
+#[test]
+fn schedules_join() {
+    // A period in two parts of other step lengths is the whole period.
+    let pendulum = Pendulum::new(0.2, 1.2, 1.7, 0.3, 0.1).expect("in range");
+    let period = pendulum.period();
+    let cut = 0.37 * period;
+    let whole = Schedule::period(&pendulum, 400);
+    let mut moving = Moving::new(&whole, 1.0, 0.5);
+    moving.run::<Fine>(&whole);
+    let expected = [moving.theta, moving.velocity(&whole)];
+    let first = Schedule::new(&pendulum, 0.0, cut, 170);
+    let mut moving = Moving::new(&first, 1.0, 0.5);
+    moving.run::<Fine>(&first);
+    let second = Schedule::new(&pendulum, cut, period - cut, 290);
+    let mut moving = Moving::new(&second, moving.theta, moving.velocity(&first));
+    moving.run::<Fine>(&second);
+    let end = [moving.theta, moving.velocity(&second)];
+    assert!(distance(end, expected) < 3e-14, "{end:?} for {expected:?}");
+    assert!((second.duration() - (period - cut)).abs() < 1e-15);
+}

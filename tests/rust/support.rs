@@ -1,0 +1,79 @@
+//! What several modules need: paths, pendulums, starts that cover a plane, whole maps.
+
+use std::f64::consts::PI;
+
+use pendmap::integrate::{State, Strobe};
+use pendmap::lanes::Path;
+use pendmap::maps::basins::{BasinMap, Options, basins};
+use pendmap::maps::control::Control;
+use pendmap::maps::starts::{Axis, Starts};
+use pendmap::model::Pendulum;
+
+/// The paths that this processor has, quickest first.
+pub fn paths() -> Vec<Path> {
+    Path::ALL.into_iter().filter(|path| path.available()).collect()
+}
+
+/// The path that a map takes: the quickest, or the one that `PENDMAP_SIMD` names.
+pub fn path() -> Path {
+    Path::choose().expect("PENDMAP_SIMD names a path of this processor")
+}
+
+/// A driven pendulum without torque.
+pub fn driven(gamma: f64, p: f64, omega: f64) -> Pendulum {
+    Pendulum::new(gamma, p, omega, 0.0, 0.0).expect("in range")
+}
+
+/// An undriven pendulum with torque.
+pub fn undriven(gamma: f64, torque: f64) -> Pendulum {
+    Pendulum::new(gamma, 0.0, 1.0, 0.0, torque).expect("in range")
+}
+
+/// The map of `pendulum` with the fine sine whatever the step.
+pub fn fine_strobe(pendulum: &Pendulum, steps: usize, path: Path) -> Strobe {
+    Strobe { fine: true, ..Strobe::new(pendulum, steps, path) }
+}
+
+/// `count` states that cover `[-theta, theta] x [-velocity, velocity]` evenly (an additive
+/// recurrence with the plastic number).
+pub fn spread(count: usize, theta: f64, velocity: f64) -> Vec<State> {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    (1..=count)
+        .map(|k| {
+            let at = |ratio: f64| 2.0 * (0.5 + k as f64 * ratio).fract() - 1.0;
+            [theta * at(1.0 / PLASTIC), velocity * at(1.0 / (PLASTIC * PLASTIC))]
+        })
+        .collect()
+}
+
+/// The grid of the reference values: `count` x `count` cells of [-pi, pi] x [-3, 3].
+pub fn plane(count: usize) -> Starts {
+    Starts::Grid {
+        theta: Axis::new("theta", -PI, PI, count).expect("an axis"),
+        velocity: Axis::new("velocity", -3.0, 3.0, count).expect("an axis"),
+    }
+}
+
+/// The basins of `pendulum` on [`plane`], as a user gets them but for the reliability check.
+pub fn basins_on_plane(pendulum: &Pendulum, count: usize) -> BasinMap {
+    let options = Options { check: false, ..Options::default() };
+    basins(pendulum, &plane(count), &options, &Control::default()).expect("a map")
+}
+
+/// States as the two arrays that the kernel takes.
+pub fn columns(states: &[State]) -> (Vec<f64>, Vec<f64>) {
+    states.iter().map(|s| (s[0], s[1])).unzip()
+}
+
+/// The states after `periods` periods, wrapped.
+pub fn advanced(strobe: &Strobe, states: &[State], periods: usize) -> Vec<State> {
+    let (mut theta, mut velocity) = columns(states);
+    let mut turns = vec![0.0; states.len()];
+    strobe.advance(&mut theta, &mut velocity, &mut turns, periods).expect("equal lengths");
+    theta.into_iter().zip(velocity).map(|(a, b)| [a, b]).collect()
+}
+
+/// The bits of numbers, to compare them without tolerance.
+pub fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|x| x.to_bits()).collect()
+}

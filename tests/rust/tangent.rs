@@ -1,0 +1,150 @@
+//! Derivatives: variational equations against finite differences, areas, stretching.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+use pendmap::integrate::accuracy::wrapped;
+use pendmap::integrate::{State, Strobe};
+use pendmap::model::Pendulum;
+use pendmap::orbit::PoincareMap;
+
+use crate::support::{bits, columns, driven, paths, spread};
+
+fn cases() -> [Pendulum; 4] {
+    [
+        driven(0.1, 1.0, 2.0),
+        driven(0.0, 0.6, 1.0),
+        driven(0.4, 1.7, 0.87),
+        Pendulum::new(0.2, 0.8, 1.5, 0.5, 0.6).expect("in range"),
+    ]
+}
+
+/// The central difference of `n` periods of the map in one direction.
+fn difference(map: &PoincareMap, state: State, direction: State, n: usize, h: f64) -> State {
+    let at = |s: f64| {
+        map.iterate([state[0] + s * direction[0], state[1] + s * direction[1]], n).state
+    };
+    let (plus, minus) = (at(h), at(-h));
+    [wrapped(plus[0] - minus[0]) / (2.0 * h), (plus[1] - minus[1]) / (2.0 * h)]
+}
+
+#[test]
+fn the_variational_equations_give_the_derivative() {
+    for pendulum in cases() {
+        let map = PoincareMap::new(&pendulum);
+        for state in spread(40, PI, 2.5) {
+            for n in [1, 3] {
+                let image = map.iterate(state, n);
+                let scale = image.derivative.norm();
+                for (column, direction) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+                    // Richardson's combination of two steps leaves errors of the fourth order.
+                    let h = 2e-4 / scale.max(1.0);
+                    let [coarse, fine] =
+                        [h, 0.5 * h].map(|h| difference(&map, state, direction, n, h));
+                    for row in 0..2 {
+                        let expected = (4.0 * fine[row] - coarse[row]) / 3.0;
+                        let found = image.derivative[(row, column)];
+                        let error = (found - expected).abs() / scale;
+                        assert!(error < 2e-8, "{pendulum:?} {state:?} n {n}: {found} {expected}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn damping_alone_shrinks_area() {
+    for pendulum in cases() {
+        let map = PoincareMap::new(&pendulum);
+        let exact = (-pendulum.gamma * pendulum.period()).exp();
+        for state in spread(200, PI, 3.0) {
+            let image = map.once(state);
+            // What the difference of two products of the entries loses.
+            let lost = 1e-14 * image.derivative.norm().powi(2);
+            let error = (image.derivative.determinant() - exact).abs();
+            assert!(error < lost + 1e-13, "{pendulum:?} at {state:?}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn turns_and_angle_make_the_unwrapped_angle() {
+    // A fast rotation without damping and drive: theta grows by about the velocity times the time.
+    let map = PoincareMap::new(&driven(0.0, 0.0, 1.0));
+    let image = map.once([0.5, 20.0]);
+    let angle = image.state[0] + std::f64::consts::TAU * image.turns as f64;
+    assert!((angle - (0.5 + 20.0 * 2.0 * PI)).abs() < 0.5, "{angle}");
+    assert!(image.turns == 20, "{}", image.turns);
+}
+
+#[test]
+fn stretch_is_the_growth_of_a_tangent() {
+    let states = spread(75, PI, 2.5);
+    let part = FRAC_1_SQRT_2;
+    for pendulum in cases() {
+        let map = PoincareMap::new(&pendulum);
+        let expected: Vec<(State, f64, State, i64)> = states
+            .iter()
+            .map(|state| {
+                let image = map.iterate(*state, 4);
+                let tangent = image.derivative * nalgebra::Vector2::new(part, part);
+                let unit = tangent / tangent.norm();
+                (image.state, tangent.norm().ln(), [unit[0], unit[1]], image.turns)
+            })
+            .collect();
+        for path in paths() {
+            let strobe = Strobe::new(&pendulum, 200, path);
+            let (mut theta, mut velocity) = columns(&states);
+            let count = states.len();
+            let mut turns = vec![0.0; count];
+            let mut tangents = (vec![part; count], vec![part; count]);
+            let mut growth = vec![0.0; count];
+            // Two calls: growth adds up, tangents go on.
+            for periods in [1, 3] {
+                strobe
+                    .stretch(
+                        (&mut theta, &mut velocity),
+                        &mut turns,
+                        (&mut tangents.0, &mut tangents.1),
+                        &mut growth,
+                        periods,
+                    )
+                    .expect("equal lengths");
+            }
+            for (i, (state, log, unit, whole)) in expected.iter().enumerate() {
+                let error = (wrapped(theta[i] - state[0])).hypot(velocity[i] - state[1]);
+                let tilt = (tangents.0[i] - unit[0]).hypot(tangents.1[i] - unit[1]);
+                assert!(error < 1e-9, "state {i} on {path}: {error:e}");
+                assert!((growth[i] - log).abs() < 1e-9, "growth {i}: {} {log}", growth[i]);
+                assert!(tilt < 1e-8, "direction {i} on {path}: {tilt:e}");
+                assert!((turns[i] - *whole as f64).abs() < 1e-12, "turns {i} on {path}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tangent_beside_a_state_does_not_change_it() {
+    for path in paths() {
+        let strobe = Strobe { fine: true, ..Strobe::new(&driven(0.1, 1.2, 2.0), 24, path) };
+        let states = spread(70, PI, 2.5);
+        let (mut theta, mut velocity) = columns(&states);
+        let mut turns = vec![0.0; states.len()];
+        strobe.advance(&mut theta, &mut velocity, &mut turns, 1).expect("equal lengths");
+        let (mut a, mut b) = columns(&states);
+        let mut whole = vec![0.0; states.len()];
+        let mut tangents = (vec![1.0; states.len()], vec![0.0; states.len()]);
+        let mut growth = vec![0.0; states.len()];
+        strobe
+            .stretch(
+                (&mut a, &mut b),
+                &mut whole,
+                (&mut tangents.0, &mut tangents.1),
+                &mut growth,
+                1,
+            )
+            .expect("equal lengths");
+        assert_eq!(bits(&theta), bits(&a), "{path}");
+        assert_eq!(bits(&velocity), bits(&b), "{path}");
+    }
+}
