@@ -67,7 +67,7 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
     part = target.with_name(f".{target.stem}-{uuid.uuid4().hex[:8]}.part.zarr")
     old = part.with_suffix(".old")
     try:
-        dataset.to_zarr(part, mode="w", zarr_format=3, consolidated=False)
+        dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
         if target.exists():
             target.rename(old)
         part.rename(target)
@@ -99,7 +99,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         raise InputError(f"{source}: suffix {source.suffix!r}: allowed are {', '.join(SUFFIXES)}")
     try:
         if source.suffix.lower() == ".zarr":
-            dataset = xr.open_zarr(source, consolidated=False).load()
+            dataset = xr.open_zarr(source, consolidated=True).load()
         else:
             dataset = xr.load_dataset(source, engine="netcdf4")
     except (OSError, ValueError, KeyError) as error:

@@ -8,13 +8,15 @@ pictures of something real; ``swing`` is one trajectory.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Floats = npt.NDArray[np.float64]
 TWO_PI = 2.0 * math.pi
@@ -42,7 +44,7 @@ def centres(low: float, high: float, count: int) -> Floats:
     return low + (np.arange(count) + 0.5) * (high - low) / count
 
 
-def assemble(
+def assemble(  # noqa: PLR0913 (the schema has many parts)
     attractors: Sequence[Painted],
     label: npt.NDArray[np.int16],
     settle: npt.NDArray[np.int32],
@@ -51,7 +53,7 @@ def assemble(
     exponent: npt.NDArray[np.float32] | None = None,
     theta: tuple[float, float] = (-math.pi, math.pi),
     velocity: tuple[float, float] = (-3.0, 3.0),
-    **attrs: Any,
+    **attrs: Any,  # noqa: ANN401 (attributes of any type)
 ) -> xr.Dataset:
     """Put arrays and attractors together as ``pendmap.basins`` returns them."""
     rows, columns = label.shape
@@ -171,7 +173,7 @@ def painted(
     *,
     undecided: int = 0,
     failed: int = 0,
-    **options: Any,
+    **options: Any,  # noqa: ANN401 (options of assemble)
 ) -> xr.Dataset:
     """Return a map of wavy bands, one an attractor; its first cells undecided, its last failed."""
     rows, columns = shape
@@ -202,7 +204,7 @@ class Run:
     growth: Floats
 
 
-def strobe(
+def strobe(  # noqa: PLR0913 (starts and parameters)
     theta: Floats,
     velocity: Floats,
     periods: int,
@@ -297,12 +299,12 @@ def integrated(
         Painted(a.name, a.kind, a.n, a.w, a.points, twin)
         for a, twin in zip(found, twins, strict=True)
     ]
-    label = label.reshape(cells, cells)
+    plane = label.reshape(cells, cells)
     swap = np.array([0, *twins], dtype=np.int16)
-    unreliable = float(np.mean(swap[label] != label[::-1, ::-1]))
+    unreliable = float(np.mean(swap[plane] != plane[::-1, ::-1]))
     return assemble(
         named,
-        label,
+        plane,
         settle.reshape(cells, cells),
         turns.reshape(cells, cells),
         gamma=gamma,
@@ -334,7 +336,7 @@ def chaotic(
 ) -> xr.Dataset:
     """Return a map whose labels tell nothing: chaos takes all, or nothing attracts (gamma = 0)."""
     theta, velocity = np.meshgrid(centres(-math.pi, math.pi, cells), centres(-3, 3, cells))
-    drive = {"gamma": gamma, "p": p, "omega": omega}
+    drive: dict[str, Any] = {"gamma": gamma, "p": p, "omega": omega}
     run = strobe(theta.ravel(), velocity.ravel(), periods, steps=60, **drive)
     shape = (cells, cells)
     found: list[Painted] = []
@@ -360,7 +362,7 @@ def chaotic(
     )
 
 
-def swing(
+def swing(  # noqa: PLR0913 (a start and parameters)
     *,
     p: float = 1.7,
     gamma: float = 0.1,

@@ -1,4 +1,6 @@
-"""Recordings: read back what was written, and, if wanted, look at the viewer's own picture of it."""
+"""Recordings: read back what was written and, if wanted, look at the viewer's picture of it."""
+
+# ruff: noqa: D102, D103 (their names say what the tests test)
 
 from __future__ import annotations
 
@@ -11,23 +13,25 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 import rerun as rr
-import synthetic
 import xarray as xr
 from PIL import Image
 from rerun.chunk import RrdReader
 
-from pendmap import palette, viewer
+import synthetic
+from pendmap import InputError, palette, viewer
 from pendmap.viewer import basins, window
 
-UNRELIABLE = {"labels_reliable": 0, "unreliable": 0.207}
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+UNRELIABLE: dict[str, Any] = {"labels_reliable": 0, "unreliable": 0.207}
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +67,7 @@ class ReadBack:
                     name = batch.column("ViewBlueprint:display_name").to_pylist()[0][0]
                     self.views[origin] = name
 
-    def one(self, entity: str, component: str) -> Any:
+    def one(self, entity: str, component: str) -> Any:  # noqa: ANN401 (whatever was logged)
         """Return the only value of a static component."""
         (row,) = self.columns[entity][component]
         return row[0] if len(row) == 1 else row
@@ -163,7 +167,9 @@ def test_transforms_bring_the_corners_of_the_map_to_the_frame(tmp_path: Path) ->
             assert np.allclose(corners[:, :2], [[-1.0, -2.0], [3.0, 4.0]], atol=1e-5)
     frame = np.array(back.one("/basin/axes/frame", "LineStrips2D:strips")[0])
     low, high = frame.min(axis=0), frame.max(axis=0)
-    assert np.allclose(corners[0, :2], [low[0], high[1]], atol=1e-3), "lowest velocity at the bottom"
+    assert np.allclose(corners[0, :2], [low[0], high[1]], atol=1e-3), (
+        "lowest velocity at the bottom"
+    )
     assert np.allclose(corners[1, :2], [high[0], low[1]], atol=1e-3)
 
 
@@ -323,7 +329,9 @@ def test_the_trail_ends_at_the_bob(tmp_path: Path, swing: xr.Dataset) -> None:
     trail = back.rows("/pendulum/data/trail", "LineStrips2D:strips")
     bob = back.rows("/pendulum/data/bob", "Points2D:positions")
     assert np.allclose(trail[:, -1], bob)
-    assert np.allclose(trail[150, -2], bob[145]), "every fifth of 200 samples: one period, 40 points"
+    assert np.allclose(trail[150, -2], bob[145]), (
+        "every fifth of 200 samples: one period, 40 points"
+    )
     assert np.allclose(trail[0], bob[0])
 
 
@@ -370,10 +378,12 @@ def test_errors_are_raised_although_the_library_would_only_warn(
 
 
 def test_bad_input_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"'\.txt'.*\.rrd"):
+    with pytest.raises(InputError, match=r"'\.txt'.*\.rrd"):
         viewer.record(synthetic.painted(), tmp_path / "a.txt")
-    with pytest.raises(ValueError, match="kind None.*basins, trajectory"):
+    with pytest.raises(InputError, match=r"kind None.*basins, trajectory"):
         viewer.record(xr.Dataset(), tmp_path / "a.rrd")
+    with pytest.raises(InputError, match="list of starts"):
+        viewer.record(synthetic.painted().isel(theta=0, drop=True), tmp_path / "a.rrd")
     with pytest.raises(FileNotFoundError, match="folder does not exist"):
         viewer.record(synthetic.painted(), tmp_path / "no" / "a.rrd")
     assert not list(tmp_path.iterdir())
@@ -476,7 +486,7 @@ def test_the_real_viewer_is_found() -> None:
 
 DRIVERS = list(Path("/usr/share/vulkan/icd.d").glob("*.json"))
 
-PICTURES = {
+PICTURES: dict[str, tuple[Callable[[], xr.Dataset], float | None]] = {
     "labels": (lambda: synthetic.integrated(p=0.6, cells=30, periods=60), None),
     "unreliable": (lambda: synthetic.painted(**UNRELIABLE), None),
     "finite time": (lambda: synthetic.chaotic(cells=30, periods=4), None),
@@ -486,7 +496,7 @@ PICTURES = {
 
 @contextlib.contextmanager
 def headless(folder: Path) -> Iterator[Any]:
-    from rerun.experimental import ViewerClient  # noqa: PLC0415
+    from rerun.experimental import ViewerClient  # noqa: PLC0415 (only where it is wanted)
 
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -526,10 +536,8 @@ def test_the_viewers_own_picture(tmp_path: Path, which: str) -> None:
         picture = Image.open(io.BytesIO(client.take_screenshot())).convert("RGB")
     assert {view.origin for view in state.views} == set(ReadBack(file).views)
     assert [view.reports for view in state.views if view.reports] == []
-    shares = {
-        tuple(colour): count / (picture.width * picture.height)
-        for count, colour in picture.getcolors(picture.width * picture.height) or ()
-    }
+    colours, counts = np.unique(np.asarray(picture).reshape(-1, 3), axis=0, return_counts=True)
+    shares = {tuple(c.tolist()): n / counts.sum() for c, n in zip(colours, counts, strict=True)}
     if which == "labels":
         map_share = 0.25
         for name, share in (("oscillation 2:0", 0.83), ("rotation 1:+1", 0.08)):

@@ -71,7 +71,7 @@ fn period_of_free_swings() {
         let measured = 4.0 * (quarter - theta / velocity);
         assert!((measured / period - 1.0).abs() < 1e-13, "{amplitude}: {measured} for {period}");
         let back = end(&run(&pendulum, start, period, 1e-13));
-        assert!((back[0] - start[0]).hypot(back[1]) < 3e-14, "{amplitude}: back at {back:?}");
+        assert!((back[0] - start[0]).hypot(back[1]) < 1e-13, "{amplitude}: back at {back:?}");
     }
 }
 
@@ -80,7 +80,8 @@ fn energy_stays_without_damping_and_drive() {
     for (torque, start) in [(0.0, [2.5, 0.0]), (0.0, [0.3, 2.2]), (0.3, [-0.4, 0.9])] {
         let pendulum = undriven(0.0, torque);
         let energy = |a: f64, v: f64| 0.5 * v * v - a.cos() - torque * a;
-        let run = run(&pendulum, start, 100.0 * TAU, 1e-12);
+        let tol = 1e-12;
+        let run = run(&pendulum, start, 100.0 * TAU, tol);
         let first = energy(start[0], start[1]);
         let worst = run
             .theta
@@ -88,7 +89,9 @@ fn energy_stays_without_damping_and_drive() {
             .zip(&run.velocity)
             .map(|(a, v)| (energy(*a, *v) - first).abs())
             .fold(0.0, f64::max);
-        assert!(worst < 2e-12, "torque {torque}, {start:?}: {worst:e}");
+        // The tolerance is for five periods: a hundred have twenty times as much, and as the velocity
+        // is not above 3, an error of the state makes one of the energy that is three times as large.
+        assert!(worst < 60.0 * tol, "torque {torque}, {start:?}: {worst:e}");
     }
 }
 
@@ -98,20 +101,35 @@ fn reference_trajectories() {
         let pendulum = model(entry);
         let start = [number(&entry["theta0"]), number(&entry["v0"])];
         let (theta, velocity) = (numbers(&entry["theta"]), numbers(&entry["v"]));
+        // The last two are chaotic: what is 1e-14 at first is 1e-6 at t = 100.
+        let growth = if pendulum.drive.p > 1.0 { 0.2 } else { 0.0 };
         for (i, until) in numbers(&entry["times"]).into_iter().enumerate() {
-            let run = run(&pendulum, start, until, 1e-13);
+            let run = run(&pendulum, start, until, 1e-11);
             let [a, v] = end(&run);
             let error = (a - theta[i]).hypot(v - velocity[i]);
-            // Chaotic ones double a rounding error every four or five units of time.
-            let allowed = if entry["omega"] == "0.87" || entry["omega"] == "1.8" {
-                2e-14 * (0.17 * until).exp()
-            } else {
-                2e-13
-            };
-            for tol in [1e-9,1e-10,1e-11,1e-12,1e-13] { let r = self::run(&pendulum, start, until, tol); let [a,v]=end(&r); eprintln!("{until} tol {tol:e} reached {:e} end {:e} steps {} true {:e}", r.reached_error, r.end_error, r.steps, (a - theta[i]).hypot(v - velocity[i])); }
-            //assert!(error < allowed, "{pendulum:?}, t {until}: {error:e}");
+            let case = format!("{pendulum:?}, t {until}");
+            assert!(error < 1e-13 * (growth * until).exp(), "{case}: {error:e}");
+            assert!(error < run.end_error + 1e-14, "{case}: {error:e}, said {:e}", run.end_error);
             assert!((run.time[run.time.len() - 1] - until).abs() < 1e-12);
         }
+    }
+}
+
+#[test]
+fn asking_for_more_does_not_give_less() {
+    // A tolerance that rounding forbids costs neither accuracy nor a thousand times the steps.
+    for entry in &list(&truths()["trajectories"])[2..] {
+        let pendulum = model(entry);
+        let start = [number(&entry["theta0"]), number(&entry["v0"])];
+        let (theta, velocity) = (numbers(&entry["theta"]), numbers(&entry["v"]));
+        let until = numbers(&entry["times"])[1];
+        let [(usual, few), (strict, many)] = [1e-11, 1e-13].map(|tol| {
+            let run = run(&pendulum, start, until, tol);
+            let [a, v] = end(&run);
+            ((a - theta[1]).hypot(v - velocity[1]), run.steps)
+        });
+        assert!(strict < 10.0 * usual, "{pendulum:?}: {strict:e} at 1e-13, {usual:e} at 1e-11");
+        assert!(many <= 8 * few, "{pendulum:?}: {many} steps for {few}");
     }
 }
 

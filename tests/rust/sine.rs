@@ -120,7 +120,6 @@ fn check_accuracy<D: Degree>(name: &str, rounding: f64) {
             for (what, found) in
                 [("sin", worst(&angles, &s, f64::sin)), ("cos", worst(&angles, &c, f64::cos))]
             {
-                eprintln!("{name} {what} {path} to {limit}: {:e}", found.0);
                 assert!(found.0 < allowed, "{name} {what} on {path}: {found:?} over {allowed:e}");
             }
         }

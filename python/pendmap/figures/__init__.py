@@ -5,14 +5,20 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
-import xarray as xr
 
+from pendmap.errors import InputError
 from pendmap.figures import basins, style, trajectory
 from pendmap.pictures.files import whole_file
+from pendmap.pictures.layers import refuse_lists
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
 
 __all__ = ["SUFFIXES", "draw"]
 
@@ -22,7 +28,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 _KINDS = {"basins": basins.figure, "trajectory": trajectory.figure}
 
 
-def draw(
+def draw(  # noqa: PLR0913 (all of these a user may choose)
     dataset: xr.Dataset,
     path: str | os.PathLike[str],
     *,
@@ -61,7 +67,7 @@ def draw(
 
     Raises
     ------
-    ValueError
+    InputError
         For an unknown kind of dataset, suffix, layer or colour map, and for an impossible size or
         resolution.
     OSError
@@ -74,11 +80,12 @@ def draw(
     kind = dataset.attrs.get("kind")
     if kind not in _KINDS:
         known = ", ".join(_KINDS)
-        raise ValueError(
+        raise InputError(
             f"cannot draw a dataset of kind {kind!r}; kinds that can be drawn: {known}"
         )
+    refuse_lists(dataset)
     resolution = style.resolution(dpi)
-    style.check_size(size)
+    style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         made = _KINDS[kind](dataset, layer=layer, size=size, dpi=resolution, colormap=colormap)
         style.write(made, part)

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from pendmap import palette
+from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.pictures import layers as layering
 from pendmap.pictures import legend, plane
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["figure"]
 
@@ -28,6 +31,9 @@ CELLS = 1200
 """Rows and columns of a map that a panel takes at most, unless the panel has more pixels."""
 
 Extent = tuple[float, float, float, float]
+
+TICKS = 4
+"""Ticks that a logarithmic colour bar has at least, where its range allows."""
 
 SMALL = 0.64
 """Size of the panel of unreliable labels, relative to those that lead."""
@@ -48,7 +54,7 @@ def figure(
     if colormap is not None:
         style.colour_map(colormap)
         if shown == ("labels",):
-            raise ValueError(f"colormap {colormap!r}: labels are coloured by attractor")
+            raise InputError(f"colormap {colormap!r}: labels are coloured by attractor")
     theta = plane.cell_edges(dataset["theta"].values)
     velocity = plane.cell_edges(dataset["velocity"].values)
     extent = (*theta, *velocity)
@@ -134,7 +140,7 @@ def _image(axes: Axes, rgb: npt.NDArray[np.uint8], extent: Extent) -> None:
     )
 
 
-def _scalar(
+def _scalar(  # noqa: PLR0913 (where to draw, what, and how)
     axes: Axes,
     bar: Axes | None,
     dataset: xr.Dataset,
@@ -201,7 +207,7 @@ def _log_ticks(low: float, high: float) -> list[float]:
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         ticks = [m * 10.0**k for k in powers for m in steps]
         inside = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
-        if len(inside) >= 4:
+        if len(inside) >= TICKS:
             return inside
     return sorted({round(x) for x in np.linspace(low, high, 5)})
 
@@ -254,7 +260,7 @@ def _dots(axes: Axes, at: npt.NDArray[np.float64], colour: str) -> None:
     axes.plot(at[:, 0], at[:, 1], "o", ms=1.1, mew=0, color=colour, zorder=4, rasterized=True)
 
 
-def _handle(entry: legend.Entry) -> Any:
+def _handle(entry: legend.Entry) -> Patch | tuple[Patch, Line2D]:
     """Return a legend handle: the basin's colour with the attractor's marker upon it."""
     patch = Patch(facecolor=entry.colour, edgecolor=style.QUIET, linewidth=0.5)
     if entry.id < 1 or entry.chaotic:

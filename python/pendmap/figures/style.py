@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import NullLocator
 
+from pendmap.errors import InputError
 from pendmap.pictures import plane
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Colormap
 
 __all__ = [
     "RC",
@@ -73,7 +77,10 @@ LEFT, RIGHT, TOP, BOTTOM = 0.72, 0.22, 0.98, 0.55
 GAP, BAR, BAR_WIDTH, BAR_PAD = 0.62, 0.78, 0.13, 0.09
 STACK_GAP = 0.85
 ROW, LEGEND_PAD = 0.19, 0.14
-WIDTH, MOST = 4.1, 60.0
+WIDTH, MOST, PIXELS = 4.1, 100.0, 20000
+DPI = (20, 1200)
+FLAT = 0.55  # height over width under which panels stand below one another
+LEAST = 0.5  # inches a panel needs
 
 
 @dataclass(frozen=True)
@@ -102,11 +109,11 @@ class Sheet:
 
     Raises
     ------
-    ValueError
+    InputError
         If ``size`` leaves no room for the panels.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (panels, words and size)
         self,
         panels: Sequence[Panel],
         *,
@@ -118,7 +125,7 @@ class Sheet:
         size: tuple[float, float] | None = None,
         dpi: float = 200.0,
     ) -> None:
-        self.stacked = stacked = ratio < 0.55
+        self.stacked = stacked = ratio < FLAT
         shares = [panel.share for panel in panels]
         bars = [BAR if panel.bar else 0.0 for panel in panels]
         aside = LEFT + RIGHT + (max(bars) if stacked else sum(bars) + GAP * (len(panels) - 1))
@@ -132,10 +139,10 @@ class Sheet:
         between = STACK_GAP * (len(panels) - 1) if stacked else 0.0
         wide = (width - aside) / across
         high = (size[1] - TOP - below - between) / down if size else wide * ratio
-        if not (math.isfinite(wide) and math.isfinite(high) and min(wide, high) >= 0.5):
-            least_width = aside + 0.5 * across
-            least_height = TOP + below + between + 0.5 * down
-            raise ValueError(
+        if not (math.isfinite(wide) and math.isfinite(high) and min(wide, high) >= LEAST):
+            least_width = aside + LEAST * across
+            least_height = TOP + below + between + LEAST * down
+            raise InputError(
                 f"size {size} leaves no room for the panels;"
                 f" it must be at least {least_width:.1f} x {least_height:.1f} inches"
             )
@@ -266,12 +273,12 @@ def colour_map(name: str) -> Colormap:
 
     Raises
     ------
-    ValueError
+    InputError
         If there is none of that name.
     """
     if name not in mpl.colormaps:
         known = "viridis, cividis, magma, inferno, plasma, RdBu_r, PuOr"
-        raise ValueError(f"no colour map {name!r}; there are for example {known}")
+        raise InputError(f"no colour map {name!r}; there are for example {known}")
     return mpl.colormaps[name].copy()
 
 
@@ -280,26 +287,31 @@ def resolution(dpi: float | None) -> float:
 
     Raises
     ------
-    ValueError
+    InputError
         If it is not between 20 and 1200.
     """
     if dpi is None:
         return 200.0
-    if not 20 <= dpi <= 1200:
-        raise ValueError(f"dpi {dpi} is not between 20 and 1200")
+    low, high = DPI
+    if not low <= dpi <= high:
+        raise InputError(f"dpi {dpi:g} is not between {low} and {high}")
     return float(dpi)
 
 
-def check_size(size: tuple[float, float] | None) -> None:
-    """Refuse a size in inches that no figure has.
+def check_size(size: tuple[float, float] | None, dpi: float) -> None:
+    """Refuse a size in inches that no figure has, or more pixels than fit.
 
     Raises
     ------
-    ValueError
-        If width or height is not a number between 0 and 60.
+    InputError
+        If width or height is not positive, or more than ``MOST`` inches or ``PIXELS`` pixels.
     """
-    if size is not None and not all(0 < side <= MOST for side in size):
-        raise ValueError(f"size {size}: width and height must be positive and at most {MOST:g} inches")
+    if size is None:
+        return
+    if not all(0 < side <= MOST for side in size):
+        raise InputError(f"size {size}: width and height are positive, at most {MOST:g} inches")
+    if max(size) * dpi > PIXELS:
+        raise InputError(f"size {size} at {dpi:g} dpi: at most {PIXELS} pixels a side are possible")
 
 
 def write(figure: Figure, path: Path) -> None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.pictures import layers as layering
 from pendmap.pictures import plane
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["PARTS", "figure"]
 
@@ -21,6 +25,12 @@ PARTS = ("history", "phase", "section")
 
 LATE = 0.2
 """The last share of a trajectory, drawn dark, so that what it settles to stands out."""
+
+FLAT = 0.1
+"""Range in rad under which a history counts as a straight line."""
+
+MANY = 500
+"""Points of a section above which they are drawn smaller."""
 
 _EARLY_COLOUR, _LATE_COLOUR = "#a9b8cc", "#1d3557"
 
@@ -35,17 +45,20 @@ def figure(
 ) -> Figure:
     """Return the figure of a trajectory; see :func:`pendmap.figures.draw`."""
     if layer is not None and layer not in PARTS:
-        raise ValueError(f"no layer {layer!r} in a trajectory; it has {', '.join(PARTS)}")
+        raise InputError(f"no layer {layer!r} in a trajectory; it has {', '.join(PARTS)}")
     if colormap is not None:
-        raise ValueError(f"colormap {colormap!r}: a trajectory's figure has no colour map")
+        raise InputError(f"colormap {colormap!r}: a trajectory's figure has no colour map")
     width, height = size or ((5.6, 5.3) if layer in ("phase", "section") else (8.6, 6.9))
     if size is None and layer == "history":
         height = 3.6
     across, down = width - style.LEFT - style.RIGHT, height - style.TOP - style.BOTTOM
     gap_x, gap_y = 0.8, 0.9
-    if min(across, down) < 0.5 or (layer is None and (across < 2.0 or down < 2.2)):
-        least = "3.0 x 3.8" if layer is None else "1.5 x 2.1"
-        raise ValueError(f"size {size} leaves no room for the panels; at least {least} inches")
+    need = (2.0, 2.2) if layer is None else (style.LEAST, style.LEAST)
+    if across < need[0] or down < need[1]:
+        least = f"{width - across + need[0]:.1f} x {height - down + need[1]:.1f}"
+        raise InputError(
+            f"size {size} leaves no room for the panels; it must be at least {least} inches"
+        )
     sheet = style.headed((width, height), dpi, "Trajectory", _subtitle(dataset))
     draw = {"history": _history, "phase": _phase, "section": _section}
     if layer is not None:
@@ -75,8 +88,8 @@ def _history(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     axes.plot(time[late:], theta[late:], color=_LATE_COLOUR, lw=1.0)
     axes.margins(x=0.0, y=0.06)
     low, high = axes.get_ylim()
-    if high - low < 0.2:
-        axes.set_ylim(low - 0.1, high + 0.1)
+    if high - low < FLAT:
+        axes.set_ylim(low - FLAT, high + FLAT)
     ticks = plane.angle_ticks(*axes.get_ylim())
     axes.set_yticks([y for y, _ in ticks], [text for _, text in ticks])
     if time[-1] > time[0]:
@@ -102,7 +115,7 @@ def _section(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     theta, velocity = dataset["section_theta"].values, dataset["section_velocity"].values
     time = dataset["time"].values
     late = dataset["section_time"].values >= time[_late(time)] if time.size else []
-    size = 1.3 if theta.size > 500 else 2.6
+    size = 1.3 if theta.size > MANY else 2.6
     for which, colour in ((~np.asarray(late, bool), _EARLY_COLOUR), (late, _LATE_COLOUR)):
         axes.plot(theta[which], velocity[which], "o", ms=size, mew=0, color=colour)
     style.phase_plane(axes, (-math.pi, math.pi), _range(dataset["velocity"].values))
@@ -111,7 +124,7 @@ def _section(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
 
 def _late(time: npt.NDArray[np.float64]) -> int:
     """Return the first index of the last part."""
-    if time.size < 2:
+    if time.size == 0:
         return 0
     return int(np.searchsorted(time, time[-1] - LATE * (time[-1] - time[0])))
 

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import os
 import uuid
-from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterator, Sequence
 
 __all__ = ["whole_file"]
 
@@ -33,7 +38,7 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
 
     Raises
     ------
-    ValueError
+    InputError
         If the suffix is not one of ``suffixes``.
     FileNotFoundError, IsADirectoryError, PermissionError
         If the folder does not exist, the path is a folder, or nothing may be written there.
@@ -42,7 +47,7 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
     suffix = target.suffix.lower()
     if suffix not in suffixes:
         known = ", ".join(suffixes)
-        raise ValueError(f"cannot write {str(target)!r}: suffix {suffix!r}, allowed are {known}")
+        raise InputError(f"cannot write {str(target)!r}: suffix {suffix!r}, allowed are {known}")
     if not target.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "the folder does not exist", str(target.parent))
     if target.is_dir():
@@ -54,6 +59,6 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
         except OSError as error:
             raise type(error)(error.errno, error.strerror, str(target)) from error
         yield part
-        os.replace(part, target)
+        part.replace(target)
     finally:
         part.unlink(missing_ok=True)

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import xarray as xr
+import numpy as np
+
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import xarray as xr
 
 __all__ = [
     "VARIABLES",
@@ -14,6 +20,7 @@ __all__ = [
     "layers",
     "named",
     "parameters",
+    "refuse_lists",
     "reliable",
     "unit",
     "warning",
@@ -48,6 +55,18 @@ def finite_time(dataset: xr.Dataset) -> bool:
     return bool(dataset.attrs.get("layers") == "finite_time")
 
 
+def refuse_lists(dataset: xr.Dataset) -> None:
+    """Refuse what ``pendmap.basins_of`` returns: a list of starts is no map.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no grid.
+    """
+    if dataset.attrs.get("kind") == "basins" and "theta" not in dataset.dims:
+        raise InputError("a list of starts is no map: only basins on a grid can be drawn")
+
+
 def warning(dataset: xr.Dataset) -> str:
     """Return the line that marks labels as unreliable."""
     share = 100 * float(dataset.attrs.get("unreliable", math.nan))
@@ -64,7 +83,7 @@ def transients(dataset: xr.Dataset) -> str:
             else f"longest {float(attrs[key]):g}"
         )
         for key in ("mean_settle", "longest_settle")
-        if math.isfinite(float(attrs.get(key, math.nan)))
+        if float(attrs.get(key, -1.0)) >= 0
     ]
     settle = [f"settle time: {', '.join(known)} periods"] if known else []
     entropy = float(attrs.get("basin_entropy", math.nan))
@@ -76,8 +95,15 @@ def transients(dataset: xr.Dataset) -> str:
 def exponents(dataset: xr.Dataset) -> str:
     """Return the largest exponents of the chaotic attractors in one line; empty where unknown."""
     chaotic = [str(kind).endswith("chaos") for kind in dataset["kind"].values]
-    known = [x for x in dataset["exponent"].values[chaotic] if math.isfinite(x)]
-    listed = ", ".join(f"{x:.3g}" for x in known)
+    values = dataset["exponent"].values[chaotic]
+    without = np.full(values.shape, np.nan)
+    errors = dataset["exponent_stderr"].values[chaotic] if "exponent_stderr" in dataset else without
+    known = [x for x in values if math.isfinite(x)]
+    if len(known) == len(errors) == 1 and math.isfinite(errors[0]):
+        digits = max(0, 1 - math.floor(math.log10(max(errors[0], 1e-9))))
+        listed = f"{known[0]:.{digits}f} \N{PLUS-MINUS SIGN} {errors[0]:.{digits}f}"
+    else:
+        listed = ", ".join(f"{x:.3g}" for x in known)
     return f"largest exponent {listed} per unit {_TAU}" if known else ""
 
 
@@ -105,14 +131,14 @@ def named(dataset: xr.Dataset, layer: str) -> str:
 
     Raises
     ------
-    ValueError
+    InputError
         If the map has no such layer; the message lists those it has.
     """
     for name, variable in VARIABLES.items():
         if layer in (name, variable) and variable in dataset:
             return name
     known = ", ".join(name for name, variable in VARIABLES.items() if variable in dataset)
-    raise ValueError(f"no layer {layer!r} in this map; it has {known}")
+    raise InputError(f"no layer {layer!r} in this map; it has {known}")
 
 
 def what(dataset: xr.Dataset, layer: str) -> str:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from pendmap import palette
 from pendmap.pictures.layers import finite_time
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["Entry", "colours", "entries", "percent", "typeset"]
 

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["angle_ticks", "broken_at_wrap", "cell_edges", "copies", "plain_ticks", "thinned"]
 
 Floats = npt.NDArray[np.float64]
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi
+
+FEWEST, MOST = 2.0, 6.5
+"""Steps between ticks that a range of angles may have."""
 
 
 def cell_edges(centres: npt.ArrayLike) -> tuple[float, float]:
@@ -47,7 +52,7 @@ def angle_ticks(low: float, high: float) -> Ticks:
     """Return places and labels of ticks at multiples of pi; plain numbers in a small window."""
     for quarters in (1, 2, 4, 8, 16, 32, 64):
         step = quarters * math.pi / 4
-        if 2.0 <= (high - low) / step <= 6.5:
+        if FEWEST <= (high - low) / step <= MOST:
             first, last = _between(low, high, step)
             return [(k * step, _multiple_of_pi(k * quarters)) for k in range(first, last + 1)]
     return plain_ticks(low, high)

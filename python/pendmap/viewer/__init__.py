@@ -5,12 +5,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import xarray as xr
-
+from pendmap.errors import InputError
 from pendmap.pictures.files import whole_file
+from pendmap.pictures.layers import refuse_lists
 from pendmap.viewer import basins, frame, trajectory
 from pendmap.viewer.window import (
     NoDisplayError,
@@ -19,6 +19,11 @@ from pendmap.viewer.window import (
     ViewerError,
     open_viewer,
 )
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
 
 __all__ = [
     "SUFFIXES",
@@ -44,10 +49,10 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
     Of a basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
     ``/turns/data/turns``, ``/exponent/data/exponent`` (those layers that tell something, the
-    leading one in front), ``/legend`` and ``/summary``. Of a trajectory: ``/state/{theta,omega,energy}``,
-    ``/pendulum/data/{arm,bob,pivot,trail}``, ``/phase/data/{curve,now}``, ``/poincare/data/points``
-    and ``/summary``, on the timelines ``sim_time`` (nondimensional time, shown as seconds) and
-    ``period``.
+    leading one in front), ``/legend`` and ``/summary``. Of a trajectory:
+    ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
+    ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
+    ``sim_time`` (nondimensional time, shown as seconds) and ``period``.
 
     Parameters
     ----------
@@ -63,7 +68,7 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
     Raises
     ------
-    ValueError
+    InputError
         For an unknown kind of dataset or suffix.
     OSError
         If the file cannot be written.
@@ -71,7 +76,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     kind = dataset.attrs.get("kind")
     if kind not in _KINDS:
         known = ", ".join(_KINDS)
-        raise ValueError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
+        raise InputError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
+    refuse_lists(dataset)
     layout, log = _KINDS[kind]
     with whole_file(path, SUFFIXES) as part, frame.strict():
         recording = frame.recording(dataset)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
-import xarray as xr
 
 from pendmap import palette
 from pendmap.pictures import layers as layering
 from pendmap.pictures import legend, plane
 from pendmap.viewer import frame
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["blueprint", "log"]
 
@@ -94,7 +96,11 @@ def _title(dataset: xr.Dataset, layer: str) -> str:
 
 
 def _image(
-    stream: rr.RecordingStream, around: frame.Frame, layer: str, image: Any, shape: tuple[int, ...]
+    stream: rr.RecordingStream,
+    around: frame.Frame,
+    layer: str,
+    image: rr.SegmentationImage | rr.DepthImage,
+    shape: tuple[int, ...],
 ) -> None:
     path = f"{ROOTS[layer]}/data/{_LEAF[layer]}"
     stream.log(path, around.of_pixels(shape), static=True)
@@ -105,7 +111,7 @@ def _labels(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame
     """Log the labels, shifted by 1: 0 failed, 1 undecided, 2 the first attractor."""
     label = plane.thinned(dataset["label"], CELLS)
     colours = legend.colours(dataset)
-    kind = np.uint8 if len(colours) <= 256 else np.uint16
+    kind = np.uint8 if len(colours) <= np.iinfo(np.uint8).max else np.uint16
     shifted = np.add(label, 1, dtype=np.int16).astype(kind)
     names = {
         int(i) + 1: str(n)
@@ -125,7 +131,7 @@ def _settle(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame
     sample = plane.thinned(dataset["settle_periods"], SAMPLE)
     known = sample[sample >= 0]
     low, high = 0.0, max(1.0, float(np.quantile(known, 0.995)) if known.size else 1.0)
-    kind = np.uint16 if int(settle.max()) < 65536 else np.float32
+    kind = np.uint16 if int(settle.max()) <= np.iinfo(np.uint16).max else np.float32
     _scalar(stream, around, "settle", np.maximum(settle, 0).astype(kind), (low, high))
     _cover(stream, dataset, around, "settle", absent)
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-import xarray as xr
 
 from pendmap.pictures import layers as layering
 from pendmap.pictures import plane
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import xarray as xr
 
 __all__ = ["INK", "Frame", "describe", "recording", "screen", "strict", "summary", "text", "write"]
 
@@ -126,7 +129,12 @@ class Frame:
         )
 
     def view(
-        self, root: str, name: str, *, below: float = 0.0, **options: Any
+        self,
+        root: str,
+        name: str,
+        *,
+        below: float = 0.0,
+        time_ranges: Sequence[rrb.VisibleTimeRange] | None = None,
     ) -> rrb.Spatial2DView:
         """Return the view of this frame, with room for ticks, a bar and, ``below``, a legend."""
         return rrb.Spatial2DView(
@@ -135,7 +143,7 @@ class Frame:
             visual_bounds=rrb.VisualBounds2D(
                 x_range=[-190.0, SIDE + 190.0], y_range=[-60.0, self.height + 150.0 + below]
             ),
-            **options,
+            time_ranges=time_ranges,
         )
 
     def log(self, stream: rr.RecordingStream, root: str) -> None:
@@ -170,7 +178,7 @@ class Frame:
         self,
         stream: rr.RecordingStream,
         root: str,
-        image: Any,
+        image: rr.SegmentationImage | rr.DepthImage,
         *,
         low: float,
         high: float,
@@ -208,7 +216,7 @@ def write(
     stream.log(path, points, static=True)
 
 
-def _plain(value: Any) -> float | str | None:
+def _plain(value: object) -> float | str | None:
     """Return a property's value as a number or text, None where it is neither.
 
     A property keeps one type in all recordings of a process, so that whole numbers are floats too.

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa
+import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 import rerun.blueprint as rrb
-import xarray as xr
 
 from pendmap.pictures import plane
 from pendmap.viewer import frame
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["blueprint", "log"]
 
@@ -30,6 +33,9 @@ TRAIL_POINTS = 48
 
 TRAILS = 20000
 """Trails that are logged at most; the trail of a longer trajectory moves on in larger steps."""
+
+MANY = 1000
+"""Points of a section above which they are drawn smaller."""
 
 _POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 2)
 _STRIP = pa.list_(pa.field("item", _POINT, nullable=False))
@@ -169,7 +175,7 @@ def _section(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     """Log one point a period; the view shows those up to the cursor, so the section grows."""
     time = dataset["section_time"].values.astype(float)
     at = np.stack([dataset["section_theta"].values, dataset["section_velocity"].values], axis=1)
-    size = 2.5 if time.size < 1000 else 1.4
+    size = 1.4 if time.size > MANY else 2.5
     period = rr.TimeColumn("period", sequence=dataset["period"].values.astype(np.int64))
     _points(stream, "poincare/data/points", time, at, Look(BOB, size), period)
 

@@ -12,6 +12,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from pendmap.errors import InputError
+
 __all__ = [
     "NoDisplayError",
     "NotARecordingError",
@@ -42,7 +44,7 @@ class RecordingNotFoundError(ViewerError, FileNotFoundError):
     """The recording does not exist."""
 
 
-class NotARecordingError(ViewerError, ValueError):
+class NotARecordingError(ViewerError, InputError):
     """The file is not a recording."""
 
 
@@ -74,7 +76,7 @@ def open_viewer(path: str | os.PathLike[str]) -> int:
     _check_display(file)
     command = [str(_program()), "--bind", "127.0.0.1", "--port", str(_free_port()), str(file)]
     with tempfile.TemporaryFile() as said:
-        viewer = subprocess.Popen(  # noqa: S603
+        viewer = subprocess.Popen(  # noqa: S603 (our own viewer, a file that was checked)
             command,
             stdin=subprocess.DEVNULL,
             stdout=said,

@@ -1,0 +1,53 @@
+"""What several tests share: reference values, the command itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Protocol
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+COMMAND = Path(sys.executable).with_name("pendmap")
+
+
+@pytest.fixture(scope="session")
+def truths() -> dict[str, Any]:
+    """Reference values from independent tools; tests/truths.json says which."""
+    content: dict[str, Any] = json.loads((HERE.parent / "truths.json").read_text(encoding="utf-8"))
+    return content
+
+
+class Run(Protocol):
+    """The command line, run in a folder of its own."""
+
+    def __call__(
+        self, *words: object, env: dict[str, str] | None = None
+    ) -> subprocess.CompletedProcess[str]:
+        """Run it to its end."""
+        ...
+
+
+@pytest.fixture
+def pendmap_command(tmp_path: Path) -> Run:
+    """Run `pendmap` with these words in `tmp_path`, without a display."""
+
+    def run(
+        *words: object, env: dict[str, str] | None = None
+    ) -> subprocess.CompletedProcess[str]:
+        clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
+        return subprocess.run(
+            [str(COMMAND), *map(str, words)],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=120,
+            cwd=tmp_path,
+            env=clean | (env or {}),
+        )
+
+    return run

@@ -1,0 +1,201 @@
+"""The command line, as a user meets it."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+from conftest import COMMAND
+
+import pendmap
+from pendmap.cli.types import AXIS, NUMBER
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+FIELDS = (
+    "attractors undecided failed cells mean_periods seconds reached_error basin_entropy unreliable"
+).split()
+ATTRACTOR = "id name kind n w theta velocity multipliers exponent fraction stderr".split()
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys\n"
+        "from pendmap.cli.main import command\n"
+        "command.main(['--help'], standalone_mode=False)\n"
+        "heavy = {'numpy', 'xarray', 'matplotlib', 'rerun', 'rich', 'pendmap._core'}\n"
+        "sys.exit(', '.join(heavy & set(sys.modules)) or 0)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    for name in ("info", "simulate", "basins", "plot", "view"):
+        assert name in run.stdout
+
+
+def test_info(pendmap_command: Run) -> None:
+    facts = json.loads(pendmap_command("info", "--json").stdout)
+    assert facts["threads"] >= 1
+    assert facts["simd"] in facts["simd_available"]
+    assert pendmap_command("info").stdout.startswith(f"pendmap {facts['version']}")
+    forced = pendmap_command("info", "--json", env={"PENDMAP_SIMD": "portable"})
+    assert json.loads(forced.stdout)["simd"] == "portable"
+
+
+def test_basins_json_keeps_the_contract(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("basins", "--p", 0.6, "--grid", 30, "--json")
+    assert run.returncode == 0, run.stderr
+    result = json.loads(run.stdout)
+    assert set(FIELDS) <= set(result)
+    for attractor in result["attractors"]:
+        assert set(ATTRACTOR) <= set(attractor)
+    shares = sum(a["fraction"] for a in result["attractors"])
+    assert shares + result["undecided"] + result["failed"] == pytest.approx(1, abs=1e-12)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_chaos_has_nulls_and_no_nan(pendmap_command: Run) -> None:
+    run = pendmap_command("basins", "--preset", "fig2b", "--grid", 20, "--json")
+    (chaos,) = json.loads(run.stdout, parse_constant=pytest.fail)["attractors"]
+    assert chaos["kind"] == "tumbling_chaos"
+    for key in ("n", "w", "theta", "velocity", "multipliers", "period"):
+        assert chaos[key] is None
+
+
+def test_without_a_named_output_three_files_are_written(
+    pendmap_command: Run, tmp_path: Path
+) -> None:
+    for _ in range(2):  # the second run replaces the first one's files
+        run = pendmap_command("basins", "--p", 0.6, "--grid", 20)
+        assert run.returncode == 0, run.stderr
+        assert run.stderr == ""
+        names = sorted(p.name for p in tmp_path.iterdir())
+        assert names == ["basins.nc", "basins.png", "basins.rrd"]
+        assert "basins.nc, basins.png, basins.rrd" in run.stdout
+
+
+def test_a_stored_map_is_drawn_again(pendmap_command: Run, tmp_path: Path) -> None:
+    pendmap_command("basins", "--p", 0.6, "--grid", 20, "--out", "map.nc")
+    for words in ((), ("--out", "other.svg", "--layer", "settle", "--size", "5x4")):
+        run = pendmap_command("plot", "map.nc", *words)
+        assert run.returncode == 0, run.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["map.nc", "map.png", "other.svg"]
+    for words, complaint in (
+        (("map.nc", "--layer", "colour"), "colour"),
+        (("map.nc", "--size", "wide"), "wide"),
+        (("absent.nc",), "absent.nc"),
+        (("map.png",), "suffix"),
+    ):
+        run = pendmap_command("plot", *words)
+        assert run.returncode == 2
+        assert complaint in run.stderr
+
+
+def test_simulate(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("simulate", "--theta", "pi/2", "--until", 30, "--json", "--lyapunov")
+    result = json.loads(run.stdout)
+    assert {"t", "theta", "velocity", "stuck", "exponent", "stderr"} <= set(result)
+    expected = pendmap.simulate(pendmap.Pendulum(), math.pi / 2, 0, 30)
+    assert result["theta"] == float(expected.theta[-1])
+    run = pendmap_command("simulate", "--until", 30)
+    assert run.returncode == 0, run.stderr
+    names = sorted(p.name for p in tmp_path.iterdir())
+    assert names == ["simulate.nc", "simulate.png", "simulate.rrd"]
+
+
+def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path: Path) -> None:
+    (tmp_path / "model.toml").write_text("[pendulum]\ngamma = 0.3\np = 0\n", encoding="utf-8")
+    words = ("simulate", "--model", "model.toml", "--theta", 0.5, "--until", 9, "--json")
+    plain = json.loads(pendmap_command(*words).stdout)
+    typed = json.loads(pendmap_command(*words, "--gamma", 0.1).stdout)
+    for result, gamma in ((plain, 0.3), (typed, 0.1)):
+        run = pendmap.simulate(pendmap.Pendulum(gamma=gamma, p=0, omega=1), 0.5, 0, 9)
+        assert result["theta"] == float(run.theta[-1])
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ("basins --p nan", "nan"),
+        ("basins --gamma=-1", "gamma is -1"),
+        ("basins --omega 0", "omega is 0"),
+        ("basins --grid 0", "0"),
+        ("basins --theta 1:2", "A:B:N"),
+        ("basins --theta 1:2:x", "A:B:N"),
+        ("basins --theta 2:1:9", "lower one first"),
+        ("basins --theta 0:1:0", "0 cells"),
+        ("basins --theta 0:nan:5", "finite"),
+        ("basins --grid 5 --theta 0:1:5", "--grid"),
+        ("basins --tol 1e-30", "tol is"),
+        ("basins --pp 1", "--pp"),
+        ("basins --out x.docx", ".docx"),
+        ("basins --plot x.nc", ".png"),
+        ("basins --rerun x", ".rrd"),
+        ("basins --out no/such/x.nc", "no/such"),
+        ("basins --out /proc/x.nc", "/proc"),
+        ("basins --preset fig9", "fig9"),
+        ("basins --model absent.toml", "absent.toml"),
+        ("basins --threads 0", "0"),
+        ("basins surplus", "surplus"),
+        ("simulate --until 0", "until"),
+        ("simulate --theta x", "x"),
+        ("view absent.rrd", "absent.rrd"),
+        ("viw", "viw"),
+    ],
+)
+def test_bad_input_gets_one_line_and_leaves_nothing(
+    pendmap_command: Run, tmp_path: Path, words: str, complaint: str
+) -> None:
+    run = pendmap_command(*words.split())
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert len(run.stderr.strip().splitlines()) == 1
+    assert complaint in run.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_needs_a_display_to_be_seen(pendmap_command: Run, tmp_path: Path) -> None:
+    pendmap_command("simulate", "--until", 5, "--rerun", "run.rrd")
+    run = pendmap_command("view", "run.rrd")
+    assert run.returncode == 2
+    assert "display" in run.stderr
+    (tmp_path / "not.rrd").write_text("text", encoding="utf-8")
+    assert pendmap_command("view", "not.rrd").returncode == 2
+
+
+def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
+    words = [str(COMMAND), "basins", "--p", "1.7", "--grid", "9000"]
+    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    time.sleep(2)
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("pi", math.pi),
+        ("-pi", -math.pi),
+        ("2pi", 2 * math.pi),
+        ("0.5*pi", math.pi / 2),
+        ("pi/4", math.pi / 4),
+        ("-1.5e-3", -1.5e-3),
+    ],
+)
+def test_pi_is_understood(text: str, value: float) -> None:
+    assert NUMBER.convert(text, None, None) == pytest.approx(value, rel=1e-15)
+
+
+def test_axes_are_understood() -> None:
+    assert AXIS.convert("-pi:pi:10", None, None) == (-math.pi, math.pi, 10)

@@ -1,0 +1,265 @@
+"""Basin maps as datasets, against integrations that share no code with them."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from pendmap import Axis, Grid, InputError, Pendulum
+
+
+def independent_labels(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Turns in 2 periods after 80 periods, by scipy's DOP853: 0 oscillation, +-2 rotation."""
+    count = theta.size
+
+    def equation(tau: float, state: np.ndarray) -> np.ndarray:
+        angle, speed = state[:count], state[count:]
+        pull = (1 + pendulum.p * math.cos(pendulum.omega * tau)) * np.sin(angle)
+        return np.concatenate([speed, -pendulum.gamma * speed - pull])
+
+    times = np.array([80, 82]) * math.tau / pendulum.omega
+    start = np.concatenate([theta, velocity])
+    run = solve_ivp(
+        equation, (0, times[-1]), start, method="DOP853", t_eval=times, rtol=1e-11, atol=1e-11
+    )
+    return np.round((run.y[:count, 1] - run.y[:count, 0]) / math.tau).astype(int)
+
+
+def test_labels_equal_those_of_scipy_cell_for_cell() -> None:
+    pendulum = Pendulum(gamma=0.1, p=0.6, omega=2.0)
+    result = pendmap.basins(pendulum, Grid.square(40))
+    turns = {"oscillation 2:0": 0, "rotation 1:-1": -2, "rotation 1:+1": 2}
+    by_label = np.array([turns[str(name)] for name in result.attractor.values])
+    theta, velocity = np.meshgrid(result.theta.values, result.velocity.values)
+    expected = independent_labels(pendulum, theta.ravel(), velocity.ravel())
+    assert np.array_equal(by_label[result.label.values.ravel() - 1], expected)
+
+
+@pytest.fixture(scope="module")
+def smooth() -> Any:  # noqa: ANN401 (a Dataset)
+    """A small map with three attractors."""
+    return pendmap.basins(Pendulum(p=0.6), Grid.square(60))
+
+
+def test_a_map_says_all_about_itself(smooth: Any) -> None:  # noqa: ANN401
+    assert smooth.label.dims == ("velocity", "theta")
+    assert smooth.theta.attrs["units"] == "rad"
+    assert smooth.theta.values[0] == pytest.approx(-math.pi + math.pi / 60)
+    for key in ("gamma", "p", "omega", "phase", "torque", "tol", "pendmap_version"):
+        assert key in smooth.attrs
+    assert smooth.attrs["reached_error"] <= smooth.attrs["tol"]
+    labels, counts = np.unique(smooth.label.values, return_counts=True)
+    assert labels.tolist() == [1, 2, 3]
+    assert counts.sum() == smooth.attrs["cells"] == 3600
+    assert smooth.fraction.values == pytest.approx(counts / 3600)
+    assert smooth.stderr.values == pytest.approx(np.sqrt(counts / 3600 * (1 - counts / 3600) / 3600))
+    assert smooth.twin.values.tolist() == [1, 3, 2]
+    assert (smooth.settle_periods.values > 0).all()
+    assert smooth.attrs["labels_reliable"] == 1
+    assert smooth.attrs["unreliable"] == 0
+
+
+def test_multipliers_multiply_to_the_damping(smooth: Any) -> None:  # noqa: ANN401
+    pairs = smooth.multipliers.values
+    product = (pairs[:, 0, 0] + 1j * pairs[:, 0, 1]) * (pairs[:, 1, 0] + 1j * pairs[:, 1, 1])
+    expected = np.exp(-0.1 * smooth.n.values * math.pi)
+    assert np.abs(product - expected).max() < 1e-12
+
+
+def test_settling_really_ends_near_the_attractor(smooth: Any) -> None:  # noqa: ANN401
+    """From each cell, the settling time and 60 periods more lead to a point of its attractor."""
+    picks = np.linspace(0, 3599, 200).astype(int)
+    theta, velocity = np.meshgrid(smooth.theta.values, smooth.velocity.values)
+    starts = theta.ravel()[picks], velocity.ravel()[picks]
+    settle = smooth.settle_periods.values.ravel()[picks]
+    labels = smooth.label.values.ravel()[picks]
+    periods = int(settle.max()) + 60
+    angle, speed, _ = pendmap.advance(Pendulum(p=0.6), *starts, periods, tol=1e-9)
+    for a, v, label in zip(angle, speed, labels, strict=True):
+        own = smooth.point_attractor.values == label
+        da = np.remainder(smooth.point_theta.values[own] - a + math.pi, math.tau) - math.pi
+        assert np.hypot(da, smooth.point_velocity.values[own] - v).min() < 1e-3
+
+
+def test_net_turns_are_those_of_the_trajectory(smooth: Any) -> None:  # noqa: ANN401
+    for j, i in ((0, 0), (20, 33), (59, 58), (50, 12)):
+        start = float(smooth.theta[i]), float(smooth.velocity[j])
+        periods = int(smooth.settle_periods[j, i])
+        run = pendmap.simulate(Pendulum(p=0.6), *start, periods * math.pi)
+        turns = (float(run.theta[-1]) - start[0]) / math.tau
+        assert int(smooth.net_turns[j, i]) == round(turns)
+
+
+def test_threads_do_not_show() -> None:
+    runs = [pendmap.basins(Pendulum(p=1.2), Grid.square(50), threads=n) for n in (1, 2)]
+    for name in ("label", "settle_periods", "net_turns"):
+        assert np.array_equal(runs[0][name], runs[1][name])
+
+
+def test_a_list_of_starts_gives_the_labels_of_the_grid(smooth: Any) -> None:  # noqa: ANN401
+    theta, velocity = np.meshgrid(smooth.theta.values, smooth.velocity.values)
+    listed = pendmap.basins_of(Pendulum(p=0.6), theta.ravel(), velocity.ravel())
+    assert np.array_equal(listed.label.values, smooth.label.values.ravel())
+
+
+def test_one_chaotic_attractor_takes_everything() -> None:
+    result = pendmap.basins(pendmap.PRESETS["fig2b"], Grid.square(30))
+    assert result.attrs["layers"] == "finite_time"
+    assert result.kind.values.tolist() == ["tumbling_chaos"]
+    assert result.fraction.values == pytest.approx([1.0])
+    assert np.isfinite(result.finite_time_exponent).all()
+    assert "One chaotic attractor takes everything" in result.attrs["summary"]
+
+
+def test_without_damping_there_are_no_attractors() -> None:
+    result = pendmap.basins(Pendulum(gamma=0, p=0.5), Grid.square(20))
+    assert result.sizes["attractor"] == 0
+    assert result.attrs["layers"] == "finite_time"
+    assert result.attrs["undecided"] == 1
+    assert "there are no attractors" in result.attrs["summary"]
+
+
+def test_unreliable_labels_are_called_so() -> None:
+    result = pendmap.basins(Pendulum(p=1.7), Grid.square(60))
+    assert result.attrs["unreliable"] > 0.05
+    assert result.attrs["labels_reliable"] == 0
+    for words in ("NOT RELIABLE", "equal shares by symmetry", "hardly better than chance"):
+        assert words in result.attrs["summary"]
+
+
+def test_without_drive_the_running_state_has_its_own_period() -> None:
+    result = pendmap.basins(Pendulum(p=0, torque=0.5), Grid.square(40))
+    assert [str(name) for name in result.attractor.values] == ["rest", "rotation 1:+1"]
+    assert float(result.theta_point[0]) == pytest.approx(math.asin(0.5), abs=1e-12)
+    period = float(result.period[1])
+    # One multiplier, that of the angle section; damping alone makes it.
+    assert float(result.multipliers[1, 0, 0]) == pytest.approx(math.exp(-0.1 * period), rel=1e-9)
+    assert np.isnan(result.multipliers.values[1, 1, 0])
+    run = pendmap.simulate(Pendulum(p=0, torque=0.5), 0, float(result.velocity_point[1]), period)
+    assert float(run.theta[-1]) == pytest.approx(math.tau, abs=1e-8)
+    assert float(run.velocity[-1]) == pytest.approx(float(result.velocity_point[1]), abs=1e-8)
+
+
+def test_shares_of_the_pendulum_with_torque() -> None:
+    """Random starts of a public comparison: fixed point 0.152, running state 0.848."""
+    rng = np.random.default_rng(5)
+    theta = rng.uniform(-math.pi + math.asin(0.5), math.pi + math.asin(0.5), 40_000)
+    result = pendmap.basins_of(Pendulum(p=0, torque=0.5), theta, rng.uniform(-10, 10, 40_000))
+    shares = dict(zip(result.kind.values.tolist(), result.fraction.values, strict=True))
+    assert shares["rest"] == pytest.approx(0.152, abs=0.005)
+    assert shares["rotation"] == pytest.approx(0.848, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ({"tol": 1e-20}, "tol is"),
+        ({"tol": math.nan}, "tol is"),
+        ({"max_periods": 0}, "max_periods is 0"),
+        ({"threads": 0}, "threads is 0"),
+        ({"seed": -1}, "seed is -1"),
+    ],
+)
+def test_bad_choices_are_refused(words: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        pendmap.basins(Pendulum(), Grid.square(5), **words)
+
+
+@pytest.mark.parametrize("axis", [(1, 1, 5), (2, 1, 5), (math.nan, 1, 5), (0, 1, 0), (0, 1, 10**6)])
+def test_bad_axes_are_refused(axis: tuple[float, float, int]) -> None:
+    with pytest.raises(InputError):
+        Axis(*axis)
+
+
+def test_bad_lists_are_refused() -> None:
+    with pytest.raises(InputError, match="as many"):
+        pendmap.basins_of(Pendulum(), [1.0, 2.0], [1.0])
+    with pytest.raises(InputError, match="finite"):
+        pendmap.basins_of(Pendulum(), [1.0, math.nan], [1.0, 1.0])
+    with pytest.raises(InputError, match="starts is 0"):
+        pendmap.basins_of(Pendulum(), [], [])
+
+
+def test_other_threads_run_meanwhile_and_progress_is_told() -> None:
+    ticks: list[float] = []
+    told: list[tuple[int, int]] = []
+    stop = threading.Event()
+
+    def tick() -> None:
+        while not stop.wait(0.005):
+            ticks.append(time.perf_counter())
+
+    other = threading.Thread(target=tick)
+    other.start()
+    began = time.perf_counter()
+    pendmap.basins(Pendulum(p=1.7), Grid.square(300), progress=lambda *x: told.append(x))
+    ended = time.perf_counter()
+    stop.set()
+    other.join()
+    during = [t for t in ticks if began < t < ended]
+    # Held all the time, the lock would let next to none through.
+    assert len(during) > (ended - began) / 0.005 / 10
+    assert told
+    assert all(0 <= done <= total for done, total in told)
+
+
+def test_an_error_in_the_callers_progress_ends_the_map() -> None:
+    def fail(done: int, total: int) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        pendmap.basins(Pendulum(p=1.7), Grid.square(700), progress=fail)
+
+
+def test_ctrl_c_raises_keyboard_interrupt() -> None:
+    code = (
+        "import pendmap, sys\n"
+        "print('go', flush=True)\n"
+        "try:\n"
+        "    pendmap.basins(pendmap.Pendulum(p=1.7), pendmap.Grid.square(9000))\n"
+        "except KeyboardInterrupt:\n"
+        "    sys.exit(42)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"go\n"
+    time.sleep(0.7)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=20) == 42
+    process.stdout.close()
+
+
+def available_paths() -> list[str]:
+    """Instruction sets of this processor."""
+    from pendmap import _core  # noqa: PLC0415 (only here)
+
+    return _core.simd_available()
+
+
+@pytest.mark.parametrize("path", available_paths())
+def test_every_instruction_set_gives_the_same_smooth_map(
+    path: str,
+    smooth: Any,  # noqa: ANN401
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(os.environ, "PENDMAP_SIMD", path)
+    again = pendmap.basins(Pendulum(p=0.6), Grid.square(60))
+    assert again.attrs["simd"] == path
+    assert np.array_equal(again.label, smooth.label)
+
+
+def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(os.environ, "PENDMAP_SIMD", "mmx")
+    with pytest.raises(InputError, match="PENDMAP_SIMD is 'mmx'"):
+        pendmap.basins(Pendulum(), Grid.square(5))

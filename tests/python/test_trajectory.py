@@ -1,0 +1,87 @@
+"""Single trajectories against values of independent tools."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+import pendmap
+from pendmap import InputError, Pendulum
+
+
+def test_trajectories_of_independent_tools(truths: dict[str, Any]) -> None:
+    for t in truths["trajectories"]:
+        pendulum = Pendulum(*(float(t[key]) for key in ("gamma", "p", "omega")))
+        for until, theta, velocity in zip(t["times"], t["theta"], t["v"], strict=True):
+            start = float(t["theta0"]), float(t["v0"])
+            run = pendmap.simulate(pendulum, *start, float(until), tol=1e-12)
+            # Chaos amplifies rounding: by e^(0.26 tau) at most on these trajectories.
+            allowed = 1e-12 * max(1, math.exp(0.26 * float(until)) / 1e3)
+            assert float(run.theta[-1]) == pytest.approx(float(theta), abs=max(1e-11, allowed))
+            assert float(run.velocity[-1]) == pytest.approx(float(velocity), abs=max(1e-11, allowed))
+
+
+def test_the_period_of_a_free_pendulum_is_the_elliptic_integral() -> None:
+    for amplitude in (0.1, 1.0, 2.0, 3.0):
+        period = 4 * ellipk(math.sin(amplitude / 2) ** 2)
+        run = pendmap.simulate(Pendulum(gamma=0, p=0), amplitude, 0, period, tol=1e-12)
+        assert float(run.theta[-1]) == pytest.approx(amplitude, abs=1e-10)
+        assert float(run.velocity[-1]) == pytest.approx(0, abs=1e-10)
+
+
+def test_sections_are_taken_once_a_period() -> None:
+    run = pendmap.simulate(Pendulum(p=1.7, omega=2), 1.0, 0.5, 20 * math.pi + 1)
+    assert run.sizes["period"] == 21
+    assert run.section_time.values == pytest.approx(np.arange(21) * math.pi)
+    assert (np.abs(run.section_theta) <= math.pi).all()
+    at = np.interp(run.section_time.values, run.time.values, run.theta.values)
+    assert np.cos(at) == pytest.approx(np.cos(run.section_theta.values), abs=1e-9)
+
+
+def test_the_exponent_of_tumbling_chaos(truths: dict[str, Any]) -> None:
+    for v in truths["lyapunov"].values():
+        pendulum = Pendulum(v["gamma"], v["p"], v["omega"])
+        until = 5000 * pendulum.period
+        run = pendmap.simulate(pendulum, 1, 0, until, samples=8, tol=1e-6, lyapunov=True)
+        error = math.hypot(run.attrs["exponent_stderr"], v["se"])
+        assert abs(run.attrs["exponent"] - v["lle_per_tau"]) < 4 * error
+        assert error < 0.03 * v["lle_per_tau"]
+
+
+def test_an_unpredictable_end_is_called_so() -> None:
+    run = pendmap.simulate(pendmap.PRESETS["fig2b"], 1, 0, 2000, samples=8)
+    assert run.attrs["end_error"] > 1e-3
+    assert "not predictable" in run.attrs["summary"]
+
+
+def test_advance_counts_turns_as_a_trajectory_does() -> None:
+    pendulum = Pendulum(p=1.0)
+    theta, velocity, turns = pendmap.advance(pendulum, [-0.5, 9.0], [2.6, 0.1], 6, tol=1e-10)
+    for k, start in enumerate(((-0.5, 2.6), (9.0, 0.1))):
+        run = pendmap.simulate(pendulum, *start, 6 * math.pi, tol=1e-12)
+        end = float(run.theta[-1])
+        assert turns[k] == round((end - start[0]) / math.tau)
+        assert math.cos(end - theta[k]) == pytest.approx(1, abs=1e-12)
+        assert velocity[k] == pytest.approx(float(run.velocity[-1]), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ({"theta": math.nan}, "theta is"),
+        ({"velocity": math.inf}, "velocity is"),
+        ({"until": 0}, "until is"),
+        ({"until": math.inf}, "until is"),
+        ({"until": 1e12}, "do not fit"),
+        ({"tol": 1.0}, "tol is"),
+        ({"samples": 0}, "samples is"),
+    ],
+)
+def test_bad_requests_are_refused(words: dict[str, Any], complaint: str) -> None:
+    request: dict[str, Any] = {"theta": 1.0, "velocity": 0.0, "until": 10.0} | words
+    with pytest.raises(InputError, match=complaint):
+        pendmap.simulate(Pendulum(), **request)
