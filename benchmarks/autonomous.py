@@ -18,10 +18,11 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.integrate import solve_ivp  # type: ignore[import-untyped]
+
 from peers import heyoka_batch, ours
 from peers.common import SEED, Case, Method, Regular, errors
 from peers.report import has_avx512, machine, note, say, table
-from scipy.integrate import solve_ivp  # type: ignore[import-untyped]
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,6 +7,7 @@ import statistics
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from peers import heyoka_batch, numba_rk4, ours
 from peers.common import (
     CASES,

@@ -40,17 +40,9 @@ class Pendmap:
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
         """Return wrapped angle and velocity, shape (N,), after whole forcing periods."""
         case = self.case
+        parameters = (case.gamma, case.p, case.omega, 0.0, self.torque)
         theta, velocity, _ = _core().advance(
-            case.gamma,
-            case.p,
-            case.omega,
-            0.0,
-            self.torque,
-            theta,
-            velocity,
-            periods,
-            self.steps,
-            self.threads,
+            parameters, theta, velocity, periods, self.steps, self.threads
         )
         return theta, velocity
 

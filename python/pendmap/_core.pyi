@@ -1,15 +1,27 @@
 from collections.abc import Callable
-from typing import Any, TypedDict
+from typing import Any, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "__version__",
+    "advance",
+    "basins_grid",
+    "basins_list",
+    "choose_steps",
+    "default_threads",
+    "simd",
+    "simd_available",
+    "simulate",
+]
+
 __version__: str
 
-_Parameters = tuple[float, float, float, float, float]
-_Axis = tuple[float, float, int]
-_Floats = NDArray[np.float64]
-_Progress = Callable[[int, int], object]
+_Parameters: TypeAlias = tuple[float, float, float, float, float]
+_Axis: TypeAlias = tuple[float, float, int]
+_Floats: TypeAlias = NDArray[np.float64]
+_Progress: TypeAlias = Callable[[int, int], object]
 
 class _Choices(TypedDict):
     tol: float

@@ -11,6 +11,7 @@ import xarray as xr
 from pendmap import _core
 from pendmap.errors import InputError
 from pendmap.grid import Grid
+from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
 
 if TYPE_CHECKING:
@@ -22,10 +23,8 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], object]
 
-__all__ = ["FORMAT_VERSION", "RELIABLE", "basins", "basins_of"]
+__all__ = ["RELIABLE", "basins", "basins_of"]
 
-FORMAT_VERSION: Final = 1
-"""Version of the layout of the datasets, in their attribute ``format_version``."""
 RELIABLE: Final = 0.05
 """Labels of which a larger share changes under half the step or mirroring are not reliable."""
 
@@ -54,7 +53,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     classified by their period ``n`` (in forcing periods) and winding ``w`` (net turns over it).
     Then every cell runs until an attractor has captured it. Cells that meet none begin new
     searches. Without damping, or where one chaotic attractor takes everything, there is nothing to
-    tell by labels: net turns and the finite-time exponent after ``layer_periods`` are given instead.
+    tell by labels: net turns and the finite-time exponent after ``layer_periods`` are given
+    instead.
 
     Parameters
     ----------

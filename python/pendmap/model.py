@@ -108,7 +108,9 @@ class Pendulum:
         unknown = [*sorted(set(table) - set(names)), *(f"[{key}]" for key in sorted(content))]
         if unknown:
             allowed = ", ".join(names)
-            raise InputError(f"{path}: {unknown[0]} is not known: allowed in [pendulum] are {allowed}")
+            raise InputError(
+                f"{path}: {unknown[0]} is not known: allowed in [pendulum] are {allowed}"
+            )
         if table.get("p", 0) != 0 and "omega" not in table:
             raise InputError(f"{path}: p without omega: a drive needs a frequency above 0")
         try:

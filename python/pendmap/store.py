@@ -15,9 +15,12 @@ from pendmap.pictures.files import whole_file
 if TYPE_CHECKING:
     import os
 
-__all__ = ["SUFFIXES", "load", "save"]
+__all__ = ["FORMAT_VERSION", "SUFFIXES", "load", "save"]
 
+FORMAT_VERSION: Final = 1
+"""Version of the layout of the datasets, in their attribute ``format_version``."""
 SUFFIXES: Final = (".nc", ".zarr")
+"""The kinds of file a result is stored in."""
 _LARGE: Final = 4096
 
 
@@ -61,7 +64,9 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
     try:
         import zarr  # noqa: F401, PLC0415 (an extra: only where it is asked for)
     except ImportError:
-        raise InputError(f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works") from None
+        raise InputError(
+            f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works"
+        ) from None
     if not target.parent.is_dir():
         raise FileNotFoundError(2, "the folder does not exist", str(target.parent))
     part = target.with_name(f".{target.stem}-{uuid.uuid4().hex[:8]}.part.zarr")
@@ -99,7 +104,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         raise InputError(f"{source}: suffix {source.suffix!r}: allowed are {', '.join(SUFFIXES)}")
     try:
         if source.suffix.lower() == ".zarr":
-            dataset = xr.open_zarr(source, consolidated=True).load()
+            dataset: xr.Dataset = xr.open_zarr(source, consolidated=True).load()
         else:
             dataset = xr.load_dataset(source, engine="netcdf4")
     except (OSError, ValueError, KeyError) as error:
@@ -107,6 +112,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     version = dataset.attrs.get("format_version")
     if version is None or "kind" not in dataset.attrs:
         raise InputError(f"{source}: is not a result of pendmap")
-    if int(version) > 1:
-        raise InputError(f"{source}: has format {version}, this pendmap reads format 1")
+    if int(version) > FORMAT_VERSION:
+        known = f"this pendmap reads format {FORMAT_VERSION}"
+        raise InputError(f"{source}: has format {version}, {known}")
     return dataset

@@ -43,8 +43,9 @@ def summarise(dataset: xr.Dataset) -> str:
 
 def _conservative(dataset: xr.Dataset) -> str:
     return (
-        "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns and "
-        f"the finite-time exponent after {dataset.attrs['layer_periods']} periods are shown instead."
+        "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
+        "and the finite-time exponent after "
+        f"{dataset.attrs['layer_periods']} periods are shown instead."
     )
 
 
@@ -78,7 +79,9 @@ def _settling(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     if a["longest_settle"] < 0:
         return []
-    return [f"Settling takes {a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most."]
+    return [
+        f"Settling takes {a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most."
+    ]
 
 
 def _texture(dataset: xr.Dataset) -> list[str]:

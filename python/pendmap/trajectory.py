@@ -10,7 +10,7 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.errors import InputError
-from pendmap.maps import FORMAT_VERSION
+from pendmap.store import FORMAT_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -127,17 +127,22 @@ def _summary(dataset: xr.Dataset) -> str:
     a = dataset.attrs
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
     lines = [
-        f"At tau = {a['until']:g}: theta = {theta:.9g} rad ({a['turns']} net turns), "
-        f"velocity = {velocity:.9g}.",
-        f"Halving the step changes the state by {a['reached_error']:.1e} after 5 periods and by "
-        f"{a['end_error']:.1e} at the end ({a['steps_per_period']} steps a period).",
+        (
+            f"At tau = {a['until']:g}: theta = {theta:.9g} rad ({a['turns']} net turns), "
+            f"velocity = {velocity:.9g}."
+        ),
+        (
+            f"Halving the step changes the state by {a['reached_error']:.1e} after 5 periods and "
+            f"by {a['end_error']:.1e} at the end ({a['steps_per_period']} steps a period)."
+        ),
     ]
     if a["end_error"] > max(1e-3, a["tol"]):
-        lines.append("The end is not predictable at this length: read the motion, not its last state.")
-    if "exponent" in a:
         lines.append(
-            f"Largest Lyapunov exponent {a['exponent']:.5f} +- {a['exponent_stderr']:.5f} per unit of tau."
+            "The end is not predictable at this length: read the motion, not its last state."
         )
+    if "exponent" in a:
+        value, error = a["exponent"], a["exponent_stderr"]
+        lines.append(f"Largest Lyapunov exponent {value:.5f} +- {error:.5f} per unit of tau.")
     return "\n".join(lines)
 
 

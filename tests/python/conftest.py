@@ -36,9 +36,7 @@ class Run(Protocol):
 def pendmap_command(tmp_path: Path) -> Run:
     """Run `pendmap` with these words in `tmp_path`, without a display."""
 
-    def run(
-        *words: object, env: dict[str, str] | None = None
-    ) -> subprocess.CompletedProcess[str]:
+    def run(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
         clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
         return subprocess.run(
             [str(COMMAND), *map(str, words)],

@@ -11,9 +11,9 @@ import time
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import COMMAND
 
 import pendmap
+from conftest import COMMAND
 from pendmap.cli.types import AXIS, NUMBER
 
 if TYPE_CHECKING:
@@ -21,10 +21,30 @@ if TYPE_CHECKING:
 
     from conftest import Run
 
-FIELDS = (
-    "attractors undecided failed cells mean_periods seconds reached_error basin_entropy unreliable"
-).split()
-ATTRACTOR = "id name kind n w theta velocity multipliers exponent fraction stderr".split()
+FIELDS = [
+    "attractors",
+    "undecided",
+    "failed",
+    "cells",
+    "mean_periods",
+    "seconds",
+    "reached_error",
+    "basin_entropy",
+    "unreliable",
+]
+ATTRACTOR = [
+    "id",
+    "name",
+    "kind",
+    "n",
+    "w",
+    "theta",
+    "velocity",
+    "multipliers",
+    "exponent",
+    "fraction",
+    "stderr",
+]
 
 
 def test_help_imports_nothing_heavy() -> None:

@@ -1,7 +1,5 @@
 """Figures: what they show, that nothing overlaps or is cut, and that files are whole or absent."""
 
-# ruff: noqa: D103 (their names say what the tests test)
-
 from __future__ import annotations
 
 import itertools
@@ -66,6 +64,7 @@ COEXISTING = (
     ("oscillation 2:0", "rotation 1:+1", "rotation 1:-1", "rotation 2:+2", "rotation 2:-2"),
     ("rest", "inverted rest", "rotation 1:+1", "rotation 1:-1", "tumbling chaos", "undecided"),
     ("rotating chaos +", "rotating chaos -", "tumbling chaos", "oscillation 2:0", "failed"),
+    ("oscillation 4:0 (+)", "oscillation 4:0 (-)", "rotation 1:+1", "rotation 1:-1", "undecided"),
     ("rest", "oscillation 1:0", "oscillation 2:0", "oscillation 3:0", "tumbling chaos"),
 )
 
@@ -159,6 +158,16 @@ def test_labels_lead_and_settle_time_stands_beside_them() -> None:
     assert figure.axes[0].get_xlabel() == "\N{GREEK SMALL LETTER THETA} (rad)"
     ticks = [tick.get_text() for tick in figure.axes[0].get_xticklabels()]
     assert ticks == ["\N{MINUS SIGN}π", "\N{MINUS SIGN}π/2", "0", "π/2", "π"]
+
+
+def test_without_drive_there_is_no_frequency() -> None:
+    figure = made(synthetic.painted(synthetic.USUAL[:2], p=0.0, torque=0.5, phase=0.3))
+    assert (
+        figure.texts[1]
+        .get_text()
+        .startswith("\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 0,  torque = 0.5;")
+    )
+    assert "periods of 2\N{GREEK SMALL LETTER PI} to settle" in written(figure)
 
 
 def test_legend_names_share_error_and_twin() -> None:

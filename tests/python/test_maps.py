@@ -63,7 +63,9 @@ def test_a_map_says_all_about_itself(smooth: Any) -> None:  # noqa: ANN401
     assert labels.tolist() == [1, 2, 3]
     assert counts.sum() == smooth.attrs["cells"] == 3600
     assert smooth.fraction.values == pytest.approx(counts / 3600)
-    assert smooth.stderr.values == pytest.approx(np.sqrt(counts / 3600 * (1 - counts / 3600) / 3600))
+    assert smooth.stderr.values == pytest.approx(
+        np.sqrt(counts / 3600 * (1 - counts / 3600) / 3600)
+    )
     assert smooth.twin.values.tolist() == [1, 3, 2]
     assert (smooth.settle_periods.values > 0).all()
     assert smooth.attrs["labels_reliable"] == 1
@@ -215,7 +217,7 @@ def test_other_threads_run_meanwhile_and_progress_is_told() -> None:
 
 
 def test_an_error_in_the_callers_progress_ends_the_map() -> None:
-    def fail(done: int, total: int) -> None:
+    def fail(*_: int) -> None:
         raise RuntimeError("enough")
 
     with pytest.raises(RuntimeError, match="enough"):

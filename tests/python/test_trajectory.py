@@ -22,7 +22,9 @@ def test_trajectories_of_independent_tools(truths: dict[str, Any]) -> None:
             # Chaos amplifies rounding: by e^(0.26 tau) at most on these trajectories.
             allowed = 1e-12 * max(1, math.exp(0.26 * float(until)) / 1e3)
             assert float(run.theta[-1]) == pytest.approx(float(theta), abs=max(1e-11, allowed))
-            assert float(run.velocity[-1]) == pytest.approx(float(velocity), abs=max(1e-11, allowed))
+            assert float(run.velocity[-1]) == pytest.approx(
+                float(velocity), abs=max(1e-11, allowed)
+            )
 
 
 def test_the_period_of_a_free_pendulum_is_the_elliptic_integral() -> None:

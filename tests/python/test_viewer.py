@@ -1,6 +1,6 @@
 """Recordings: read back what was written and, if wanted, look at the viewer's picture of it."""
 
-# ruff: noqa: D102, D103 (their names say what the tests test)
+# ruff: noqa: D102 (their names say what the tests test)
 
 from __future__ import annotations
 
@@ -359,9 +359,11 @@ def test_a_recording_is_whole_or_absent(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_the_same_map_is_the_same_recording(tmp_path: Path) -> None:
+    other = synthetic.painted()
+    other["label"][4, 5] = 0
     ids = [
         recorded(dataset, tmp_path).recordings[0].recording_id
-        for dataset in (synthetic.painted(), synthetic.painted(), synthetic.painted(undecided=1))
+        for dataset in (synthetic.painted(), synthetic.painted(seconds=9.0), other)
     ]
     assert ids[0] == ids[1] != ids[2]
 

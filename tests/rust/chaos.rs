@@ -1,1 +1,112 @@
-//! chaos
+//! Chaotic attractors, and transients that must not be taken for such.
+
+use std::sync::atomic::AtomicBool;
+
+use pendmap::attractor::capture::{Fate, outcomes};
+use pendmap::attractor::{Catalogue, Kind};
+use pendmap::integrate::State;
+use pendmap::integrate::accuracy::choose;
+use pendmap::integrate::trajectory::{Request, simulate};
+use pendmap::maps::basins::{BasinMap, Plane};
+
+use crate::support::{basins_on_plane, driven, path, plane};
+use crate::truths::{model, number, table, truths};
+
+/// The one chaotic attractor of a plane that has nothing else.
+fn only_chaos(map: &BasinMap) -> &pendmap::attractor::Attractor {
+    assert_eq!(map.plane, Plane::OnlyChaos);
+    let [chaos] = map.attractors.as_slice() else { panic!("{} attractors", map.attractors.len()) };
+    assert_eq!((chaos.kind, chaos.name.as_str()), (Kind::TumblingChaos, "tumbling chaos"));
+    assert_eq!((chaos.n, chaos.w, chaos.period), (None, None, None));
+    assert_eq!((chaos.twin, chaos.multipliers.len()), (Some(0), 0));
+    assert!(chaos.points.len() > 500 && chaos.points.len() <= 2000);
+    assert!(chaos.exponent > 10.0 * chaos.exponent_stderr && chaos.exponent_stderr > 0.0);
+    chaos
+}
+
+#[test]
+fn tumbling_chaos_takes_everything_at_the_three_points_of_figure_2() {
+    for (p, omega) in [(1.03, 0.87), (1.7, 0.87), (1.5, 1.8)] {
+        let map = basins_on_plane(&driven(0.1, p, omega), 40);
+        let chaos = only_chaos(&map);
+        // The points lie on it: none is captured by anything, and both senses are there.
+        assert!(chaos.points.iter().any(|s| s[1] > 0.5) && chaos.points.iter().any(|s| s[1] < -0.5));
+        assert!((map.fractions[0] - 1.0).abs() < 1e-12);
+        // Labels tell nothing, so the layers do.
+        let layers = map.layers.as_ref().expect("layers");
+        assert!((3..=60).contains(&map.layer_periods));
+        assert!(layers.turns.iter().any(|t| *t > 0) && layers.turns.iter().any(|t| *t < 0));
+        assert!(layers.exponent.iter().all(|e| e.is_finite()));
+    }
+}
+
+#[test]
+fn exponents_are_the_reference_ones() {
+    for (name, entry) in table(&truths()["lyapunov"]) {
+        let map = basins_on_plane(&model(entry), 20);
+        let chaos = only_chaos(&map);
+        let (exact, stderr) = (number(&entry["lle_per_tau"]), number(&entry["se"]));
+        let allowed = 3.0 * stderr.hypot(chaos.exponent_stderr);
+        let error = (chaos.exponent - exact).abs();
+        assert!(error < allowed, "{name}: {} for {exact}, {allowed} allowed", chaos.exponent);
+        // A standard error that means something: two in a hundred at the most.
+        assert!(chaos.exponent_stderr < 0.02 * exact, "{name}: {}", chaos.exponent_stderr);
+    }
+}
+
+#[test]
+fn exponent_of_one_trajectory() {
+    let exponent = |p: f64, omega: f64, until: f64, start: State| {
+        let request = Request { start, until, tol: 1e-7, samples: 20, lyapunov: true };
+        let run = simulate(&driven(0.1, p, omega), &request, &AtomicBool::new(false));
+        run.expect("a trajectory").exponent.expect("asked for")
+    };
+    let entry = &truths()["lyapunov"]["w0.87_p1.7"];
+    let (mean, stderr) = exponent(1.7, 0.87, 20_000.0, [1.0, 0.0]);
+    let exact = number(&entry["lle_per_tau"]);
+    assert!((mean - exact).abs() < 3.0 * stderr.hypot(number(&entry["se"])), "{mean} +- {stderr}");
+    assert!(stderr < 0.05 * exact, "{stderr}");
+    // On a focus of the map both multipliers have the modulus exp(-gamma n T / 2).
+    let (mean, stderr) = exponent(1.0, 2.0, 4000.0, [0.5, 0.0]);
+    assert!((mean + 0.05).abs() < 3.0 * stderr + 1e-3, "{mean} +- {stderr}");
+}
+
+#[test]
+fn long_transients_are_not_called_chaotic() {
+    for p in [1.2, 1.8] {
+        let map = basins_on_plane(&driven(0.1, p, 2.0), 60);
+        assert_eq!(map.plane, Plane::Basins, "p = {p}");
+        for attractor in &map.attractors {
+            assert!(!attractor.kind.is_chaotic(), "p = {p}: {}", attractor.name);
+            assert!(attractor.exponent < 0.0);
+        }
+        assert!(map.share(0) < 0.01, "p = {p}: {} undecided", map.share(0));
+        // Some do take hundreds of periods.
+        assert!(map.labels.settle.iter().any(|s| *s > 200), "p = {p}");
+    }
+}
+
+#[test]
+fn chaos_beside_other_attractors() {
+    let pendulum = driven(0.1, 1.52, 1.1);
+    let starts = plane(40);
+    let map = basins_on_plane(&pendulum, 40);
+    assert_eq!(map.plane, Plane::Basins);
+    let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
+    assert!(names.contains(&"rest") && names.contains(&"tumbling chaos"), "{names:?}");
+    let chaos = names.iter().position(|name| *name == "tumbling chaos").expect("it");
+    assert!(map.fractions[chaos] > 0.02 && map.fractions[chaos] < 0.1, "{:?}", map.fractions);
+    // What is labelled so is captured by none of the others for very long.
+    let label = chaos as i16 + 1;
+    let cells: Vec<usize> = (0..1600).filter(|i| map.labels.label[*i] == label).collect();
+    assert!(cells.iter().all(|i| map.labels.settle[*i] == -1));
+    let sample = starts.sampled_states(400, 0);
+    let (strobe, _) = choose(&pendulum, &sample, 1e-6, path()).expect("steps");
+    let mut catalogue = Catalogue::new(&strobe);
+    assert!(catalogue.search(&strobe, &sample, 1000, &AtomicBool::new(false)));
+    assert!(catalogue.has_chaos() && catalogue.only_chaos().is_none());
+    let states: Vec<State> = cells.iter().map(|i| starts.get(*i)).collect();
+    for outcome in outcomes(&strobe, &catalogue.traps, 5000, &states) {
+        assert_eq!(outcome.fate, Fate::Open);
+    }
+}

@@ -1,1 +1,160 @@
-//! input
+//! What is refused, and in which words: each names the value, what is wrong and what is allowed.
+
+use std::sync::atomic::AtomicBool;
+
+use pendmap::error::Error;
+use pendmap::integrate::Strobe;
+use pendmap::integrate::accuracy::choose;
+use pendmap::integrate::trajectory::{Request, simulate};
+use pendmap::lanes::Path;
+use pendmap::maps::advance::advance;
+use pendmap::maps::basins::{Options, basins};
+use pendmap::maps::control::Control;
+use pendmap::maps::starts::{Axis, Starts};
+use pendmap::model::{HarmonicDrive, Pendulum};
+
+use crate::support::{driven, path, plane, spread};
+
+/// The message of a refusal; a success is the failure of the test.
+fn refusal<T>(result: Result<T, Error>) -> String {
+    result.err().expect("refused").to_string()
+}
+
+#[test]
+fn pendulums() {
+    let make = |gamma, p, omega, phase, torque| {
+        refusal(Pendulum::new(gamma, p, omega, phase, torque))
+    };
+    let (nan, inf) = (f64::NAN, f64::INFINITY);
+    assert_eq!(make(-0.1, 1.0, 2.0, 0.0, 0.0), "gamma is -0.1: allowed is 0 or more");
+    assert_eq!(make(nan, 1.0, 2.0, 0.0, 0.0), "gamma is NaN: allowed is 0 or more");
+    assert_eq!(make(inf, 1.0, 2.0, 0.0, 0.0), "gamma is inf: allowed is 0 or more");
+    assert_eq!(make(0.1, nan, 2.0, 0.0, 0.0), "p is NaN: allowed is any finite number");
+    assert_eq!(make(0.1, -inf, 2.0, 0.0, 0.0), "p is -inf: allowed is any finite number");
+    assert_eq!(make(0.1, 1.0, 0.0, 0.0, 0.0), "omega is 0: allowed is a number above 0");
+    assert_eq!(make(0.1, 1.0, -2.0, 0.0, 0.0), "omega is -2: allowed is a number above 0");
+    assert_eq!(make(0.1, 1.0, nan, 0.0, 0.0), "omega is NaN: allowed is a number above 0");
+    assert_eq!(make(0.1, 1.0, 2.0, inf, 0.0), "phase is inf: allowed is any finite number");
+    assert_eq!(make(0.1, 1.0, 2.0, 0.0, nan), "torque is NaN: allowed is any finite number");
+    assert!(HarmonicDrive::new(1.0, 2.0, 0.0).is_ok() && Pendulum::new(0.0, -1.0, 2.0, 9.0, -3.0).is_ok());
+}
+
+#[test]
+fn axes() {
+    let make = |low, high, count| refusal(Axis::new("velocity", low, high, count));
+    let order = "allowed is two finite bounds, the lower one first";
+    assert_eq!(make(1.0, -1.0, 10), format!("velocity is -1: {order}"));
+    assert_eq!(make(2.0, 2.0, 10), format!("velocity is 2: {order}"));
+    assert_eq!(make(f64::NAN, 1.0, 10), format!("velocity is NaN: {order}"));
+    assert_eq!(make(0.0, f64::INFINITY, 10), format!("velocity is inf: {order}"));
+    assert_eq!(make(-1.0, 1.0, 0), "velocity is 0: allowed is 1 to 100000 cells");
+    assert_eq!(make(-1.0, 1.0, 100_001), "velocity is 100001: allowed is 1 to 100000 cells");
+}
+
+#[test]
+fn trajectories() {
+    let good = Request { start: [1.0, 0.0], until: 1.0, tol: 1e-6, samples: 10, lyapunov: false };
+    let go = |request: Request| {
+        refusal(simulate(&driven(0.1, 1.0, 2.0), &request, &AtomicBool::new(false)))
+    };
+    let nan = f64::NAN;
+    assert_eq!(
+        go(Request { start: [nan, 0.0], ..good }),
+        "theta is NaN: allowed is any finite number"
+    );
+    assert_eq!(
+        go(Request { start: [0.0, f64::INFINITY], ..good }),
+        "velocity is inf: allowed is any finite number"
+    );
+    assert_eq!(go(Request { until: -1.0, ..good }), "until is -1: allowed is a time above 0");
+    assert_eq!(go(Request { until: nan, ..good }), "until is NaN: allowed is a time above 0");
+    assert_eq!(go(Request { tol: 0.1, ..good }), "tol is 0.1: allowed is 1e-13 to 1e-2");
+    assert_eq!(go(Request { tol: nan, ..good }), "tol is NaN: allowed is 1e-13 to 1e-2");
+    assert_eq!(go(Request { samples: 0, ..good }), "samples is 0: allowed is 1 or more");
+    assert!(simulate(&driven(0.1, 1.0, 2.0), &good, &AtomicBool::new(false)).is_ok());
+    let stopped = simulate(&driven(0.1, 1.0, 2.0), &good, &AtomicBool::new(true));
+    assert_eq!(stopped.err(), Some(Error::Interrupted));
+}
+
+#[test]
+fn arrays_of_different_lengths() {
+    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, path());
+    let lengths = |given, names| Some(Error::Lengths { given, names });
+    let go = |a: usize, b: usize, c: usize| {
+        let (mut a, mut b, mut c) = (vec![0.0; a], vec![0.0; b], vec![0.0; c]);
+        let singly = strobe.advance_singly(&mut a, &mut b, &mut c, 1).err();
+        assert_eq!(strobe.advance(&mut a, &mut b, &mut c, 1).err(), singly);
+        singly
+    };
+    assert_eq!(go(3, 3, 3), None);
+    assert_eq!(go(0, 0, 0), None);
+    assert_eq!(go(3, 2, 3), lengths((3, 2), ("theta", "velocity")));
+    assert_eq!(go(3, 3, 4), lengths((3, 4), ("theta", "turns")));
+    let error = go(3, 2, 3).expect("refused").to_string();
+    assert_eq!(error, "theta has 3 values and velocity has 2: they must be as many");
+
+    let stretch = |n: [usize; 6]| {
+        let [mut a, mut b, mut c, mut d, mut e, mut f] = n.map(|n| vec![1.0; n]);
+        strobe.stretch((&mut a, &mut b), &mut c, (&mut d, &mut e), &mut f, 1).err()
+    };
+    assert_eq!(stretch([2; 6]), None);
+    assert_eq!(stretch([2, 1, 2, 2, 2, 2]), lengths((2, 1), ("theta", "velocity")));
+    assert_eq!(stretch([2, 2, 1, 2, 2, 2]), lengths((2, 1), ("theta", "turns")));
+    assert_eq!(stretch([2, 2, 2, 1, 2, 2]), lengths((2, 1), ("theta", "tangent theta")));
+    assert_eq!(stretch([2, 2, 2, 2, 1, 2]), lengths((2, 1), ("theta", "tangent velocity")));
+    assert_eq!(stretch([2, 2, 2, 2, 2, 1]), lengths((2, 1), ("theta", "growth")));
+
+    let (mut a, mut b) = (vec![0.0; 5], vec![0.0; 4]);
+    let on_threads = advance(&strobe, &mut a, &mut b, 1, 1, &Control::default());
+    assert_eq!(on_threads.err(), lengths((5, 4), ("theta", "velocity")));
+}
+
+#[test]
+fn tolerances() {
+    let starts = spread(100, 3.0, 3.0);
+    let range = |tol: f64| refusal(choose(&driven(0.1, 1.0, 2.0), &starts, tol, path()));
+    assert_eq!(range(0.5), "tol is 0.5: allowed is 1e-13 to 1e-2");
+    assert_eq!(range(0.0), "tol is 0: allowed is 1e-13 to 1e-2");
+    assert_eq!(range(-1e-6), "tol is -0.000001: allowed is 1e-13 to 1e-2");
+    assert_eq!(range(f64::NAN), "tol is NaN: allowed is 1e-13 to 1e-2");
+    // Chaos makes more of rounding errors than 1e-13 within five periods.
+    let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, path()).err().expect("refused");
+    let Error::Tolerance { tol, reached } = error else { panic!("{error}") };
+    assert!(tol < 2e-13 && reached > tol && reached < 1e-6, "{reached:e}");
+    let error = Error::Tolerance { tol: 1e-13, reached: 2.34e-11 }.to_string();
+    let expected = "tol is 1e-13: the smallest error that steps can reach here is 2.3e-11";
+    assert_eq!(error, expected);
+}
+
+#[test]
+fn instruction_sets() {
+    for path in Path::ALL {
+        assert_eq!(path.name().parse::<Path>(), Ok(path));
+        assert_eq!(path.to_string(), path.name());
+    }
+    let error = "avx1024".parse::<Path>().err().expect("refused");
+    assert_eq!(error, Error::Simd { name: "avx1024".to_owned() });
+    let expected = "PENDMAP_SIMD is 'avx1024': allowed are avx512, avx2, sse and portable, as far \
+                    as this processor has them";
+    assert_eq!(error.to_string(), expected);
+    assert!("AVX2".parse::<Path>().is_err() && "".parse::<Path>().is_err());
+    assert!(Path::Portable.available());
+}
+
+#[test]
+fn maps() {
+    let pendulum = driven(0.1, 1.0, 2.0);
+    let go = |starts: &Starts, options: Options| {
+        refusal(basins(&pendulum, starts, &options, &Control::default()))
+    };
+    let options = Options::default();
+    assert_eq!(go(&Starts::List(Vec::new()), options), "starts is 0: allowed is 1 or more");
+    let tol = Options { tol: 1.0, ..options };
+    assert_eq!(go(&plane(10), tol), "tol is 1: allowed is 1e-13 to 1e-2");
+    assert_eq!(Error::Interrupted.to_string(), "interrupted");
+    let error = Error::Threads("no more".to_owned());
+    assert_eq!(error.to_string(), "threads: no more");
+    // They are errors as the standard library has them.
+    let boxed: Box<dyn std::error::Error> = Box::new(error);
+    assert!(boxed.source().is_none());
+}

@@ -1,6 +1,6 @@
 //! Periodic orbits by Newton's method, against the known ones.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
@@ -122,4 +122,24 @@ fn nothing_is_made_up() {
         }
     }
     assert!(found > 5 && refused > 5, "{found} found, {refused} refused");
+}
+
+#[test]
+fn an_orbit_is_the_same_a_turn_further_on() {
+    for known in attractors() {
+        for turn in [-TAU, TAU] {
+            let start = [known.points[0][0] + turn, known.points[0][1]];
+            let orbit = polished(&known, start, known.n);
+            assert_eq!((orbit.n, orbit.w), (known.n, known.w), "from {start:?}");
+            assert!(orbit.points.iter().all(|p| p[0].abs() <= PI), "{:?}", orbit.points);
+        }
+    }
+    // At the top an angle may be on either side of pi by a rounding error: that is no turn.
+    for (p, omega) in [(0.5, 2.0), (1.0, 2.0), (30.0, 14.0)] {
+        let map = PoincareMap::new(&driven(0.5, p, omega));
+        for theta in [3.1, 3.15, -3.1, -3.15] {
+            let orbit = find(&map, [theta, 0.01], 1, 0.3).expect("the inverted rest");
+            assert_eq!(orbit.w, 0, "from {theta} at p = {p}: {:?}", orbit.points);
+        }
+    }
 }

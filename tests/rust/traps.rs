@@ -1,1 +1,167 @@
-//! traps
+//! Traps: whatever starts inside one ends on its attractor.
+
+use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
+
+use pendmap::attractor::Catalogue;
+use pendmap::attractor::capture::{Fate, outcomes};
+use pendmap::attractor::trap::Ellipse;
+use pendmap::integrate::accuracy::{choose, distance};
+use pendmap::integrate::{State, Strobe};
+use pendmap::model::Pendulum;
+
+use crate::support::{advanced, driven, fine_strobe, path, plane, undriven};
+
+fn searched(pendulum: &Pendulum, tol: f64) -> (Strobe, Catalogue) {
+    let starts = plane(100).sampled_states(400, 0);
+    let (strobe, _) = choose(pendulum, &starts, tol, path()).expect("steps");
+    let mut catalogue = Catalogue::new(&strobe);
+    catalogue.search(&strobe, &starts, 1000, &AtomicBool::new(false));
+    (strobe, catalogue)
+}
+
+/// States inside an ellipse: spread over its area, and close to its edge all round.
+fn inside(ellipse: &Ellipse) -> Vec<State> {
+    let [a, b, c] = ellipse.shape;
+    let at = |radius: f64, angle: f64| {
+        let dv = radius * angle.sin() / c;
+        [ellipse.centre[0] + (radius * angle.cos() - b * dv) / a, ellipse.centre[1] + dv]
+    };
+    let edge = (0..150).map(|k| at(0.999, TAU * f64::from(k) / 150.0));
+    let area = (0..250).map(|k| {
+        let k = f64::from(k);
+        at(((k + 0.5) / 250.0).sqrt(), TAU * (k * 0.618_033_988_749_895).fract())
+    });
+    edge.chain(area).collect()
+}
+
+fn pendulums() -> Vec<Pendulum> {
+    [0.3, 0.5, 0.6, 1.0, 1.2, 1.34, 1.8]
+        .map(|p| driven(0.1, p, 2.0))
+        .into_iter()
+        .chain([Pendulum::new(0.1, 0.5, 1.5, 0.3, 0.2).expect("in range"), undriven(0.2, 0.0)])
+        .collect()
+}
+
+#[test]
+fn whatever_is_inside_an_ellipse_converges_to_its_attractor() {
+    for pendulum in pendulums() {
+        let (strobe, catalogue) = searched(&pendulum, 1e-6);
+        let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
+        assert!(!catalogue.traps.ellipses.is_empty(), "{pendulum:?}");
+        for ellipse in &catalogue.traps.ellipses {
+            let attractor = &catalogue.attractors[ellipse.attractor];
+            // 600 periods, or one more cycle: even 0.964 has become 1e-10.
+            let periods = 600_usize.next_multiple_of(attractor.n.expect("a cycle"));
+            let states = inside(ellipse);
+            assert!(states.iter().all(|s| ellipse.height(*s) < 1.0));
+            for (start, end) in states.iter().zip(advanced(&fine, &states, periods)) {
+                let missed = distance(end, ellipse.centre);
+                assert!(
+                    missed < 1e-8,
+                    "{pendulum:?}: {} from {start:?} to {end:?}, {missed:e} away",
+                    attractor.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn within_four_returns_the_height_has_fallen() {
+    for pendulum in pendulums() {
+        let (strobe, catalogue) = searched(&pendulum, 1e-6);
+        for ellipse in &catalogue.traps.ellipses {
+            let n = catalogue.attractors[ellipse.attractor].n.expect("a cycle");
+            let states = inside(ellipse);
+            let heights = |states: &[State]| -> Vec<f64> {
+                states
+                    .iter()
+                    .map(|s| {
+                        // The ellipse may stand one turn beside the wrapped angle.
+                        [-TAU, 0.0, TAU]
+                            .into_iter()
+                            .map(|turn| ellipse.height([s[0] + turn, s[1]]))
+                            .fold(f64::INFINITY, f64::min)
+                    })
+                    .collect()
+            };
+            let before = heights(&states);
+            let mut now = states.clone();
+            let mut lowest = before.clone();
+            for _ in 0..4 {
+                now = advanced(&strobe, &now, n);
+                for (low, height) in lowest.iter_mut().zip(heights(&now)) {
+                    *low = low.min(height);
+                }
+            }
+            for (i, (low, before)) in lowest.iter().zip(&before).enumerate() {
+                assert!(low < before, "{pendulum:?} from {:?}: {low} from {before}", states[i]);
+            }
+        }
+    }
+}
+
+#[test]
+fn ellipses_are_centred_on_the_points_of_their_attractors() {
+    for pendulum in pendulums() {
+        let (_, catalogue) = searched(&pendulum, 1e-6);
+        for (i, attractor) in catalogue.attractors.iter().enumerate() {
+            for (k, point) in attractor.points.iter().enumerate() {
+                let at = |e: &&Ellipse| e.attractor == i && e.point == k;
+                let own: Vec<&Ellipse> = catalogue.traps.ellipses.iter().filter(at).collect();
+                assert!(!own.is_empty(), "{} has no trap at point {k}", attractor.name);
+                assert!(own.iter().all(|e| distance(e.centre, *point) < 1e-9));
+            }
+        }
+        // A useful trap is not tiny: the aim is to stop long before convergence.
+        let widest = catalogue.traps.ellipses.iter().map(|e| 1.0 / e.shape[0]).fold(0.0, f64::max);
+        assert!(widest > 0.02, "{pendulum:?}: {widest}");
+    }
+}
+
+#[test]
+fn capture_agrees_with_waiting() {
+    // Labels by traps against where trajectories are after 3000 periods, at a smooth point.
+    let pendulum = driven(0.1, 0.6, 2.0);
+    let (strobe, catalogue) = searched(&pendulum, 1e-6);
+    let starts: Vec<State> = (0..1600).map(|i| plane(40).get(i)).collect();
+    let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
+    let ends = advanced(&fine, &starts, 3000);
+    let mut different = 0;
+    for (outcome, end) in outcomes(&strobe, &catalogue.traps, 4000, &starts).iter().zip(ends) {
+        let Fate::Captured(label) = outcome.fate else { panic!("{outcome:?}") };
+        let reached = catalogue
+            .attractors
+            .iter()
+            .position(|a| a.points.iter().any(|p| distance(*p, end) < 1e-8))
+            .expect("some attractor");
+        different += usize::from(label != reached);
+        assert!(outcome.periods < outcome.work, "two hits, and the first one counts");
+    }
+    assert_eq!(different, 0, "of 1600 labels");
+}
+
+#[test]
+fn a_band_holds_the_running_state() {
+    for pendulum in [undriven(0.1, 0.5), Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range")] {
+        let (strobe, catalogue) = searched(&pendulum, 1e-6);
+        let [band] = catalogue.traps.bands.as_slice() else { panic!("one band: {pendulum:?}") };
+        assert!(band.half_width > 0.1, "{}", band.half_width);
+        let states: Vec<State> = (0..500)
+            .map(|k| {
+                let k = f64::from(k);
+                let theta = TAU * ((k * 0.618_033_988_749_895).fract() - 0.5);
+                let side = 0.999 * (2.0 * (k * 0.754_877_666_246_693).fract() - 1.0);
+                [theta, band.at(theta) + side * band.half_width]
+            })
+            .collect();
+        assert!(states.iter().all(|s| band.contains(*s)));
+        let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
+        for (start, end) in states.iter().zip(advanced(&fine, &states, 60)) {
+            // Interpolation of the tabulated curve limits how close one can see it come.
+            let off = (end[1] - band.at(end[0])).abs();
+            assert!(off < 5e-3, "{pendulum:?}: {start:?} to {end:?}, {off:e} off");
+        }
+    }
+}

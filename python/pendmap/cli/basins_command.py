@@ -30,11 +30,17 @@ _DEFAULT = 1000
 @click.option("--velocity", type=AXIS, help="Initial velocities.  [default: -3:3:1000]")
 @click.option("--grid", type=click.IntRange(min=1), help="Cells on each side of the window.")
 @click.option("--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]")
-@click.option("--max-periods", type=click.IntRange(min=1), help="Bound after which a start is undecided.")
-@click.option("--layer-periods", type=click.IntRange(min=1), help="Periods of the finite-time layers.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Shifts the samples.  [default: 0]")
+@click.option(
+    "--max-periods", type=click.IntRange(min=1), help="Bound after which a start is undecided."
+)
+@click.option(
+    "--layer-periods", type=click.IntRange(min=1), help="Periods of the finite-time layers."
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, help="Shifts the samples.  [default: 0]"
+)
 @progress_options
-@output_options()
+@output_options
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Map the basins of attraction over initial angle and velocity.
 
@@ -67,12 +73,33 @@ def _axes(
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the JSON object of a basin map."""
     a = dataset.attrs
-    names = (
-        "undecided failed cells mean_periods seconds reached_error basin_entropy unreliable "
-        "labels_sampled unreliable_half_step unreliable_mirror mean_settle longest_settle "
-        "neighbours_agree neighbours_chance plane layer_periods steps_per_period max_periods "
-        "tol simd threads seed pendmap_version format_version"
-    ).split()
+    names = [
+        "undecided",
+        "failed",
+        "cells",
+        "mean_periods",
+        "seconds",
+        "reached_error",
+        "basin_entropy",
+        "unreliable",
+        "labels_sampled",
+        "unreliable_half_step",
+        "unreliable_mirror",
+        "mean_settle",
+        "longest_settle",
+        "neighbours_agree",
+        "neighbours_chance",
+        "plane",
+        "layer_periods",
+        "steps_per_period",
+        "max_periods",
+        "tol",
+        "simd",
+        "threads",
+        "seed",
+        "pendmap_version",
+        "format_version",
+    ]
     return {
         "attractors": [_attractor(dataset, k) for k in range(dataset.sizes["attractor"])],
         **{name: a.get(name) for name in names},
@@ -85,9 +112,11 @@ def _attractor(dataset: xr.Dataset, k: int) -> dict[str, Any]:
     n = int(row["n"])
     closed = n > 0
     multipliers = [[float(x) for x in pair] for pair in row["multipliers"].values]
-    multipliers = [pair for pair in multipliers if pair[0] == pair[0]]  # noqa: PLR0124 (not NaN)
+    multipliers = [pair for pair in multipliers if pair[0] == pair[0]]
     mine = dataset["point_attractor"].values == int(row["id"])
-    points = zip(dataset["point_theta"].values[mine], dataset["point_velocity"].values[mine], strict=True)
+    points = zip(
+        dataset["point_theta"].values[mine], dataset["point_velocity"].values[mine], strict=True
+    )
     return {
         "id": int(row["id"]),
         "name": str(row["attractor"].values),

@@ -57,7 +57,7 @@ def run() -> None:
     sys.exit(_exit_code())
 
 
-def _exit_code() -> int:
+def _exit_code() -> int:  # noqa: PLR0911 (one for each way to end)
     try:
         result = command.main(prog_name="pendmap", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:

@@ -71,24 +71,19 @@ def progress_options(function: Command) -> Command:
     return threads(quiet(function))
 
 
-def output_options(*kinds: str) -> Callable[[Command], Command]:
+def output_options(function: Command) -> Command:
     """Add --json, --out, --plot, --rerun and --view."""
-
-    def add(function: Command) -> Command:
-        for option in (
-            click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout."),
-            click.option("--view", is_flag=True, help="Open the recording in the viewer."),
-            click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd."),
-            click.option(
-                "--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf."
-            ),
-            click.option("--out", type=OutputFile([".nc", ".zarr"]), help="Result: .nc or .zarr."),
-        ):
-            function = option(function)
-        return function
-
-    del kinds
-    return add
+    for option in (
+        click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout."),
+        click.option("--view", is_flag=True, help="Open the recording in the viewer."),
+        click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd."),
+        click.option(
+            "--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf."
+        ),
+        click.option("--out", type=OutputFile([".nc", ".zarr"]), help="Result: .nc or .zarr."),
+    ):
+        function = option(function)
+    return function
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,17 +99,17 @@ class Outputs:
 
     @classmethod
     def take(cls, given: dict[str, Any], name: str) -> Outputs:
-        """Take the output options out of ``given``; with none of them, three files ``name``.*"""
+        """Take the output options out of ``given``; with none, three files ``name.*``."""
         fields = {field.name: given.pop(field.name) for field in dataclasses.fields(cls)}
         outputs = cls(**fields)
         asked = (outputs.out, outputs.plot, outputs.rerun, outputs.view, outputs.as_json)
         if not any(asked):
-            files = {
-                "out": OutputFile([".nc"]).convert(f"{name}.nc", None, None),
-                "plot": OutputFile([".png"]).convert(f"{name}.png", None, None),
-                "rerun": OutputFile([".rrd"]).convert(f"{name}.rrd", None, None),
-            }
-            outputs = dataclasses.replace(outputs, **files)
+            outputs = dataclasses.replace(
+                outputs,
+                out=OutputFile([".nc"]).convert(f"{name}.nc", None, None),
+                plot=OutputFile([".png"]).convert(f"{name}.png", None, None),
+                rerun=OutputFile([".rrd"]).convert(f"{name}.rrd", None, None),
+            )
         if outputs.view and outputs.rerun is None:
             rrd = OutputFile([".rrd"]).convert(f"{name}.rrd", None, None)
             outputs = dataclasses.replace(outputs, rerun=rrd)

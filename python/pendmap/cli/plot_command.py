@@ -20,7 +20,9 @@ __all__ = ["command"]
     type=OutputFile([".png", ".svg", ".pdf"]),
     help="Figure to write: .png .svg .pdf.  [default: FILE with .png]",
 )
-@click.option("--layer", help="One part alone: labels, settle, turns, exponent; history, phase, section.")
+@click.option(
+    "--layer", help="One part alone: labels, settle, turns, exponent; history, phase, section."
+)
 @click.option("--size", help="Width x height in inches, like 8x4.")
 @click.option("--dpi", type=click.IntRange(20, 1200), help="Pixels an inch of a .png.")
 @click.option("--colormap", help="Colours of the fields, by matplotlib's names.")

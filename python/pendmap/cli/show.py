@@ -20,9 +20,7 @@ __all__ = ["plain", "progress_bar", "show"]
 
 
 @contextlib.contextmanager
-def progress_bar(
-    name: str, *, shown: bool
-) -> Iterator[Callable[[int, int], None] | None]:
+def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], None] | None]:
     """A bar with the time left, on stderr; ``None`` where it is not shown."""
     if not shown:
         yield None

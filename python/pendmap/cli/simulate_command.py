@@ -30,7 +30,7 @@ __all__ = ["command"]
 @click.option("--samples", type=click.IntRange(min=1), help="Samples a period.  [default: 64]")
 @click.option("--lyapunov", is_flag=True, help="Also the largest Lyapunov exponent.")
 @click.option("--quiet", is_flag=True, help="No summary.")
-@output_options()
+@output_options
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Integrate one trajectory: time history, phase plane, Poincaré section.
 

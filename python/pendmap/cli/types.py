@@ -27,7 +27,7 @@ def _number(text: str) -> float:
     return float(text)
 
 
-class _Number(click.ParamType):
+class _Number(click.ParamType[float]):
     name = "number"
 
     def convert(
@@ -47,10 +47,10 @@ class AxisText(NamedTuple):
 
     low: float
     high: float
-    count: int
+    cells: int
 
 
-class _Axis(click.ParamType):
+class _Axis(click.ParamType[AxisText]):
     name = "A:B:N"
 
     def convert(
@@ -73,7 +73,7 @@ class _Axis(click.ParamType):
         return AxisText(low, high, count)
 
 
-class OutputFile(click.ParamType):
+class OutputFile(click.ParamType[Path]):
     """A file to write: its suffix and folder are checked before anything is computed."""
 
     name = "file"
@@ -84,6 +84,7 @@ class OutputFile(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Path:
+        """Refuse what cannot be written."""
         path = Path(str(value))
         if path.suffix.lower() not in self.suffixes:
             allowed = ", ".join(self.suffixes)

@@ -170,7 +170,7 @@ def _scalar(  # noqa: PLR0913 (where to draw, what, and how)
         norm=norm,
     )
     if bar is not None:
-        style.colour_bar(bar, drawn, layering.unit(layer), extend, ticks)
+        style.colour_bar(bar, drawn, layering.unit(dataset, layer), extend, ticks)
 
 
 def _scale(
@@ -203,7 +203,7 @@ def _scale(
 
 def _log_ticks(low: float, high: float) -> list[float]:
     """Return ticks 1, 2, 5, 10, ... between the ends; more of them where these are close."""
-    for steps in ((1,), (1, 3), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9)):
+    for steps in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         ticks = [m * 10.0**k for k in powers for m in steps]
         inside = [t for t in ticks if low * 0.999 <= t <= high * 1.001]

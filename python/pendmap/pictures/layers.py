@@ -153,20 +153,29 @@ def what(dataset: xr.Dataset, layer: str) -> str:
     }[layer]
 
 
-def unit(layer: str) -> str:
-    """Return what a scalar layer counts, for a colour bar."""
+def unit(dataset: xr.Dataset, layer: str) -> str:
+    """Return what a scalar layer counts, for a colour bar; without drive a period is 2 pi."""
+    driven = float(dataset.attrs.get("p", 1.0)) != 0.0
     return {
-        "settle": "periods to settle",
+        "settle": "periods to settle"
+        if driven
+        else "periods of 2\N{GREEK SMALL LETTER PI} to settle",
         "turns": "net turns",
         "exponent": f"exponent per unit {_TAU}",
     }[layer]
 
 
 def parameters(attrs: Mapping[Any, Any]) -> str:
-    """Return the pendulum's parameters in one line; phase and torque only where they are not 0."""
-    always = ("gamma", "p", "omega")
+    """Return the pendulum's parameters in one line.
+
+    Phase and torque stand there only where they are not 0, and without drive, p = 0, there is no
+    frequency and no phase.
+    """
+    driven = float(attrs.get("p", 1.0)) != 0.0
+    always = ("gamma", "p", "omega") if driven else ("gamma", "p")
+    never = () if driven else ("omega", "phase")
     return ",  ".join(
         f"{symbol} = {float(attrs[key]):.6g}".replace("-", "\N{MINUS SIGN}")
         for key, symbol in _SYMBOLS.items()
-        if key in attrs and (key in always or float(attrs[key]) != 0.0)
+        if key in attrs and key not in never and (key in always or float(attrs[key]) != 0.0)
     )

@@ -50,7 +50,7 @@ def copies(points: Floats, low: float, high: float) -> Floats:
 
 def angle_ticks(low: float, high: float) -> Ticks:
     """Return places and labels of ticks at multiples of pi; plain numbers in a small window."""
-    for quarters in (1, 2, 4, 8, 16, 32, 64):
+    for quarters in (2**k for k in range(12)):
         step = quarters * math.pi / 4
         if FEWEST <= (high - low) / step <= MOST:
             first, last = _between(low, high, step)

@@ -53,7 +53,7 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
         rrb.TextDocumentView(origin="/summary", name="Summary"),
         row_shares=[1, 1],
     )
-    return frame.screen(rrb.Tabs(*tabs, active_tab=0), aside, shares=[5, 2])
+    return frame.screen(rrb.Tabs(*tabs, active_tab=0), aside, shares=[11, 5])
 
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:

@@ -32,7 +32,8 @@ TIMELINE = "sim_time"
 
 def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     """Return an empty recording, identified by the dataset's content."""
-    content = hashlib.blake2b(repr(sorted(dataset.attrs.items())).encode(), digest_size=12)
+    attrs = {str(k): v for k, v in dataset.attrs.items() if k not in ("seconds", "summary")}
+    content = hashlib.blake2b(repr(sorted(attrs.items())).encode(), digest_size=12)
     content.update(
         np.ascontiguousarray(dataset["label" if "label" in dataset else "theta"].values).data
     )
