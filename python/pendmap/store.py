@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import xarray as xr
 
 from pendmap.errors import InputError
-from pendmap.pictures.files import whole_file
+from pendmap.files import whole_file
 
 if TYPE_CHECKING:
     import os

@@ -1,6 +1,7 @@
 //! Trajectories run until an attractor has captured them: a lane that has finished takes the next
 //! start at a period's end.
 
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::trap::{Band, Ellipse};
@@ -122,9 +123,9 @@ impl Job for Capture<'_> {
 
 struct Block<'a> {
     job: Capture<'a>,
-    /// Ellipses in the coordinates of a lane: the kick instead of the velocity.
+    /// Ellipses in the coordinates of a lane: half turns and kick.
     scaled: Vec<Ellipse>,
-    theta: Buffer,
+    half_turns: Buffer,
     kick: Buffer,
     turns: Buffer,
     height: Buffer,
@@ -141,15 +142,15 @@ impl<'a> Block<'a> {
             .ellipses
             .iter()
             .map(|e| Ellipse {
-                centre: [e.centre[0], e.centre[1] * scale],
-                shape: [e.shape[0], e.shape[1] / scale, e.shape[2] / scale],
+                centre: [e.centre[0] * FRAC_1_PI, e.centre[1] * scale],
+                shape: [e.shape[0] * PI, e.shape[1] / scale, e.shape[2] / scale],
                 ..*e
             })
             .collect();
         Self {
             job,
             scaled,
-            theta: Buffer::default(),
+            half_turns: Buffer::default(),
             kick: Buffer::default(),
             turns: Buffer::default(),
             height: Buffer::default(),
@@ -189,19 +190,21 @@ impl<'a> Block<'a> {
     #[inline(always)]
     fn period<D: Degree, L: Lane>(&mut self, token: L::Token) -> f64 {
         let schedule = &self.job.strobe.schedule;
-        let mut lanes =
-            Moving { theta: L::load(token, &self.theta.0), kick: L::load(token, &self.kick.0) };
+        let mut lanes = Moving {
+            half_turns: L::load(token, &self.half_turns.0),
+            kick: L::load(token, &self.kick.0),
+        };
         lanes.run::<D>(schedule);
-        let (theta, whole) = wrap(lanes.theta);
+        let (half_turns, whole) = wrap(lanes.half_turns);
         let mut height = L::splat(token, f64::INFINITY);
         for e in &self.scaled {
-            let x = theta - theta.like(e.centre[0]);
-            let y = lanes.kick - theta.like(e.centre[1]);
+            let x = half_turns - half_turns.like(e.centre[0]);
+            let y = lanes.kick - half_turns.like(e.centre[1]);
             let y1 = x.scale_add(e.shape[0], y.scale(e.shape[1]));
             let y2 = y.scale(e.shape[2]);
             height = y1.mul_add(y1, y2 * y2).min(height);
         }
-        theta.store(&mut self.theta.0);
+        half_turns.store(&mut self.half_turns.0);
         lanes.kick.store(&mut self.kick.0);
         (L::load(token, &self.turns.0) + whole).store(&mut self.turns.0);
         height.store(&mut self.height.0);
@@ -215,10 +218,10 @@ impl<'a> Block<'a> {
     fn refill(&mut self, lane: usize) -> bool {
         let Some((index, [theta, velocity])) = self.job.source.next() else {
             self.tenants[lane] = None;
-            (self.theta.0[lane], self.kick.0[lane]) = (0.0, 0.0);
+            (self.half_turns.0[lane], self.kick.0[lane]) = (0.0, 0.0);
             return false;
         };
-        self.theta.0[lane] = theta;
+        self.half_turns.0[lane] = theta * FRAC_1_PI;
         self.kick.0[lane] = velocity * self.job.strobe.schedule.kick;
         self.turns.0[lane] = 0.0;
         self.tenants[lane] =
@@ -229,11 +232,11 @@ impl<'a> Block<'a> {
 
     /// The trap that holds `lane`, as attractor and point.
     fn trap(&self, lane: usize) -> Option<(usize, usize)> {
-        let state = [self.theta.0[lane], self.kick.0[lane]];
+        let state = [self.half_turns.0[lane], self.kick.0[lane]];
         if let Some(e) = self.scaled.iter().find(|e| e.height(state) < 1.0) {
             return Some((e.attractor, e.point));
         }
-        let state = [state[0], state[1] / self.job.strobe.schedule.kick];
+        let state = [self.theta(lane), self.velocity(lane)];
         self.job.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0))
     }
 
@@ -258,7 +261,7 @@ impl<'a> Block<'a> {
             point,
             clock: self.clock,
             turns: self.turns.0[lane],
-            theta: self.theta.0[lane],
+            theta: self.theta(lane),
             velocity: self.velocity(lane),
         });
         self.tenants[lane] = Some(tenant);
@@ -277,13 +280,17 @@ impl<'a> Block<'a> {
         after == (before + 1) % count
     }
 
+    fn theta(&self, lane: usize) -> f64 {
+        self.half_turns.0[lane] * PI
+    }
+
     fn velocity(&self, lane: usize) -> f64 {
         self.kick.0[lane] / self.job.strobe.schedule.kick
     }
 
     fn hand_over(&mut self, tenant: Tenant, fate: Fate, end: (f64, f64, f64, u64)) {
         let (theta, velocity, turns, clock) = end;
-        let whole = turns + (theta - tenant.first_theta) / std::f64::consts::TAU;
+        let whole = turns + (theta - tenant.first_theta) / TAU;
         let outcome = Outcome {
             fate,
             periods: (clock - tenant.born) as u32,
@@ -307,7 +314,7 @@ impl<'a> Block<'a> {
                 self.next_expiry = self.next_expiry.min(expiry);
                 continue;
             }
-            let (theta, velocity) = (self.theta.0[lane], self.velocity(lane));
+            let (theta, velocity) = (self.theta(lane), self.velocity(lane));
             let finite = theta.is_finite() && velocity.is_finite() && velocity.abs() < 1e6;
             let fate = if finite { Fate::Open } else { Fate::Failed };
             self.hand_over(tenant, fate, (theta, velocity, self.turns.0[lane], self.clock));

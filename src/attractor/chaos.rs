@@ -240,7 +240,7 @@ fn turns_over_the_top(strobe: &Strobe, members: &[&Walk]) -> (Kind, i64) {
         for _ in 0..WATCHED {
             for loads in schedule.steps() {
                 moving.step::<Fine>(loads, schedule.decay);
-                let now = well(moving.theta);
+                let now = well(moving.theta());
                 if now != last {
                     let sense = (now - last).signum();
                     // Over the top and back again at once is no turn; twice in one sense is.

@@ -1,5 +1,7 @@
 //! How many steps a period a tolerance asks for.
 
+use std::f64::consts::TAU;
+
 use super::stroboscopic::{State, Strobe};
 use crate::error::Error;
 use crate::lanes::Path;
@@ -43,7 +45,7 @@ pub fn distance(a: State, b: State) -> f64 {
 /// The angle in [-pi, pi].
 #[must_use]
 pub fn wrapped(angle: f64) -> f64 {
-    crate::lanes::sine::wrap(angle).0
+    angle - TAU * (angle / TAU).round()
 }
 
 fn after(strobe: &Strobe, starts: &[State]) -> Vec<State> {

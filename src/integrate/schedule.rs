@@ -4,13 +4,16 @@
 //! `u = (1 - exp(-gamma s)) / gamma` and `w = th' exp(gamma s)`,
 //! `d th / du = w`, `d w / du = exp(2 gamma s) (torque - modulation sin th)`:
 //! no velocity on the right, so a Runge-Kutta-Nystrom method applies exactly. The factors
-//! `h_u^2 exp(2 gamma s)` of each stage go into the table, and the trajectory carries
-//! `kick = h_u th'`, so that a step has no other products than the method's own.
+//! `h_u^2 exp(2 gamma s)` of each stage go into the table, and the trajectory carries its angle in
+//! half turns, `x = th / pi`, and `kick = h_u x'`, so that a step has no other products than the
+//! method's own.
+
+use std::f64::consts::FRAC_1_PI;
 
 use super::tableau::{C, STAGES};
 use crate::model::Pendulum;
 
-/// One step's loads, stage by stage, each times `h_u^2 exp(2 gamma s)`.
+/// One step's loads, stage by stage, each times `h_u^2 exp(2 gamma s) / pi`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StageLoads {
     /// `1 + p cos(omega tau + phase)` at the stage.
@@ -25,7 +28,7 @@ pub struct Schedule {
     steps: Vec<StageLoads>,
     /// `exp(-gamma h)`: back from `w` to the velocity at a step's end.
     pub decay: f64,
-    /// `h_u`: the velocity times this is the kick that a trajectory carries.
+    /// `h_u / pi`: the velocity times this is the kick that a trajectory carries.
     pub kick: f64,
     duration: f64,
 }
@@ -36,22 +39,23 @@ impl Schedule {
     pub fn new(pendulum: &Pendulum, tau: f64, duration: f64, steps: usize) -> Self {
         let gamma = pendulum.gamma;
         let h = duration / steps as f64;
-        let kick = if gamma == 0.0 { h } else { -(-gamma * h).exp_m1() / gamma };
+        // The step in the folded time u.
+        let folded = if gamma == 0.0 { h } else { -(-gamma * h).exp_m1() / gamma };
         let stage_time =
-            C.map(|c| if gamma == 0.0 { c * h } else { -(-gamma * c * kick).ln_1p() / gamma });
+            C.map(|c| if gamma == 0.0 { c * h } else { -(-gamma * c * folded).ln_1p() / gamma });
         let table = (0..steps)
             .map(|k| {
                 let start = tau + duration * (k as f64 / steps as f64);
                 let mut loads = StageLoads::default();
                 for (i, s) in stage_time.into_iter().enumerate() {
-                    let factor = kick * kick * (2.0 * gamma * s).exp();
+                    let factor = folded * folded * (2.0 * gamma * s).exp() * FRAC_1_PI;
                     loads.modulation[i] = factor * pendulum.drive.modulation(start + s);
                     loads.torque[i] = factor * pendulum.torque;
                 }
                 loads
             })
             .collect();
-        Self { steps: table, decay: (-gamma * h).exp(), kick, duration }
+        Self { steps: table, decay: (-gamma * h).exp(), kick: folded * FRAC_1_PI, duration }
     }
 
     /// `steps` equal steps over the forcing period that starts at `tau = 0`.

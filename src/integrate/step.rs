@@ -1,26 +1,36 @@
 //! One step of the Runge-Kutta-Nystrom method, for any number type.
 
+use std::f64::consts::{FRAC_1_PI, PI};
+
 use super::schedule::{Schedule, StageLoads};
 use super::tableau::{A, B, BP, C, STAGES};
 use crate::lanes::Real;
 use crate::lanes::sine::Degree;
 use crate::model::pendulum::conservative_load;
 
-/// A trajectory within a schedule: the angle, and the velocity times the schedule's `kick`.
+/// A trajectory within a schedule: the angle in half turns, and the velocity times the schedule's
+/// `kick`.
 #[derive(Clone, Copy, Debug)]
 pub struct Moving<R> {
-    /// The angle, rad.
-    pub theta: R,
-    /// `h_u th'`.
+    /// The angle over pi.
+    pub half_turns: R,
+    /// `h_u th' / pi`.
     pub kick: R,
 }
 
 impl<R: Real> Moving<R> {
-    /// From angle and velocity.
+    /// From the angle in rad and the velocity.
     #[inline(always)]
     #[must_use]
     pub fn new(schedule: &Schedule, theta: R, velocity: R) -> Self {
-        Self { theta, kick: velocity.scale(schedule.kick) }
+        Self { half_turns: theta.scale(FRAC_1_PI), kick: velocity.scale(schedule.kick) }
+    }
+
+    /// The angle, rad.
+    #[inline(always)]
+    #[must_use]
+    pub fn theta(&self) -> R {
+        self.half_turns.scale(PI)
     }
 
     /// The velocity `th'`.
@@ -33,11 +43,11 @@ impl<R: Real> Moving<R> {
     /// One step.
     #[inline(always)]
     pub fn step<D: Degree>(&mut self, loads: &StageLoads, decay: f64) {
-        let Self { theta, kick } = *self;
+        let Self { half_turns, kick } = *self;
         let mut k =
-            [conservative_load::<D, R>(loads.modulation[0], loads.torque[0], theta); STAGES];
+            [conservative_load::<D, R>(loads.modulation[0], loads.torque[0], half_turns); STAGES];
         for i in 1..STAGES {
-            let mut at = kick.scale_add(C[i], theta);
+            let mut at = kick.scale_add(C[i], half_turns);
             for j in 0..i {
                 if A[i][j] != 0.0 {
                     at = k[j].scale_add(A[i][j], at);
@@ -45,7 +55,7 @@ impl<R: Real> Moving<R> {
             }
             k[i] = conservative_load::<D, R>(loads.modulation[i], loads.torque[i], at);
         }
-        let mut position = theta + kick;
+        let mut position = half_turns + kick;
         let mut speed = kick;
         for i in 0..STAGES {
             if B[i] != 0.0 {
@@ -55,7 +65,7 @@ impl<R: Real> Moving<R> {
                 speed = k[i].scale_add(BP[i], speed);
             }
         }
-        *self = Self { theta: position, kick: speed.scale(decay) };
+        *self = Self { half_turns: position, kick: speed.scale(decay) };
     }
 
     /// All steps of the schedule.

@@ -6,7 +6,7 @@ use super::step::Moving;
 use super::tangent::Tangent;
 use crate::error::Error;
 use crate::lanes::sine::{Coarse, Degree, Fine, wrap};
-use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, Path, dispatch};
+use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, Path, Real, dispatch};
 use crate::model::Pendulum;
 
 /// Angle and velocity, `[theta, th']`.
@@ -169,11 +169,11 @@ impl Advance<'_> {
             let mut count = L::load(token, &turns.0);
             for _ in 0..self.periods {
                 lanes.run::<D>(schedule);
-                let (wrapped, whole) = wrap(lanes.theta);
-                lanes.theta = wrapped;
+                let (wrapped, whole) = wrap(lanes.half_turns);
+                lanes.half_turns = wrapped;
                 count = count + whole;
             }
-            lanes.theta.store(&mut theta.0);
+            lanes.theta().store(&mut theta.0);
             lanes.velocity(schedule).store(&mut velocity.0);
             count.store(&mut turns.0);
             a.copy_from_slice(&theta.0[..a.len()]);
@@ -245,12 +245,12 @@ impl Job for Stretch<'_> {
                 let mut lanes = Moving::new(schedule, theta, velocity);
                 lanes.run::<Fine>(schedule);
                 let velocity = lanes.velocity(schedule);
-                let (wrapped, whole) = wrap(lanes.theta.value);
+                let (wrapped, whole) = wrap(lanes.half_turns.value);
                 let turns = S::Lanes::load(isa, &buffers[2].0) + whole;
-                wrapped.store(&mut buffers[0].0);
+                wrapped.scale(std::f64::consts::PI).store(&mut buffers[0].0);
                 velocity.value.store(&mut buffers[1].0);
                 turns.store(&mut buffers[2].0);
-                lanes.theta.slope[0].store(&mut buffers[3].0);
+                lanes.theta().slope[0].store(&mut buffers[3].0);
                 velocity.slope[0].store(&mut buffers[4].0);
                 for lane in 0..part.len() {
                     let length = buffers[3].0[lane].hypot(buffers[4].0[lane]);

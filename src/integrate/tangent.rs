@@ -95,9 +95,10 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
 
     #[inline(always)]
     fn sine<D: Degree>(mut self) -> Self {
-        let cosine = self.value.cosine::<D>();
+        // d sin(pi x) = pi cos(pi x) dx.
+        let slope_of_sine = self.value.cosine::<D>().scale(std::f64::consts::PI);
         for slope in &mut self.slope {
-            *slope = *slope * cosine;
+            *slope = *slope * slope_of_sine;
         }
         self.value = self.value.sine::<D>();
         self

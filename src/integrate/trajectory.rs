@@ -186,7 +186,7 @@ fn advance(schedule: &Schedule, state: &mut State, tangent: &mut [f64; 2], grow:
     if !grow {
         let mut moving = Moving::new(schedule, state[0], state[1]);
         moving.run::<Fine>(schedule);
-        *state = [moving.theta, moving.velocity(schedule)];
+        *state = [moving.theta(), moving.velocity(schedule)];
         return 0.0;
     }
     let theta = Tangent { value: state[0], slope: [tangent[0]] };
@@ -194,8 +194,9 @@ fn advance(schedule: &Schedule, state: &mut State, tangent: &mut [f64; 2], grow:
     let mut moving = Moving::new(schedule, theta, velocity);
     moving.run::<Fine>(schedule);
     let velocity = moving.velocity(schedule);
-    *state = [moving.theta.value, velocity.value];
-    let grown = [moving.theta.slope[0], velocity.slope[0]];
+    let theta = moving.theta();
+    *state = [theta.value, velocity.value];
+    let grown = [theta.slope[0], velocity.slope[0]];
     let length = grown[0].hypot(grown[1]);
     *tangent = [grown[0] / length, grown[1] / length];
     length.ln()

@@ -21,7 +21,7 @@ pub trait Real:
     /// `self * factor`.
     #[must_use]
     fn scale(self, factor: f64) -> Self;
-    /// The sine, to the precision of `D`.
+    /// `sin(pi self)`, to the precision of `D`: the angle is in half turns.
     #[must_use]
     fn sine<D: Degree>(self) -> Self;
 }
@@ -54,7 +54,7 @@ pub trait Lane: Real {
     #[must_use]
     fn flip_where_odd(self, count: Self) -> Self;
 
-    /// The cosine, to the precision of `D`.
+    /// `cos(pi self)`, to the precision of `D`: the angle is in half turns.
     #[inline(always)]
     #[must_use]
     fn cosine<D: Degree>(self) -> Self {

@@ -4,6 +4,8 @@
 //! `tau = w0 t`, `gamma = c / (m w0)`: eq. 1.2 of Horton, Wiercigroch & Xu (2008) with a constant
 //! torque (over `m l^2 w0^2`) on the right.
 
+use std::f64::consts::FRAC_1_PI;
+
 use super::drive::HarmonicDrive;
 use crate::error::Error;
 use crate::lanes::sine::Degree;
@@ -66,16 +68,16 @@ impl Pendulum {
         let load = conservative_load::<crate::lanes::sine::Fine, L>(
             self.drive.modulation(tau),
             self.torque,
-            theta,
+            theta.scale(FRAC_1_PI),
         );
         velocity.scale_add(-self.gamma, load)
     }
 }
 
-/// What acts besides the viscous damping: `torque - modulation sin th`.
+/// What acts besides the viscous damping: `torque - modulation sin(pi half_turns)`.
 ///
-/// Linear in `modulation` and `torque`, so that an integrator may put its own factor into both.
+/// The angle is in half turns, as the kernel counts it (see [`crate::lanes::sine`]). Linear in `modulation` and `torque`, so that an integrator may put its own factor into both.
 #[inline(always)]
-pub fn conservative_load<D: Degree, R: Real>(modulation: f64, torque: f64, theta: R) -> R {
-    theta.sine::<D>().affine(-modulation, torque)
+pub fn conservative_load<D: Degree, R: Real>(modulation: f64, torque: f64, half_turns: R) -> R {
+    half_turns.sine::<D>().affine(-modulation, torque)
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::tangent::Tangent;
 use crate::integrate::{Moving, Schedule, State};
-use crate::lanes::sine::Fine;
+use crate::lanes::sine::{Fine, wrap};
 use crate::model::Pendulum;
 
 /// A step short enough for errors near 1e-15 a period: the method's error falls as the eighth
@@ -73,11 +73,11 @@ pub fn flow(schedule: &Schedule, state: State) -> Image {
     let mut moving = Moving::new(schedule, seed(0), seed(1));
     moving.run::<Fine>(schedule);
     let velocity = moving.velocity(schedule);
-    let theta = moving.theta;
-    let angle = wrapped(theta.value);
+    let theta = moving.theta();
+    let (half_turns, turns) = wrap(moving.half_turns.value);
     Image {
-        state: [angle, velocity.value],
-        turns: ((theta.value - angle) / std::f64::consts::TAU).round() as i64,
+        state: [half_turns * std::f64::consts::PI, velocity.value],
+        turns: turns as i64,
         derivative: Matrix2::new(
             theta.slope[0],
             theta.slope[1],

@@ -36,7 +36,9 @@ struct Turn {
 fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Option<Turn> {
     let sense = velocity.signum();
     let goal = sense * TAU;
-    let step = Schedule::new(pendulum, 0.0, STEP, 1);
+    // A tenth of a rad at the most, however fast.
+    let length = STEP.min(0.1 / velocity.abs());
+    let step = Schedule::new(pendulum, 0.0, length, 1);
     let (mut angle, mut time) = (0.0, 0.0);
     let mut image =
         Image { state: [0.0, velocity], turns: 0, derivative: nalgebra::Matrix2::identity() };
@@ -50,7 +52,7 @@ fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Opt
         }
         if next_angle * sense >= TAU {
             // The remainder of the step, by Newton's method on its length.
-            let mut rest = STEP * (goal - angle) / (next_angle - angle);
+            let mut rest = length * (goal - angle) / (next_angle - angle);
             let mut end = next;
             for _ in 0..20 {
                 end = flow(&Schedule::new(pendulum, 0.0, rest, 1), [angle, image.state[1]]);
@@ -68,7 +70,7 @@ fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Opt
         }
         image = Image { state: next.state, turns: 0, derivative };
         angle = next_angle;
-        time += STEP;
+        time += length;
     }
     None
 }

@@ -137,7 +137,9 @@ fn symmetry_breaking_makes_two_of_one() {
     assert!(one.is_stable() && one.n == 2 && one.w == 0);
     let other = find_at(p + 0.01, mirror(one.points[0]));
     assert!(other.is_stable() && !other.contains(one.points[0], 1e-2));
-    assert!(other.contains(mirror(one.points[0]), 1e-9) && other.contains(mirror(one.points[1]), 1e-9));
+    assert!(
+        other.contains(mirror(one.points[0]), 1e-9) && other.contains(mirror(one.points[1]), 1e-9)
+    );
 }
 
 #[test]

@@ -30,7 +30,9 @@ fn tumbling_chaos_takes_everything_at_the_three_points_of_figure_2() {
         let map = basins_on_plane(&driven(0.1, p, omega), 40);
         let chaos = only_chaos(&map);
         // The points lie on it: none is captured by anything, and both senses are there.
-        assert!(chaos.points.iter().any(|s| s[1] > 0.5) && chaos.points.iter().any(|s| s[1] < -0.5));
+        assert!(
+            chaos.points.iter().any(|s| s[1] > 0.5) && chaos.points.iter().any(|s| s[1] < -0.5)
+        );
         assert!((map.fractions[0] - 1.0).abs() < 1e-12);
         // Labels tell nothing, so the layers do.
         let layers = map.layers.as_ref().expect("layers");

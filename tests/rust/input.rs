@@ -22,9 +22,8 @@ fn refusal<T>(result: Result<T, Error>) -> String {
 
 #[test]
 fn pendulums() {
-    let make = |gamma, p, omega, phase, torque| {
-        refusal(Pendulum::new(gamma, p, omega, phase, torque))
-    };
+    let make =
+        |gamma, p, omega, phase, torque| refusal(Pendulum::new(gamma, p, omega, phase, torque));
     let (nan, inf) = (f64::NAN, f64::INFINITY);
     assert_eq!(make(-0.1, 1.0, 2.0, 0.0, 0.0), "gamma is -0.1: allowed is 0 or more");
     assert_eq!(make(nan, 1.0, 2.0, 0.0, 0.0), "gamma is NaN: allowed is 0 or more");
@@ -36,7 +35,10 @@ fn pendulums() {
     assert_eq!(make(0.1, 1.0, nan, 0.0, 0.0), "omega is NaN: allowed is a number above 0");
     assert_eq!(make(0.1, 1.0, 2.0, inf, 0.0), "phase is inf: allowed is any finite number");
     assert_eq!(make(0.1, 1.0, 2.0, 0.0, nan), "torque is NaN: allowed is any finite number");
-    assert!(HarmonicDrive::new(1.0, 2.0, 0.0).is_ok() && Pendulum::new(0.0, -1.0, 2.0, 9.0, -3.0).is_ok());
+    assert!(
+        HarmonicDrive::new(1.0, 2.0, 0.0).is_ok()
+            && Pendulum::new(0.0, -1.0, 2.0, 9.0, -3.0).is_ok()
+    );
 }
 
 #[test]

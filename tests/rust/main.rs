@@ -5,7 +5,7 @@
 //! - [`sine`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
-//! - [`maps`]: whole planes
+//! - [`maps`], [`layers`]: whole planes
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
@@ -16,6 +16,7 @@ mod chaos;
 mod exact;
 mod input;
 mod lanes;
+mod layers;
 mod maps;
 mod orbits;
 mod order;

@@ -1,1 +1,322 @@
-//! maps
+//! Whole planes: what must not change a map, and how its parts hang together.
+
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use pendmap::attractor::Catalogue;
+use pendmap::error::Error;
+use pendmap::integrate::accuracy::{choose, distance};
+use pendmap::integrate::trajectory::{Request, simulate};
+use pendmap::integrate::{State, Strobe};
+use pendmap::lanes::Path;
+use pendmap::maps::advance::advance;
+use pendmap::maps::basins::{BasinMap, Options, basins};
+use pendmap::maps::control::{Control, pool};
+use pendmap::maps::label::{FAILED, Labels, NEVER, UNDECIDED, label};
+use pendmap::maps::layers::finite_time;
+use pendmap::maps::starts::{Axis, Starts};
+use pendmap::model::Pendulum;
+use pendmap::orbit::PoincareMap;
+
+use crate::support::{basins_on_plane, bits, columns, driven, path, paths, plane, spread};
+
+fn unchecked() -> Options {
+    Options { check: false, ..Options::default() }
+}
+
+/// The step, attractors and labels of a plane on a chosen path.
+fn labelled(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Catalogue, Labels) {
+    let sample = starts.sampled_states(400, 0);
+    let (strobe, _) = choose(pendulum, &sample, 1e-6, path).expect("steps");
+    let mut catalogue = Catalogue::new(&strobe);
+    catalogue.search(&strobe, &sample, 1000, &AtomicBool::new(false));
+    let labels = relabelled(&strobe, &catalogue, starts, None);
+    (strobe, catalogue, labels)
+}
+
+fn relabelled(
+    strobe: &Strobe,
+    catalogue: &Catalogue,
+    starts: &Starts,
+    picks: Option<&[usize]>,
+) -> Labels {
+    let pool = pool(1).expect("a pool");
+    label(strobe, catalogue, starts, picks, 4000, &pool, &Control::default()).expect("labels")
+}
+
+/// The name of every cell's attractor.
+fn names(map: &BasinMap) -> Vec<&str> {
+    let name = |label: &i16| {
+        usize::try_from(label - 1).ok().map_or("none", |i| map.attractors[i].name.as_str())
+    };
+    map.labels.label.iter().map(name).collect()
+}
+
+fn assert_same(a: &Labels, b: &Labels, what: &str) {
+    assert_eq!(a.label, b.label, "labels: {what}");
+    assert_eq!(a.settle, b.settle, "settling times: {what}");
+    assert_eq!(a.turns, b.turns, "turns: {what}");
+    assert_eq!(a.open.len(), b.open.len(), "open starts: {what}");
+    for ((i, x), (j, y)) in a.open.iter().zip(&b.open) {
+        assert!(i == j && bits(x) == bits(y), "open start {i}: {what}");
+    }
+    assert_eq!(a.work, b.work, "work: {what}");
+}
+
+#[test]
+fn threads_do_not_show() {
+    let quasiperiodic = Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range");
+    let cases = [
+        ("periodic", driven(0.1, 1.0, 2.0)),
+        ("slow", driven(0.1, 1.8, 2.0)),
+        ("only chaos", driven(0.1, 1.5, 1.8)),
+        ("chaos and others", driven(0.1, 1.52, 1.1)),
+        ("conservative", driven(0.0, 0.5, 2.0)),
+        ("quasiperiodic", quasiperiodic),
+    ];
+    for (what, pendulum) in cases {
+        let [a, b] = [1, 2].map(|threads| {
+            let options = Options { threads, ..unchecked() };
+            basins(&pendulum, &plane(40), &options, &Control::default()).expect("a map")
+        });
+        assert_same(&a.labels, &b.labels, what);
+        assert_eq!(bits(&a.fractions), bits(&b.fractions), "{what}");
+        assert_eq!(names(&a), names(&b), "{what}");
+        let layers = |map: &BasinMap| {
+            map.layers.as_ref().map(|l| {
+                (l.turns.clone(), l.exponent.iter().map(|e| e.to_bits()).collect::<Vec<_>>())
+            })
+        };
+        assert_eq!(layers(&a), layers(&b), "{what}");
+    }
+}
+
+#[test]
+fn threads_do_not_show_in_plain_integration() {
+    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, path());
+    let states = spread(3000, 3.1, 3.0);
+    let [a, b] = [1, 2].map(|threads| {
+        let (mut theta, mut velocity) = columns(&states);
+        let turns = advance(&strobe, &mut theta, &mut velocity, 100, threads, &Control::default());
+        (bits(&theta), bits(&velocity), turns.expect("turns"))
+    });
+    assert_eq!(a, b);
+}
+
+#[test]
+fn a_list_of_starts_is_the_same_cells() {
+    let starts = plane(30);
+    let list = Starts::List((0..starts.len()).map(|i| starts.get(i)).collect());
+    for p in [0.6, 1.0] {
+        let (strobe, catalogue, labels) = labelled(&driven(0.1, p, 2.0), &starts, path());
+        assert_same(&labels, &relabelled(&strobe, &catalogue, &list, None), "list");
+        // And so is a part of them, in any order.
+        let picks: Vec<usize> = (0..900).rev().step_by(7).collect();
+        let part = relabelled(&strobe, &catalogue, &starts, Some(&picks));
+        for (k, i) in picks.iter().enumerate() {
+            assert_eq!(part.label[k], labels.label[*i]);
+            assert_eq!((part.settle[k], part.turns[k]), (labels.settle[*i], labels.turns[*i]));
+        }
+    }
+}
+
+#[test]
+fn a_part_of_the_plane_has_the_labels_of_the_whole_by_name() {
+    let pendulum = driven(0.1, 0.6, 2.0);
+    let whole = basins_on_plane(&pendulum, 60);
+    // Columns 20 to 49 and rows 5 to 24 of 60.
+    let edge = |low: f64, high: f64, i: f64| low + (high - low) * i / 60.0;
+    let pi = std::f64::consts::PI;
+    let axis = |name, low, high, count| Axis::new(name, low, high, count).expect("an axis");
+    let part = Starts::Grid {
+        theta: axis("theta", edge(-pi, pi, 20.0), edge(-pi, pi, 50.0), 30),
+        velocity: axis("velocity", edge(-3.0, 3.0, 5.0), edge(-3.0, 3.0, 25.0), 20),
+    };
+    let small = basins(&pendulum, &part, &unchecked(), &Control::default()).expect("a map");
+    let (all, some) = (names(&whole), names(&small));
+    for (k, name) in some.iter().enumerate() {
+        let (column, row) = (k % 30 + 20, k / 30 + 5);
+        assert_eq!(*name, all[row * 60 + column], "column {column}, row {row}");
+    }
+}
+
+#[test]
+fn the_tolerance_does_not_change_smooth_basins() {
+    let pendulum = driven(0.1, 0.6, 2.0);
+    let [rough, exact] = [1e-6, 1e-11].map(|tol| {
+        let options = Options { tol, ..unchecked() };
+        basins(&pendulum, &plane(100), &options, &Control::default()).expect("a map")
+    });
+    assert!(rough.steps * 3 < exact.steps && exact.reached_error <= 1e-11);
+    assert_eq!(names(&rough), names(&exact));
+}
+
+#[test]
+fn parts_of_a_map_agree() {
+    for pendulum in [driven(0.1, 1.0, 2.0), driven(0.1, 1.8, 2.0), driven(0.1, 1.52, 1.1)] {
+        let map = basins_on_plane(&pendulum, 40);
+        let labels = &map.labels;
+        let count = |label: i16| labels.label.iter().filter(|l| **l == label).count();
+        let last = map.attractors.len() as i16;
+        let all: usize = (FAILED..=last).map(count).sum();
+        assert_eq!(all, 1600, "labels lie between {FAILED} and {last}");
+        for (i, fraction) in map.fractions.iter().enumerate() {
+            assert!((fraction * 1600.0 - count(i as i16 + 1) as f64).abs() < 1e-9);
+            assert!(*fraction > 0.0, "an attractor that is listed has starts");
+        }
+        assert_eq!(labels.open.len(), count(UNDECIDED));
+        assert!(labels.open.iter().all(|(i, _)| labels.label[*i] == UNDECIDED));
+        for (label, settle) in labels.label.iter().zip(&labels.settle) {
+            let settles =
+                usize::try_from(label - 1).is_ok_and(|i| !map.attractors[i].kind.is_chaotic());
+            assert_eq!(*settle == NEVER, !settles, "label {label} settles at {settle}");
+        }
+        assert!(labels.work >= labels.settle.iter().map(|s| (*s).max(0) as u64).sum::<u64>());
+    }
+}
+
+#[test]
+fn settling_times_and_turns_are_those_of_the_trajectory() {
+    let pendulum = driven(0.1, 0.6, 2.0);
+    let starts = plane(40);
+    let (_, catalogue, labels) = labelled(&pendulum, &starts, path());
+    for i in starts.sample(60, 3) {
+        let periods = f64::from(labels.settle[i]);
+        let until = periods * pendulum.period();
+        let start = starts.get(i);
+        let request = Request { start, until, tol: 1e-9, samples: 1, lyapunov: false };
+        let run = simulate(&pendulum, &request, &AtomicBool::new(false)).expect("a trajectory");
+        let last = run.theta.len() - 1;
+        let end = [run.theta[last], run.velocity[last]];
+        let net = ((end[0] - start[0]) / std::f64::consts::TAU).round();
+        assert!((net - f64::from(labels.turns[i])).abs() < 0.5, "start {i}: {net} turns");
+        let attractor = &catalogue.attractors[labels.label[i] as usize - 1];
+        let off = attractor.points.iter().map(|p| distance(*p, end)).fold(9.0, f64::min);
+        assert!(off < 1.0, "start {i} has come to within {off} of {}", attractor.name);
+        // And from there it goes where the label says.
+        let map = PoincareMap::new(&pendulum);
+        let settled = map.iterate(end, 200).state;
+        assert!(attractor.points.iter().any(|p| distance(*p, settled) < 1e-8), "start {i}");
+    }
+}
+
+#[test]
+fn every_path_gives_the_same_fractions() {
+    for (p, allowed) in [(0.6, 0.0), (1.0, 0.015)] {
+        let (pendulum, starts) = (driven(0.1, p, 2.0), plane(60));
+        let (_, reference, expected) = labelled(&pendulum, &starts, Path::Portable);
+        for path in paths() {
+            let (_, catalogue, labels) = labelled(&pendulum, &starts, path);
+            assert_eq!(catalogue.attractors.len(), reference.attractors.len());
+            for (i, attractor) in catalogue.attractors.iter().enumerate() {
+                assert_eq!(attractor.name, reference.attractors[i].name);
+                let share = |labels: &Labels| {
+                    let own = labels.label.iter().filter(|l| **l == i as i16 + 1).count();
+                    own as f64 / 3600.0
+                };
+                let moved = (share(&labels) - share(&expected)).abs();
+                assert!(moved <= allowed, "{} at p = {p} on {path}: {moved}", attractor.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn avx512_and_avx2_give_the_same_map() {
+    let both = [Path::Avx512, Path::Avx2];
+    if !both.iter().all(|path| path.available()) {
+        eprintln!("skipped: this processor lacks one of them");
+        return;
+    }
+    let [a, b] = both.map(|path| labelled(&driven(0.1, 1.34, 2.0), &plane(50), path));
+    assert_same(&a.2, &b.2, "two widths");
+    assert_eq!(a.0.steps(), b.0.steps());
+}
+
+#[test]
+fn a_cancelled_map_stops() {
+    for p in [1.0, 1.8] {
+        let control = Control::default();
+        control.cancel();
+        let map = basins(&driven(0.1, p, 2.0), &plane(40), &unchecked(), &control);
+        assert_eq!(map.err(), Some(Error::Interrupted));
+    }
+    let control = Control::default();
+    control.cancel();
+    let strobe = Strobe::new(&driven(0.0, 1.0, 2.0), 12, path());
+    let layers = finite_time(&strobe, &plane(40), 10, &pool(1).expect("a pool"), &control);
+    assert_eq!(layers.err(), Some(Error::Interrupted));
+    let mut theta = vec![0.0; 10];
+    let mut velocity = vec![1.0; 10];
+    let ends = advance(&strobe, &mut theta, &mut velocity, 10, 1, &control);
+    assert_eq!(ends.err(), Some(Error::Interrupted));
+}
+
+#[test]
+fn cancelling_works_while_a_map_is_made() {
+    // Seconds of work: chaos, search, labels, layers in turn.
+    for (p, omega, size) in [(1.8, 2.0, 2000), (1.7, 0.87, 3000), (1.0, 2.0, 4000)] {
+        let control = Control::default();
+        let (result, late) = std::thread::scope(|scope| {
+            let work = scope.spawn(|| {
+                let made = basins(&driven(0.1, p, omega), &plane(size), &unchecked(), &control);
+                (made.map(|_| ()), Instant::now())
+            });
+            std::thread::sleep(Duration::from_millis(300));
+            let asked = Instant::now();
+            control.cancel();
+            let (result, ended) = work.join().expect("no panic");
+            (result, ended.saturating_duration_since(asked))
+        });
+        assert_eq!(result, Err(Error::Interrupted), "p = {p}");
+        assert!(late < Duration::from_secs(1), "p = {p}: {late:?} after Ctrl-C");
+    }
+}
+
+#[test]
+fn progress_ends_at_the_number_of_cells() {
+    for p in [0.6, 1.5] {
+        let control = Control::default();
+        let omega = if p > 1.0 { 1.8 } else { 2.0 };
+        basins(&driven(0.1, p, omega), &plane(30), &unchecked(), &control).expect("a map");
+        assert_eq!(control.progress(), (900, 900));
+    }
+}
+
+#[test]
+fn a_start_that_fails_is_a_status_and_the_others_do_not_see_it() {
+    let mut states: Vec<State> = spread(60, 3.0, 2.5);
+    let pendulum = driven(0.1, 0.6, 2.0);
+    let options = Options { max_periods: Some(400), ..unchecked() };
+    let go = |states: &[State]| {
+        let starts = Starts::List(states.to_vec());
+        basins(&pendulum, &starts, &options, &Control::default()).expect("a map")
+    };
+    let sound = go(&states);
+    states[17] = [f64::NAN, 0.0];
+    let map = go(&states);
+    assert_eq!((map.labels.label[17], map.labels.settle[17]), (FAILED, NEVER));
+    assert!((map.share(FAILED) - 1.0 / 60.0).abs() < 1e-12);
+    for i in (0..60).filter(|i| *i != 17) {
+        assert_eq!(names(&map)[i], names(&sound)[i], "start {i}");
+    }
+}
+
+#[test]
+fn a_short_bound_leaves_starts_undecided() {
+    for p in [1.0, 1.8] {
+        for bound in [12, 60, 300] {
+            let options = Options { max_periods: Some(bound), ..unchecked() };
+            let map = basins(&driven(0.1, p, 2.0), &plane(40), &options, &Control::default());
+            let map = map.expect("a map");
+            // Undecided is not chaotic: both planes have transients much longer than that.
+            for attractor in &map.attractors {
+                let name = &attractor.name;
+                assert!(!attractor.kind.is_chaotic(), "p = {p} within {bound} periods: {name}");
+            }
+            assert!(map.labels.settle.iter().all(|s| *s <= bound as i32));
+            let undecided = map.share(UNDECIDED);
+            assert!(bound > 100 || undecided > 0.05, "p = {p}: {undecided} after {bound} periods");
+        }
+    }
+}

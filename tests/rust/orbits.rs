@@ -51,7 +51,12 @@ fn multipliers_of_the_known_attractors() {
         // A conjugate pair has no order.
         let error = (miss(a.re, a.im, 0).max(miss(b.re, b.im, 1)))
             .min(miss(a.re, a.im, 1).max(miss(b.re, b.im, 0)));
-        assert!(error < 1e-9, "{:?} at p = {}: {error:e}", (known.n, known.w), known.pendulum.drive.p);
+        assert!(
+            error < 1e-9,
+            "{:?} at p = {}: {error:e}",
+            (known.n, known.w),
+            known.pendulum.drive.p
+        );
         let exact = (-known.pendulum.gamma * known.n as f64 * known.pendulum.period()).exp();
         assert!(((a * b).re / exact - 1.0).abs() < 1e-12 && (a * b).im.abs() < 1e-15);
         for monodromy in &orbit.monodromy {

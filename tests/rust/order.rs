@@ -4,11 +4,10 @@ use std::f64::consts::PI;
 
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::tableau::{A, B, BP, C, ORDER, STAGES};
-use pendmap::integrate::{Moving, Schedule};
-use pendmap::lanes::sine::Fine;
+use pendmap::integrate::Schedule;
 use pendmap::model::Pendulum;
 
-use crate::support::{advanced, fine_strobe, path, spread};
+use crate::support::{advanced, along, fine_strobe, path, spread};
 
 /// Root mean square over starts of the error after one period, for each number of steps.
 fn errors(pendulum: &Pendulum, steps: &[usize]) -> Vec<f64> {
@@ -37,9 +36,11 @@ fn the_step_has_order_eight() {
         let scale = pendulum.period() / PI;
         let steps = [16.0, 20.0, 25.0].map(|n| (n * scale).round() as usize);
         let errors = errors(&pendulum, &steps);
-                let order =
-            (errors[0] / errors[2]).ln() / (steps[2] as f64 / steps[0] as f64).ln();
-        assert!((order - f64::from(ORDER)).abs() < 0.25, "{name}: order {order}, errors {errors:?}");
+        let order = (errors[0] / errors[2]).ln() / (steps[2] as f64 / steps[0] as f64).ln();
+        assert!(
+            (order - f64::from(ORDER)).abs() < 0.25,
+            "{name}: order {order}, errors {errors:?}"
+        );
     }
 }
 
@@ -67,17 +68,10 @@ fn schedules_join() {
     let pendulum = Pendulum::new(0.2, 1.2, 1.7, 0.3, 0.1).expect("in range");
     let period = pendulum.period();
     let cut = 0.37 * period;
-    let whole = Schedule::period(&pendulum, 400);
-    let mut moving = Moving::new(&whole, 1.0, 0.5);
-    moving.run::<Fine>(&whole);
-    let expected = [moving.theta, moving.velocity(&whole)];
+    let expected = along(&Schedule::period(&pendulum, 400), [1.0, 0.5]);
     let first = Schedule::new(&pendulum, 0.0, cut, 170);
-    let mut moving = Moving::new(&first, 1.0, 0.5);
-    moving.run::<Fine>(&first);
     let second = Schedule::new(&pendulum, cut, period - cut, 290);
-    let mut moving = Moving::new(&second, moving.theta, moving.velocity(&first));
-    moving.run::<Fine>(&second);
-    let end = [moving.theta, moving.velocity(&second)];
+    let end = along(&second, along(&first, [1.0, 0.5]));
     assert!(distance(end, expected) < 3e-14, "{end:?} for {expected:?}");
     assert!((second.duration() - (period - cut)).abs() < 1e-15);
 }

@@ -1,6 +1,6 @@
-//! Sine, cosine and reduction modulo a turn, on every path, against the C library.
+//! Sine, cosine and reduction of angles in half turns, on every path, against the C library.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::PI;
 use std::marker::PhantomData;
 
 use pendmap::lanes::sine::{Coarse, Degree, Fine, wrap};
@@ -9,9 +9,9 @@ use pendmap::lanes::{Isa, Job, Lane, Path, dispatch};
 use crate::support::{bits, paths};
 
 /// What one function of the lane arithmetic makes of many numbers.
-struct Each<'a, F>(&'a [f64], F);
+struct Each<'a, F>(&'a [f64], PhantomData<F>);
 
-/// A function over any lane; written as a trait, since a closure cannot be generic.
+/// A function over any lane; a trait, since a closure cannot be generic.
 trait Function {
     fn of<L: Lane>(x: L) -> L;
 }
@@ -68,41 +68,50 @@ impl<F: Function> Job for Each<'_, F> {
     }
 }
 
-/// `F` on `path`; lanes and single numbers must agree bit for bit.
-fn each<F: Function>(path: Path, numbers: &[f64], function: F) -> Vec<f64> {
-    let [lanes, singles] = dispatch::run(path, Each(numbers, function));
-    assert_eq!(bits(&lanes), bits(&singles), "lanes and single numbers on {path}");
+/// `F` of many numbers on `path`; lanes and single numbers must agree bit for bit.
+fn each<F: Function>(path: Path, numbers: &[f64]) -> Vec<f64> {
+    let [lanes, singles] = dispatch::run(path, Each::<F>(numbers, PhantomData));
+    assert!(bits(&lanes) == bits(&singles), "lanes and single numbers differ on {path}");
     lanes
 }
 
-fn sine<D: Degree>(path: Path, numbers: &[f64]) -> Vec<f64> {
-    each(path, numbers, Sine::<D>(PhantomData))
-}
-
-fn cosine<D: Degree>(path: Path, numbers: &[f64]) -> Vec<f64> {
-    each(path, numbers, Cosine::<D>(PhantomData))
-}
-
-/// Numbers all over [-limit, limit], and the neighbours of every multiple of pi/2 in it.
-fn angles(limit: f64) -> Vec<f64> {
+/// Half turns all over [-limit, limit], and the neighbours of every quarter turn in it.
+fn half_turns(limit: i32) -> Vec<f64> {
     let count = 100_000;
-    let mut all: Vec<f64> =
-        (0..=count).map(|i| limit * (2.0 * f64::from(i) / f64::from(count) - 1.0)).collect();
-    let most = (limit / FRAC_PI_2) as i32;
-    for k in -most..=most {
-        let at = f64::from(k) * FRAC_PI_2;
+    let mut all: Vec<f64> = (0..=count)
+        .map(|i| f64::from(limit) * (2.0 * f64::from(i) / f64::from(count) - 1.0))
+        .collect();
+    for k in -2 * limit..=2 * limit {
+        let at = 0.5 * f64::from(k);
         all.extend([at, at.next_up(), at.next_down()]);
         for power in 1..16 {
             let gap = 10_f64.powi(-power);
             all.extend([at + gap, at - gap]);
         }
     }
-    all.retain(|x| x.abs() <= limit);
     all
 }
 
+/// `sin(pi x)` by the C library: the reduction is exact, and what the product with pi rounds off is
+/// put back.
+fn exact_sine(x: f64) -> f64 {
+    let k = x.round();
+    let r = x - k;
+    let product = r * PI;
+    let rest = r.mul_add(PI, -product) + r * 1.224_646_799_147_353_2e-16;
+    let sine = product.sin() + rest * product.cos();
+    if k.rem_euclid(2.0) == 0.0 { sine } else { -sine }
+}
+
+fn exact_cosine(x: f64) -> f64 {
+    // An eighth of a turn from where the cosine is flat, its own series is the better one.
+    let (k, r) = (x.round(), x - x.round());
+    let cosine = if r.abs() < 0.25 { (r * PI).cos() } else { exact_sine(0.5 - r.abs()) };
+    if k.rem_euclid(2.0) == 0.0 { cosine } else { -cosine }
+}
+
 /// Largest difference, with the angle where it is.
-fn worst(angles: &[f64], values: &[f64], exact: impl Fn(f64) -> f64) -> (f64, f64) {
+fn worst(angles: &[f64], values: &[f64], exact: fn(f64) -> f64) -> (f64, f64) {
     angles
         .iter()
         .zip(values)
@@ -111,63 +120,82 @@ fn worst(angles: &[f64], values: &[f64], exact: impl Fn(f64) -> f64) -> (f64, f6
 }
 
 fn check_accuracy<D: Degree>(name: &str, rounding: f64) {
-    for limit in [PI, 50.0] {
-        let angles = angles(limit);
-        // The fused reduction is off by 3.9e-17 of the angle, half a unit in its last place.
-        let allowed = D::ERROR + rounding + 4e-17 * limit;
+    // 16 half turns are 50 rad.
+    for limit in [1, 16] {
+        let angles = half_turns(limit);
         for path in paths() {
-            let (s, c) = (sine::<D>(path, &angles), cosine::<D>(path, &angles));
-            for (what, found) in
-                [("sin", worst(&angles, &s, f64::sin)), ("cos", worst(&angles, &c, f64::cos))]
-            {
-                assert!(found.0 < allowed, "{name} {what} on {path}: {found:?} over {allowed:e}");
-            }
+            let (s, c) = (each::<Sine<D>>(path, &angles), each::<Cosine<D>>(path, &angles));
+            let sine = worst(&angles, &s, exact_sine);
+            let cosine = worst(&angles, &c, exact_cosine);
+            let allowed = D::ERROR + rounding;
+            assert!(sine.0 < allowed, "{name} sine on {path}: {sine:?} over {allowed:e}");
+            // x - 1/2 is rounded once, to half a unit in the last place of x.
+            let allowed = allowed + PI * f64::from(limit) * 0.5 * f64::EPSILON;
+            assert!(cosine.0 < allowed, "{name} cosine on {path}: {cosine:?} over {allowed:e}");
         }
     }
 }
 
 #[test]
 fn fine_sine_and_cosine_are_good_to_rounding() {
-    check_accuracy::<Fine>("fine", 2.5e-16);
+    check_accuracy::<Fine>("fine", 4e-16);
 }
 
 #[test]
 fn coarse_sine_and_cosine_keep_their_bound() {
     check_accuracy::<Coarse>("coarse", 4e-16);
     // The bound is the polynomial's own and not a generous one.
-    let angles = angles(PI);
-    let found = worst(&angles, &sine::<Coarse>(Path::Portable, &angles), f64::sin);
+    let angles = half_turns(1);
+    let found = worst(&angles, &each::<Sine<Coarse>>(Path::Portable, &angles), exact_sine);
     assert!(found.0 > 0.9 * Coarse::ERROR, "{found:?}");
 }
 
 #[test]
-fn small_angles_keep_their_relative_accuracy() {
-    // The first coefficient is 1: a pendulum near rest is as precise as one far from it.
-    let angles: Vec<f64> = (0..3000).map(|i| 10_f64.powf(-0.1 * f64::from(i))).collect();
-    let small: Vec<f64> = angles.into_iter().filter(|x| *x < 1e-3).collect();
+fn far_angles_are_as_good_as_near_ones() {
+    // A pendulum that has gone round a hundred thousand times.
+    let angles: Vec<f64> = (0..50_000).map(|i| 2e5 + f64::from(i) * 0.123_456_7).collect();
     for path in paths() {
-        for (x, y) in small.iter().zip(sine::<Fine>(path, &small)) {
-            assert!((y / x.sin() - 1.0).abs() < 3e-16, "{path}: sin {x:e} = {y:e}");
+        let found = worst(&angles, &each::<Sine<Fine>>(path, &angles), exact_sine);
+        assert!(found.0 < Fine::ERROR + 3e-16, "{path}: {found:?}");
+    }
+}
+
+#[test]
+fn small_angles_keep_their_relative_accuracy() {
+    // The first coefficient is pi: a pendulum near rest is as precise as one far from it.
+    let small: Vec<f64> = (30..3000).map(|i| 10_f64.powf(-0.1 * f64::from(i))).collect();
+    for path in paths() {
+        for (x, y) in small.iter().zip(each::<Sine<Fine>>(path, &small)) {
+            assert!((y / exact_sine(*x) - 1.0).abs() < 4e-16, "{path}: sin(pi {x:e}) = {y:e}");
         }
     }
 }
 
+#[test]
+fn the_equilibria_are_exact() {
+    let whole: Vec<f64> = (-40..=40).map(f64::from).collect();
+    for path in paths() {
+        assert!(each::<Sine<Fine>>(path, &whole).iter().all(|y| *y == 0.0), "{path}");
+        assert!(each::<Sine<Coarse>>(path, &whole).iter().all(|y| *y == 0.0), "{path}");
+    }
+}
+
 /// Whether two numbers are each other's opposite to the last bit. A zero is made by a difference
-/// and has the sign +, so that zeros are their own opposites.
+/// and may have either sign.
 fn opposite(a: f64, b: f64) -> bool {
     (-a).to_bits() == b.to_bits() || (a == 0.0 && b == 0.0)
 }
 
 #[test]
 fn sine_and_reduction_are_odd_bit_for_bit() {
-    let right = angles(50.0);
+    let right = half_turns(16);
     let left: Vec<f64> = right.iter().map(|x| -x).collect();
     for path in paths() {
         let pairs = [
-            ("fine sine", sine::<Fine>(path, &right), sine::<Fine>(path, &left)),
-            ("coarse sine", sine::<Coarse>(path, &right), sine::<Coarse>(path, &left)),
-            ("angle", each(path, &right, Wrapped), each(path, &left, Wrapped)),
-            ("turns", each(path, &right, Turns), each(path, &left, Turns)),
+            ("fine sine", each::<Sine<Fine>>(path, &right), each::<Sine<Fine>>(path, &left)),
+            ("coarse sine", each::<Sine<Coarse>>(path, &right), each::<Sine<Coarse>>(path, &left)),
+            ("angle", each::<Wrapped>(path, &right), each::<Wrapped>(path, &left)),
+            ("turns", each::<Turns>(path, &right), each::<Turns>(path, &left)),
         ];
         for (what, a, b) in pairs {
             for ((x, a), b) in right.iter().zip(a).zip(b) {
@@ -178,17 +206,15 @@ fn sine_and_reduction_are_odd_bit_for_bit() {
 }
 
 #[test]
-fn wrapping_takes_whole_turns_off() {
-    let mut angles = angles(50.0);
+fn wrapping_takes_whole_turns_off_and_loses_nothing() {
+    let mut angles = half_turns(16);
     angles.extend((0..20_000).map(|i| f64::from(i) * 1.234_567 - 1e4));
     for path in paths() {
-        let (wrapped, turns) = (each(path, &angles, Wrapped), each(path, &angles, Turns));
+        let (wrapped, turns) = (each::<Wrapped>(path, &angles), each::<Turns>(path, &angles));
         for ((x, r), k) in angles.iter().zip(&wrapped).zip(&turns) {
-            assert!(k.fract() == 0.0, "{k} turns from {x} on {path}");
-            assert!(r.abs() <= PI + 2e-15 * (1.0 + x.abs()), "{x} wraps to {r} on {path}");
-            // Exact but for the last rounding: the double next to 2 pi and what it lacks.
-            let exact = k.mul_add(-2.449_293_598_294_706_4e-16, k.mul_add(-TAU, *x));
-            assert!((r - exact).abs() < 1e-18 + 2.3e-16 * r.abs(), "{x}: {r} for {exact} on {path}");
+            assert!(k.fract() == 0.0 && r.abs() <= 1.0, "{x} is {k} turns and {r} on {path}");
+            assert!((x - r).to_bits() == (2.0 * k).to_bits() || *k == 0.0, "{x} on {path}");
+            assert!(*k != 0.0 || r.to_bits() == x.to_bits() || *x == 0.0, "{x} on {path}");
         }
     }
 }

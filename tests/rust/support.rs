@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use pendmap::integrate::{State, Strobe};
+use pendmap::integrate::{Moving, Schedule, State, Strobe};
 use pendmap::lanes::Path;
+use pendmap::lanes::sine::Fine;
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::Control;
 use pendmap::maps::starts::{Axis, Starts};
@@ -71,6 +72,13 @@ pub fn advanced(strobe: &Strobe, states: &[State], periods: usize) -> Vec<State>
     let mut turns = vec![0.0; states.len()];
     strobe.advance(&mut theta, &mut velocity, &mut turns, periods).expect("equal lengths");
     theta.into_iter().zip(velocity).map(|(a, b)| [a, b]).collect()
+}
+
+/// One trajectory through a schedule; the angle comes back as it is, without wrapping.
+pub fn along(schedule: &Schedule, [theta, velocity]: State) -> State {
+    let mut moving = Moving::new(schedule, theta, velocity);
+    moving.run::<Fine>(schedule);
+    [moving.theta(), moving.velocity(schedule)]
 }
 
 /// The bits of numbers, to compare them without tolerance.

@@ -20,9 +20,8 @@ fn cases() -> [Pendulum; 4] {
 
 /// The central difference of `n` periods of the map in one direction.
 fn difference(map: &PoincareMap, state: State, direction: State, n: usize, h: f64) -> State {
-    let at = |s: f64| {
-        map.iterate([state[0] + s * direction[0], state[1] + s * direction[1]], n).state
-    };
+    let at =
+        |s: f64| map.iterate([state[0] + s * direction[0], state[1] + s * direction[1]], n).state;
     let (plus, minus) = (at(h), at(-h));
     [wrapped(plus[0] - minus[0]) / (2.0 * h), (plus[1] - minus[1]) / (2.0 * h)]
 }

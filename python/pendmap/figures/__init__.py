@@ -12,7 +12,7 @@ import matplotlib as mpl
 
 from pendmap.errors import InputError
 from pendmap.figures import basins, style, trajectory
-from pendmap.pictures.files import whole_file
+from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
 
 if TYPE_CHECKING:

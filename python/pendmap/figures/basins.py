@@ -17,6 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from pendmap import palette
 from pendmap.errors import InputError
 from pendmap.figures import style
+from pendmap.figures.sheet import Panel, Sheet
 from pendmap.pictures import layers as layering
 from pendmap.pictures import legend, plane
 
@@ -63,8 +64,8 @@ def figure(
     aside = layering.finite_time(dataset) and layer is None and bool(chaos)
     if "labels" not in shown and not layering.finite_time(dataset):
         listed = [e for e in listed if e.id < 1 or e.chaotic]
-    sheet = style.Sheet(
-        [_panel(dataset, one, shown) for one in shown] + [style.Panel(SMALL)] * aside,
+    sheet = Sheet(
+        [_panel(dataset, one, shown) for one in shown] + [Panel(SMALL)] * aside,
         ratio=min(max((velocity[1] - velocity[0]) / (theta[1] - theta[0]), 0.3), 1.3),
         title=_title(dataset, shown),
         subtitle=_subtitle(dataset),
@@ -92,9 +93,9 @@ def figure(
     return sheet.figure
 
 
-def _panel(dataset: xr.Dataset, layer: str, shown: tuple[str, ...]) -> style.Panel:
+def _panel(dataset: xr.Dataset, layer: str, shown: tuple[str, ...]) -> Panel:
     small = layer == "labels" and len(shown) > 1 and not layering.reliable(dataset)
-    return style.Panel(SMALL if small else 1.0, bar=layer != "labels")
+    return Panel(SMALL if small else 1.0, bar=layer != "labels")
 
 
 def _leading(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -244,7 +245,7 @@ def _attractors(axes: Axes, listed: list[legend.Entry], extent: Extent) -> None:
             axes.plot(at[:, 0], at[:, 1], clip_on=False, zorder=5, **_drawn(entry, size))
 
 
-def _section(sheet: style.Sheet, chaos: list[legend.Entry], mark: str) -> None:
+def _section(sheet: Sheet, chaos: list[legend.Entry], mark: str) -> None:
     """Draw the stroboscopic points of chaotic attractors on the last panel, a plane of its own."""
     axes = sheet.axes[-1]
     every = np.concatenate([entry.points for entry in chaos])
@@ -268,7 +269,7 @@ def _handle(entry: legend.Entry) -> Patch | tuple[Patch, Line2D]:
     return (patch, Line2D([], [], **_drawn(entry, 5.0)))
 
 
-def _warn(sheet: style.Sheet, axes: Axes, dataset: xr.Dataset) -> None:
+def _warn(sheet: Sheet, axes: Axes, dataset: xr.Dataset) -> None:
     """Mark the labels as unreliable: next to their small panel, or as the title of a large one."""
     text = layering.warning(dataset)
     if len(sheet.axes) == 1:

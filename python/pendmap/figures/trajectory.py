@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.errors import InputError
+from pendmap.figures import sheet as sheets
 from pendmap.figures import style
 from pendmap.pictures import layers as layering
 from pendmap.pictures import plane
@@ -51,24 +52,24 @@ def figure(
     width, height = size or ((5.6, 5.3) if layer in ("phase", "section") else (8.6, 6.9))
     if size is None and layer == "history":
         height = 3.6
-    across, down = width - style.LEFT - style.RIGHT, height - style.TOP - style.BOTTOM
+    across, down = width - sheets.LEFT - sheets.RIGHT, height - sheets.TOP - sheets.BOTTOM
     gap_x, gap_y = 0.8, 0.9
-    need = (2.0, 2.2) if layer is None else (style.LEAST, style.LEAST)
+    need = (2.0, 2.2) if layer is None else (sheets.LEAST, sheets.LEAST)
     if across < need[0] or down < need[1]:
         least = f"{width - across + need[0]:.1f} x {height - down + need[1]:.1f}"
         raise InputError(
             f"size {size} leaves no room for the panels; it must be at least {least} inches"
         )
-    sheet = style.headed((width, height), dpi, "Trajectory", _subtitle(dataset))
+    sheet = sheets.headed((width, height), dpi, "Trajectory", _subtitle(dataset))
     draw = {"history": _history, "phase": _phase, "section": _section}
     if layer is not None:
-        draw[layer](style.place(sheet, style.LEFT, style.BOTTOM, across, down), dataset, "")
+        draw[layer](sheets.place(sheet, sheets.LEFT, sheets.BOTTOM, across, down), dataset, "")
         return sheet
     half, top = (across - gap_x) / 2, 0.36 * (down - gap_y)
     low = down - gap_y - top
-    first = style.place(sheet, style.LEFT, height - style.TOP - top, across, top)
-    second = style.place(sheet, style.LEFT, style.BOTTOM, half, low)
-    third = style.place(sheet, style.LEFT + half + gap_x, style.BOTTOM, half, low)
+    first = sheets.place(sheet, sheets.LEFT, height - sheets.TOP - top, across, top)
+    second = sheets.place(sheet, sheets.LEFT, sheets.BOTTOM, half, low)
+    third = sheets.place(sheet, sheets.LEFT + half + gap_x, sheets.BOTTOM, half, low)
     for axes, part, mark in zip((first, second, third), PARTS, "abc", strict=True):
         draw[part](axes, dataset, f"({mark}) ")
     return sheet

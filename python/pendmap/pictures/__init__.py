@@ -1,7 +1,6 @@
 """What figures and recordings share, so that both show the same names, shares, ticks and cells.
 
 ``layers``: which layers of a map lead, and their titles; ``legend``: names, colours and shares of
-the attractors; ``plane``: cells, ticks and curves of the phase plane; ``files``: whole files or
-none.
-No drawing library is imported here.
+the attractors; ``plane``: cells, ticks and curves of the phase plane. No drawing library is
+imported here.
 """

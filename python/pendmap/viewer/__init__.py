@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
-from pendmap.pictures.files import whole_file
+from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
 from pendmap.viewer import basins, frame, trajectory
 from pendmap.viewer.window import (
