@@ -27,16 +27,16 @@ fn inside(ellipse: &Ellipse) -> Vec<State> {
         let dv = radius * angle.sin() / c;
         [ellipse.centre[0] + (radius * angle.cos() - b * dv) / a, ellipse.centre[1] + dv]
     };
-    let edge = (0..150).map(|k| at(0.999, TAU * f64::from(k) / 150.0));
-    let area = (0..250).map(|k| {
+    let edge = (0..64).map(|k| at(0.999, TAU * f64::from(k) / 64.0));
+    let area = (0..100).map(|k| {
         let k = f64::from(k);
-        at(((k + 0.5) / 250.0).sqrt(), TAU * (k * 0.618_033_988_749_895).fract())
+        at(((k + 0.5) / 100.0).sqrt(), TAU * (k * 0.618_033_988_749_895).fract())
     });
     edge.chain(area).collect()
 }
 
 fn pendulums() -> Vec<Pendulum> {
-    [0.3, 0.5, 0.6, 1.0, 1.2, 1.34, 1.8]
+    [0.3, 0.5, 1.0, 1.34, 1.8]
         .map(|p| driven(0.1, p, 2.0))
         .into_iter()
         .chain([Pendulum::new(0.1, 0.5, 1.5, 0.3, 0.2).expect("in range"), undriven(0.2, 0.0)])
@@ -47,7 +47,7 @@ fn pendulums() -> Vec<Pendulum> {
 fn whatever_is_inside_an_ellipse_converges_to_its_attractor() {
     for pendulum in pendulums() {
         let (strobe, catalogue) = searched(&pendulum, 1e-6);
-        let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
+        let fine = fine_strobe(&pendulum, 2 * strobe.steps(), path());
         assert!(!catalogue.traps.ellipses.is_empty(), "{pendulum:?}");
         for ellipse in &catalogue.traps.ellipses {
             let attractor = &catalogue.attractors[ellipse.attractor];

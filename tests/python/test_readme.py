@@ -1,0 +1,64 @@
+"""What README.md promises is run."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from conftest import Run
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    """All code blocks in a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def commands() -> list[list[str]]:
+    """All commands, as words."""
+    lines = [line for block in blocks("sh") for line in block.splitlines()]
+    return [shlex.split(line, comments=True) for line in lines]
+
+
+def test_every_command_runs(pendmap_command: Run) -> None:
+    words = [line for line in commands() if line[0] == "pendmap"]
+    assert len(words) >= 7
+    for line in words:
+        run = pendmap_command(*line[1:])
+        assert run.returncode == 0, f"{line}: {run.stderr}"
+
+
+def test_make_knows_the_other_commands() -> None:
+    others = [line for line in commands() if line[0] != "pendmap"]
+    assert ["make", "demo"] in others
+    assert ["make", "test"] in others
+    for words in others:
+        run = subprocess.run(
+            [*words, "--dry-run"], cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        assert run.returncode == 0, run.stderr
+        if words[1] == "demo":
+            assert "pendmap basins --p 1.7" in run.stdout
+
+
+@pytest.mark.parametrize("code", blocks("python"))
+def test_every_snippet_runs(code: str, tmp_path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+
+
+def test_every_link_leads_somewhere() -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        if not target.startswith("http"):
+            assert (ROOT / target).exists(), target
