@@ -1,1 +1,106 @@
-fn main() {}
+//! The stroboscopic map on each instruction set, one thread: an element is one trajectory over one
+//! forcing period, so that the figure is trajectory-periods a second.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::hint::black_box;
+use std::time::Duration;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use pendmap::integrate::Strobe;
+use pendmap::integrate::accuracy::choose;
+use pendmap::lanes::Path;
+use pendmap::maps::starts::{Axis, Starts};
+use pendmap::model::Pendulum;
+
+/// Trajectories: whole bundles on every path.
+const COUNT: usize = 1536;
+/// Periods in one call.
+const PERIODS: usize = 16;
+
+/// The points of the design's measurements: gamma, p, omega.
+const POINTS: [(&str, f64, f64, f64); 2] =
+    [("p 1 omega 2", 0.1, 1.0, 2.0), ("p 1.7 omega 0.87", 0.1, 1.7, 0.87)];
+
+fn plane() -> Starts {
+    let axis = |name, half: f64| Axis::new(name, -half, half, 100).expect("an axis");
+    Starts::Grid { theta: axis("theta", std::f64::consts::PI), velocity: axis("velocity", 3.0) }
+}
+
+fn strobe(pendulum: &Pendulum, tol: f64, path: Path) -> Strobe {
+    choose(pendulum, &plane().sampled_states(200, 0), tol, path).expect("steps").0
+}
+
+fn columns() -> (Vec<f64>, Vec<f64>) {
+    plane().sampled_states(COUNT, 1).into_iter().map(|s| (s[0], s[1])).unzip()
+}
+
+fn paths() -> impl Iterator<Item = Path> {
+    Path::ALL.into_iter().filter(|path| path.available())
+}
+
+fn map(criterion: &mut Criterion) {
+    for (name, gamma, p, omega) in POINTS {
+        let pendulum = Pendulum::new(gamma, p, omega, 0.0, 0.0).expect("in range");
+        let mut group = criterion.benchmark_group(format!("map, {name}"));
+        group.throughput(Throughput::Elements((COUNT * PERIODS) as u64));
+        for tol in [1e-6, 1e-9] {
+            for path in paths() {
+                let strobe = strobe(&pendulum, tol, path);
+                let id =
+                    BenchmarkId::new(path.name(), format!("{tol:e}, {} steps", strobe.steps()));
+                group.bench_function(id, |bencher| {
+                    let (mut theta, mut velocity) = columns();
+                    let mut turns = vec![0.0; COUNT];
+                    bencher.iter(|| {
+                        strobe
+                            .advance(
+                                black_box(&mut theta),
+                                black_box(&mut velocity),
+                                &mut turns,
+                                PERIODS,
+                            )
+                            .expect("equal lengths");
+                    });
+                });
+            }
+        }
+        group.finish();
+    }
+}
+
+fn stretch(criterion: &mut Criterion) {
+    let pendulum = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).expect("in range");
+    let mut group = criterion.benchmark_group("map with tangent, p 1 omega 2");
+    group.throughput(Throughput::Elements((COUNT * PERIODS) as u64));
+    for path in paths() {
+        let strobe = strobe(&pendulum, 1e-6, path);
+        group.bench_function(path.name(), |bencher| {
+            let (mut theta, mut velocity) = columns();
+            let mut turns = vec![0.0; COUNT];
+            let mut tangents = (vec![FRAC_1_SQRT_2; COUNT], vec![FRAC_1_SQRT_2; COUNT]);
+            let mut growth = vec![0.0; COUNT];
+            bencher.iter(|| {
+                strobe
+                    .stretch(
+                        (black_box(&mut theta), black_box(&mut velocity)),
+                        &mut turns,
+                        (&mut tangents.0, &mut tangents.1),
+                        &mut growth,
+                        PERIODS,
+                    )
+                    .expect("equal lengths");
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(20)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(2));
+    targets = map, stretch
+}
+criterion_main!(benches);

@@ -13,6 +13,8 @@ use crate::lanes::sine::Fine;
 const CELLS: [usize; 2] = [96, 96];
 /// Stroboscopic points that are kept as a picture of the set.
 const KEPT: usize = 2000;
+/// Trajectories that draw the curve of a quasi-periodic set.
+const CURVES: usize = 32;
 /// Periods over which turns over the top are watched step by step.
 const WATCHED: usize = 400;
 /// An exponent this many standard errors above zero is positive.
@@ -145,10 +147,11 @@ fn walk(strobe: &Strobe, states: &[State], periods: usize) -> Vec<Walk> {
         .iter()
         .map(|_| Walk { region: Region::new(speed), points: Vec::new(), turns: 0.0, exponent: 0.0 })
         .collect();
-    let align = 20.min(periods);
+    let align = periods / 2;
     for period in 0..periods {
         if period == align {
-            // The tangents have turned into the direction of growth: count from here.
+            // Count from here: the tangents have turned into the direction of growth, and the shear
+            // of regular motion, which grows them in proportion to time, adds no more than ln 2.
             growth.fill(0.0);
         }
         // Lengths agree, so this cannot fail.
@@ -180,6 +183,10 @@ fn describe(
     region: Region,
     watch: usize,
 ) -> Option<ChaoticSet> {
+    if strobe.pendulum.is_autonomous() {
+        // A flow in the plane has no chaos; what is left here has not settled yet.
+        return None;
+    }
     let (mean, stderr) = mean_and_error(&members.iter().map(|w| w.exponent).collect::<Vec<_>>());
     let period = strobe.pendulum.period();
     let first = members[0];
@@ -189,7 +196,10 @@ fn describe(
     points.truncate(KEPT);
     let turning = |w: &&Walk| w.turns.abs() > 0.02 * watch as f64;
     if mean.abs() < NEUTRAL && members.iter().all(turning) {
-        let band = Band::around(strobe, &first.points, 0)?;
+        // Near a resonance one trajectory takes long to fill the curve; several fill it sooner.
+        let curve: Vec<State> =
+            members.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
+        let band = Band::around(strobe, &curve, 0)?;
         return Some(ChaoticSet {
             kind: Kind::QuasiperiodicRotation,
             sense: first.turns.signum() as i64,

@@ -1,8 +1,10 @@
 //! Regions that nothing leaves: a trajectory inside one has been captured.
 //!
-//! Around a point of a periodic attractor with monodromy `M` the discrete Lyapunov equation
-//! `M^T S M - S = -I` gives an ellipse `x^T S x <= level` that `M` maps inside itself. A circle will
-//! not do: rotations grow threefold before they shrink. How far the ellipse reaches in the nonlinear
+//! Around a point of a periodic attractor with monodromy `M` and spectral radius `rho` the discrete
+//! Lyapunov equation `M^T S M / r^2 - S = -I`, `rho < r < 1`, gives an ellipse `x^T S x <= level` that
+//! `M` shrinks by `r` at least. A circle will not do: rotations grow threefold before they shrink.
+//! With `r = 1` the ellipse of an orbit that first grows much would shrink too little to be told from
+//! rounding. How far the ellipse reaches in the nonlinear
 //! map is sampled: the largest level such that every sample within it comes back lower.
 
 use std::f64::consts::TAU;
@@ -39,12 +41,16 @@ impl Ellipse {
 /// Directions that are sampled.
 const RAYS: usize = 96;
 /// Levels that are sampled, each `RATIO` of the one before in radius.
-const LEVELS: usize = 44;
+const LEVELS: usize = 54;
 const RATIO: f64 = 0.82;
 /// Returns after which a sample must be lower: any of these will do.
 const RETURNS: [usize; 4] = [1, 2, 3, 4];
-/// How much lower.
-const LOWER: f64 = 0.999;
+/// Of the linear shrinking, so much must be left in the nonlinear map.
+const LEFT: f64 = 0.2;
+/// Ellipses need not shrink faster than this, however strong the damping.
+const LEAST_SHRINK: f64 = 0.3;
+/// Samples of a band must come back lower by this factor.
+const BAND_LOWER: f64 = 0.999;
 /// The part of the sampled radius that is used.
 const MARGIN: f64 = 0.9;
 
@@ -55,8 +61,10 @@ const MARGIN: f64 = 0.9;
 pub fn ellipses(strobe: &Strobe, orbit: &PeriodicOrbit, attractor: usize) -> Vec<Ellipse> {
     let mut traps = Vec::new();
     for (point, (centre, monodromy)) in orbit.points.iter().zip(&orbit.monodromy).enumerate() {
-        let Some(root) = lyapunov_root(monodromy) else { return Vec::new() };
-        let Some(radius) = safe_radius(strobe, orbit.n, *centre, &root) else {
+        let shrink = orbit.multipliers.largest().sqrt().max(LEAST_SHRINK);
+        let Some(root) = lyapunov_root(&(monodromy / shrink)) else { return Vec::new() };
+        let lower = 1.0 - LEFT * (1.0 - shrink);
+        let Some(radius) = safe_radius(strobe, orbit.n, *centre, &root, lower) else {
             return Vec::new();
         };
         let shape = root.map(|x| x / radius);
@@ -100,7 +108,13 @@ fn extent(root: &[f64; 3]) -> f64 {
 }
 
 /// The largest sampled radius within which every sample comes back lower.
-fn safe_radius(strobe: &Strobe, n: usize, centre: State, root: &[f64; 3]) -> Option<f64> {
+fn safe_radius(
+    strobe: &Strobe,
+    n: usize,
+    centre: State,
+    root: &[f64; 3],
+    lower: f64,
+) -> Option<f64> {
     let [a, b, c] = *root;
     let widest = 3.0 / extent(root);
     let radii: Vec<f64> = (0..LEVELS).map(|k| widest * RATIO.powi(k as i32)).collect();
@@ -125,7 +139,7 @@ fn safe_radius(strobe: &Strobe, n: usize, centre: State, root: &[f64; 3]) -> Opt
         // From the smallest level outward, up to the first one with a sample that rises.
         let safe = (0..LEVELS)
             .rev()
-            .take_while(|k| (0..RAYS).all(|ray| height(k * RAYS + ray) < LOWER * radii[*k]))
+            .take_while(|k| (0..RAYS).all(|ray| height(k * RAYS + ray) < lower * radii[*k]))
             .last();
         if let Some(k) = safe {
             let radius = MARGIN * radii[k];
@@ -188,15 +202,16 @@ impl Band {
         let mut best: Option<f64> = None;
         for _ in 0..8 {
             strobe.advance(&mut theta, &mut velocity, &mut turns, 1).ok()?;
+            let holds = |k: usize| {
+                let part = k * 2 * columns..(k + 1) * 2 * columns;
+                part.into_iter()
+                    .all(|i| (velocity[i] - band.at(theta[i])).abs() < BAND_LOWER * widths[k])
+            };
             let safe = (0..LEVELS)
                 .rev()
                 // Interpolation of the curve limits how narrow a band can be judged.
-                .skip_while(|k| widths[*k] < 1e-3)
-                .take_while(|k| {
-                    let part = k * 2 * columns..(k + 1) * 2 * columns;
-                    part.into_iter()
-                        .all(|i| (velocity[i] - band.at(theta[i])).abs() < LOWER * widths[*k])
-                })
+                .skip_while(|k| !holds(*k))
+                .take_while(|k| holds(*k))
                 .last();
             if let Some(k) = safe {
                 let width = MARGIN * widths[k];

@@ -9,7 +9,7 @@ use crate::integrate::accuracy::distance;
 
 /// Largest `|P^n(x) - x|` of an orbit that counts as found.
 pub const RESIDUAL: f64 = 1e-12;
-/// Largest relative deviation of the multipliers' product from `exp(-gamma n T)`.
+/// Largest relative deviation of a period's shrinking of area from `exp(-gamma T)`.
 pub const PRODUCT: f64 = 1e-9;
 const ITERATIONS: usize = 16;
 /// By this iteration the gap must have fallen tenfold, or the start was too far.
@@ -51,7 +51,8 @@ impl PeriodicOrbit {
 /// Newton's method on `P^n(x) - x` from `start`; then the smallest period that divides `n`.
 ///
 /// `None` if it does not converge to a residual below [`RESIDUAL`], wanders further than `reach`,
-/// or if the multipliers' product is not `exp(-gamma n T)`.
+/// or if phase area does not
+/// shrink by `exp(-gamma T)` in each period, which makes the multipliers' product `exp(-gamma n T)`.
 #[must_use]
 pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<PeriodicOrbit> {
     let point = polish(map, start, n, reach)?;
@@ -116,7 +117,19 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
         .collect();
     let exact = (-map.pendulum.gamma * n as f64 * map.pendulum.period()).exp();
     let multipliers = multipliers(&monodromy[0], exact);
-    let product = derivatives.iter().map(Matrix2::determinant).product::<f64>();
-    ((product / exact - 1.0).abs() < PRODUCT && residual < 10.0 * RESIDUAL)
-        .then_some(PeriodicOrbit { n, w, points, residual, multipliers, monodromy })
+    let each = (-map.pendulum.gamma * map.pendulum.period()).exp();
+    // Relative to the products whose difference a determinant is: under strong damping these are
+    // all that rounding leaves.
+    let area_shrinks = derivatives.iter().all(|m| {
+        let (ad, bc) = (m[(0, 0)] * m[(1, 1)], m[(0, 1)] * m[(1, 0)]);
+        (ad - bc - each).abs() <= PRODUCT * (ad.abs() + bc.abs() + each)
+    });
+    (area_shrinks && residual < 10.0 * RESIDUAL).then_some(PeriodicOrbit {
+        n,
+        w,
+        points,
+        residual,
+        multipliers,
+        monodromy,
+    })
 }

@@ -265,3 +265,37 @@ def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(os.environ, "PENDMAP_SIMD", "mmx")
     with pytest.raises(InputError, match="PENDMAP_SIMD is 'mmx'"):
         pendmap.basins(Pendulum(), Grid.square(5))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "name"),
+    [
+        # Strong damping: area shrinks by 1e-55 a period.
+        ({"gamma": 20.0, "p": 2.0, "omega": 1.0}, "rest"),
+        # Cycles in less than 1 % of the plane, strongly stretched before they shrink.
+        (
+            {"gamma": 0.5, "p": 2.68962157, "omega": 2.30547203, "torque": 0.1},
+            "oscillation 7:0 (-)",
+        ),
+        ({"gamma": 0.02, "p": 1.23286585, "omega": 0.94662087}, "oscillation 4:0 (+)"),
+        # A running state next to the resonance 17/5: it takes long to fill its curve.
+        (
+            {"gamma": 0.2, "p": 2.1744, "omega": 1.7613, "torque": 1.2},
+            "quasiperiodic rotation +",
+        ),
+    ],
+)
+def test_hard_attractors_are_found(parameters: dict[str, float], name: str) -> None:
+    result = pendmap.basins(Pendulum(**({"p": 1.0, "omega": 1.0} | parameters)), Grid.square(60))
+    assert name in result.attractor.values.tolist()
+    assert result.attrs["undecided"] == 0
+
+
+@pytest.mark.parametrize("p", [0.0, 0.05])
+def test_slow_settling_is_not_called_chaos(p: float) -> None:
+    """Nearly without damping nothing settles within the bound, and shear stretches tangents."""
+    result = pendmap.basins(
+        Pendulum(gamma=1e-6, p=p, torque=0.1), Grid.square(24), max_periods=1000
+    )
+    assert not [kind for kind in result.kind.values.tolist() if "chaos" in kind]
+    assert result.attrs["undecided"] > 0.5

@@ -120,7 +120,7 @@ fn tolerances() {
     assert_eq!(range(-1e-6), "tol is -0.000001: allowed is 1e-13 to 1e-2");
     assert_eq!(range(f64::NAN), "tol is NaN: allowed is 1e-13 to 1e-2");
     // Chaos makes more of rounding errors than 1e-13 within five periods.
-    let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, path()).err().expect("refused");
+    let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, path()).expect_err("refused");
     let Error::Tolerance { tol, reached } = error else { panic!("{error}") };
     assert!(tol < 2e-13 && reached > tol && reached < 1e-6, "{reached:e}");
     let error = Error::Tolerance { tol: 1e-13, reached: 2.34e-11 }.to_string();
@@ -134,7 +134,7 @@ fn instruction_sets() {
         assert_eq!(path.name().parse::<Path>(), Ok(path));
         assert_eq!(path.to_string(), path.name());
     }
-    let error = "avx1024".parse::<Path>().err().expect("refused");
+    let error = "avx1024".parse::<Path>().expect_err("refused");
     assert_eq!(error, Error::Simd { name: "avx1024".to_owned() });
     let expected = "PENDMAP_SIMD is 'avx1024': allowed are avx512, avx2, sse and portable, as far \
                     as this processor has them";

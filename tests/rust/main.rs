@@ -5,11 +5,10 @@
 //! - [`sine`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
-//! - [`maps`], [`layers`]: whole planes
+//! - [`maps`], [`layers`], [`threads`]: whole planes
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
-#![allow(dead_code)]
 mod attractors;
 mod bifurcations;
 mod chaos;
@@ -25,5 +24,6 @@ mod sine;
 mod special;
 mod support;
 mod tangent;
+mod threads;
 mod traps;
 mod truths;

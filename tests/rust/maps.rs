@@ -1,28 +1,22 @@
 //! Whole planes: what must not change a map, and how its parts hang together.
 
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
 
 use pendmap::attractor::Catalogue;
-use pendmap::error::Error;
 use pendmap::integrate::accuracy::{choose, distance};
 use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, Strobe};
 use pendmap::lanes::Path;
-use pendmap::maps::advance::advance;
-use pendmap::maps::basins::{BasinMap, Options, basins};
+use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::{Control, pool};
 use pendmap::maps::label::{FAILED, Labels, NEVER, UNDECIDED, label};
-use pendmap::maps::layers::finite_time;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 use pendmap::orbit::PoincareMap;
 
-use crate::support::{basins_on_plane, bits, columns, driven, path, paths, plane, spread};
-
-fn unchecked() -> Options {
-    Options { check: false, ..Options::default() }
-}
+use crate::support::{
+    assert_same, basins_on_plane, cell_names, driven, path, paths, plane, spread, unchecked,
+};
 
 /// The step, attractors and labels of a plane on a chosen path.
 fn labelled(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Catalogue, Labels) {
@@ -42,65 +36,6 @@ fn relabelled(
 ) -> Labels {
     let pool = pool(1).expect("a pool");
     label(strobe, catalogue, starts, picks, 4000, &pool, &Control::default()).expect("labels")
-}
-
-/// The name of every cell's attractor.
-fn names(map: &BasinMap) -> Vec<&str> {
-    let name = |label: &i16| {
-        usize::try_from(label - 1).ok().map_or("none", |i| map.attractors[i].name.as_str())
-    };
-    map.labels.label.iter().map(name).collect()
-}
-
-fn assert_same(a: &Labels, b: &Labels, what: &str) {
-    assert_eq!(a.label, b.label, "labels: {what}");
-    assert_eq!(a.settle, b.settle, "settling times: {what}");
-    assert_eq!(a.turns, b.turns, "turns: {what}");
-    assert_eq!(a.open.len(), b.open.len(), "open starts: {what}");
-    for ((i, x), (j, y)) in a.open.iter().zip(&b.open) {
-        assert!(i == j && bits(x) == bits(y), "open start {i}: {what}");
-    }
-    assert_eq!(a.work, b.work, "work: {what}");
-}
-
-#[test]
-fn threads_do_not_show() {
-    let quasiperiodic = Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range");
-    let cases = [
-        ("periodic", driven(0.1, 1.0, 2.0)),
-        ("slow", driven(0.1, 1.8, 2.0)),
-        ("only chaos", driven(0.1, 1.5, 1.8)),
-        ("chaos and others", driven(0.1, 1.52, 1.1)),
-        ("conservative", driven(0.0, 0.5, 2.0)),
-        ("quasiperiodic", quasiperiodic),
-    ];
-    for (what, pendulum) in cases {
-        let [a, b] = [1, 2].map(|threads| {
-            let options = Options { threads, ..unchecked() };
-            basins(&pendulum, &plane(24), &options, &Control::default()).expect("a map")
-        });
-        assert_same(&a.labels, &b.labels, what);
-        assert_eq!(bits(&a.fractions), bits(&b.fractions), "{what}");
-        assert_eq!(names(&a), names(&b), "{what}");
-        let layers = |map: &BasinMap| {
-            map.layers.as_ref().map(|l| {
-                (l.turns.clone(), l.exponent.iter().map(|e| e.to_bits()).collect::<Vec<_>>())
-            })
-        };
-        assert_eq!(layers(&a), layers(&b), "{what}");
-    }
-}
-
-#[test]
-fn threads_do_not_show_in_plain_integration() {
-    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, path());
-    let states = spread(3000, 3.1, 3.0);
-    let [a, b] = [1, 2].map(|threads| {
-        let (mut theta, mut velocity) = columns(&states);
-        let turns = advance(&strobe, &mut theta, &mut velocity, 100, threads, &Control::default());
-        (bits(&theta), bits(&velocity), turns.expect("turns"))
-    });
-    assert_eq!(a, b);
 }
 
 #[test]
@@ -133,7 +68,7 @@ fn a_part_of_the_plane_has_the_labels_of_the_whole_by_name() {
         velocity: axis("velocity", edge(-3.0, 3.0, 5.0), edge(-3.0, 3.0, 25.0), 20),
     };
     let small = basins(&pendulum, &part, &unchecked(), &Control::default()).expect("a map");
-    let (all, some) = (names(&whole), names(&small));
+    let (all, some) = (cell_names(&whole), cell_names(&small));
     for (k, name) in some.iter().enumerate() {
         let (column, row) = (k % 30 + 20, k / 30 + 5);
         assert_eq!(*name, all[row * 60 + column], "column {column}, row {row}");
@@ -148,7 +83,7 @@ fn the_tolerance_does_not_change_smooth_basins() {
         basins(&pendulum, &plane(100), &options, &Control::default()).expect("a map")
     });
     assert!(rough.steps * 3 < exact.steps && exact.reached_error <= 1e-11);
-    assert_eq!(names(&rough), names(&exact));
+    assert_eq!(cell_names(&rough), cell_names(&exact));
 }
 
 #[test]
@@ -234,57 +169,6 @@ fn avx512_and_avx2_give_the_same_map() {
 }
 
 #[test]
-fn a_cancelled_map_stops() {
-    for p in [1.0, 1.8] {
-        let control = Control::default();
-        control.cancel();
-        let map = basins(&driven(0.1, p, 2.0), &plane(40), &unchecked(), &control);
-        assert_eq!(map.err(), Some(Error::Interrupted));
-    }
-    let control = Control::default();
-    control.cancel();
-    let strobe = Strobe::new(&driven(0.0, 1.0, 2.0), 12, path());
-    let layers = finite_time(&strobe, &plane(40), 10, &pool(1).expect("a pool"), &control);
-    assert_eq!(layers.err(), Some(Error::Interrupted));
-    let mut theta = vec![0.0; 10];
-    let mut velocity = vec![1.0; 10];
-    let ends = advance(&strobe, &mut theta, &mut velocity, 10, 1, &control);
-    assert_eq!(ends.err(), Some(Error::Interrupted));
-}
-
-#[test]
-fn cancelling_works_while_a_map_is_made() {
-    // Seconds of work: chaos, search, labels, layers in turn.
-    for (p, omega, size) in [(1.8, 2.0, 2000), (1.7, 0.87, 3000), (1.0, 2.0, 4000)] {
-        let control = Control::default();
-        let (result, late) = std::thread::scope(|scope| {
-            let work = scope.spawn(|| {
-                let made = basins(&driven(0.1, p, omega), &plane(size), &unchecked(), &control);
-                (made.map(|_| ()), Instant::now())
-            });
-            std::thread::sleep(Duration::from_millis(300));
-            let asked = Instant::now();
-            control.cancel();
-            let (result, ended) = work.join().expect("no panic");
-            (result, ended.saturating_duration_since(asked))
-        });
-        eprintln!("{p} late {late:?}");
-        assert_eq!(result, Err(Error::Interrupted), "p = {p}");
-        assert!(late < Duration::from_secs(1), "p = {p}: {late:?} after Ctrl-C");
-    }
-}
-
-#[test]
-fn progress_ends_at_the_number_of_cells() {
-    for p in [0.6, 1.5] {
-        let control = Control::default();
-        let omega = if p > 1.0 { 1.8 } else { 2.0 };
-        basins(&driven(0.1, p, omega), &plane(30), &unchecked(), &control).expect("a map");
-        assert_eq!(control.progress(), (900, 900));
-    }
-}
-
-#[test]
 fn a_start_that_fails_is_a_status_and_the_others_do_not_see_it() {
     let mut states: Vec<State> = spread(60, 3.0, 2.5);
     let pendulum = driven(0.1, 0.6, 2.0);
@@ -299,7 +183,7 @@ fn a_start_that_fails_is_a_status_and_the_others_do_not_see_it() {
     assert_eq!((map.labels.label[17], map.labels.settle[17]), (FAILED, NEVER));
     assert!((map.share(FAILED) - 1.0 / 60.0).abs() < 1e-12);
     for i in (0..60).filter(|i| *i != 17) {
-        assert_eq!(names(&map)[i], names(&sound)[i], "start {i}");
+        assert_eq!(cell_names(&map)[i], cell_names(&sound)[i], "start {i}");
     }
 }
 

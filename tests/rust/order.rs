@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
+use pendmap::integrate::Schedule;
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::tableau::{A, B, BP, C, ORDER, STAGES};
-use pendmap::integrate::Schedule;
 use pendmap::model::Pendulum;
 
 use crate::support::{advanced, along, fine_strobe, path, spread};

@@ -7,6 +7,7 @@ use pendmap::lanes::Path;
 use pendmap::lanes::sine::Fine;
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::Control;
+use pendmap::maps::label::Labels;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 
@@ -55,10 +56,34 @@ pub fn plane(count: usize) -> Starts {
     }
 }
 
-/// The basins of `pendulum` on [`plane`], as a user gets them but for the reliability check.
+/// What a user gets but for the reliability check.
+pub fn unchecked() -> Options {
+    Options { check: false, ..Options::default() }
+}
+
+/// The basins of `pendulum` on [`plane`].
 pub fn basins_on_plane(pendulum: &Pendulum, count: usize) -> BasinMap {
-    let options = Options { check: false, ..Options::default() };
-    basins(pendulum, &plane(count), &options, &Control::default()).expect("a map")
+    basins(pendulum, &plane(count), &unchecked(), &Control::default()).expect("a map")
+}
+
+/// The name of every cell's attractor.
+pub fn cell_names(map: &BasinMap) -> Vec<&str> {
+    let name = |label: &i16| {
+        usize::try_from(label - 1).ok().map_or("none", |i| map.attractors[i].name.as_str())
+    };
+    map.labels.label.iter().map(name).collect()
+}
+
+/// Labels that agree in everything, bit for bit.
+pub fn assert_same(a: &Labels, b: &Labels, what: &str) {
+    assert_eq!(a.label, b.label, "labels: {what}");
+    assert_eq!(a.settle, b.settle, "settling times: {what}");
+    assert_eq!(a.turns, b.turns, "turns: {what}");
+    assert_eq!(a.open.len(), b.open.len(), "open starts: {what}");
+    for ((i, x), (j, y)) in a.open.iter().zip(&b.open) {
+        assert!(i == j && bits(x) == bits(y), "open start {i}: {what}");
+    }
+    assert_eq!(a.work, b.work, "work: {what}");
 }
 
 /// States as the two arrays that the kernel takes.

@@ -1,0 +1,111 @@
+//! Threads, progress and cancellation: what must not show, and what must show at once.
+
+use std::time::{Duration, Instant};
+
+use pendmap::error::Error;
+use pendmap::integrate::Strobe;
+use pendmap::maps::advance::advance;
+use pendmap::maps::basins::{BasinMap, Options, basins};
+use pendmap::maps::control::{Control, pool};
+use pendmap::maps::layers::finite_time;
+use pendmap::model::Pendulum;
+
+use crate::support::{
+    assert_same, bits, cell_names, columns, driven, path, plane, spread, unchecked,
+};
+
+#[test]
+fn threads_do_not_show() {
+    let quasiperiodic = Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range");
+    let cases = [
+        ("periodic", driven(0.1, 1.0, 2.0)),
+        ("slow", driven(0.1, 1.8, 2.0)),
+        ("only chaos", driven(0.1, 1.5, 1.8)),
+        ("chaos and others", driven(0.1, 1.52, 1.1)),
+        ("conservative", driven(0.0, 0.5, 2.0)),
+        ("quasiperiodic", quasiperiodic),
+    ];
+    for (what, pendulum) in cases {
+        let [a, b] = [1, 2].map(|threads| {
+            let options = Options { threads, ..unchecked() };
+            basins(&pendulum, &plane(24), &options, &Control::default()).expect("a map")
+        });
+        assert_same(&a.labels, &b.labels, what);
+        assert_eq!(bits(&a.fractions), bits(&b.fractions), "{what}");
+        assert_eq!(cell_names(&a), cell_names(&b), "{what}");
+        let layers = |map: &BasinMap| {
+            map.layers.as_ref().map(|l| {
+                (l.turns.clone(), l.exponent.iter().map(|e| e.to_bits()).collect::<Vec<_>>())
+            })
+        };
+        assert_eq!(layers(&a), layers(&b), "{what}");
+    }
+}
+
+#[test]
+fn threads_do_not_show_in_plain_integration() {
+    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, path());
+    let states = spread(3000, 3.1, 3.0);
+    let [a, b] = [1, 2].map(|threads| {
+        let (mut theta, mut velocity) = columns(&states);
+        let turns = advance(&strobe, &mut theta, &mut velocity, 100, threads, &Control::default());
+        (bits(&theta), bits(&velocity), turns.expect("turns"))
+    });
+    assert_eq!(a, b);
+}
+
+#[test]
+fn a_cancelled_map_stops() {
+    for p in [1.0, 1.8] {
+        let control = Control::default();
+        control.cancel();
+        let map = basins(&driven(0.1, p, 2.0), &plane(40), &unchecked(), &control);
+        assert_eq!(map.err(), Some(Error::Interrupted));
+    }
+    let control = Control::default();
+    control.cancel();
+    let strobe = Strobe::new(&driven(0.0, 1.0, 2.0), 12, path());
+    let layers = finite_time(&strobe, &plane(40), 10, &pool(1).expect("a pool"), &control);
+    assert_eq!(layers.err(), Some(Error::Interrupted));
+    let mut theta = vec![0.0; 10];
+    let mut velocity = vec![1.0; 10];
+    let ends = advance(&strobe, &mut theta, &mut velocity, 10, 1, &control);
+    assert_eq!(ends.err(), Some(Error::Interrupted));
+}
+
+#[test]
+fn cancelling_works_while_a_map_is_made() {
+    // Seconds of work each: the search, what it watches, labels, layers.
+    for (p, omega, size, milliseconds) in [
+        (1.8, 2.0, 2000, 100),
+        (1.8, 2.0, 2000, 400),
+        (1.7, 0.87, 4000, 100),
+        (1.7, 0.87, 4000, 400),
+        (1.0, 2.0, 4000, 300),
+    ] {
+        let control = Control::default();
+        let (result, late) = std::thread::scope(|scope| {
+            let work = scope.spawn(|| {
+                let made = basins(&driven(0.1, p, omega), &plane(size), &unchecked(), &control);
+                (made.map(|_| ()), Instant::now())
+            });
+            std::thread::sleep(Duration::from_millis(milliseconds));
+            let asked = Instant::now();
+            control.cancel();
+            let (result, ended) = work.join().expect("no panic");
+            (result, ended.saturating_duration_since(asked))
+        });
+        assert_eq!(result, Err(Error::Interrupted), "p = {p}");
+        assert!(late < Duration::from_secs(1), "p = {p}: {late:?} after Ctrl-C");
+    }
+}
+
+#[test]
+fn progress_ends_at_the_number_of_cells() {
+    for p in [0.6, 1.5] {
+        let control = Control::default();
+        let omega = if p > 1.0 { 1.8 } else { 2.0 };
+        basins(&driven(0.1, p, omega), &plane(30), &unchecked(), &control).expect("a map");
+        assert_eq!(control.progress(), (900, 900));
+    }
+}
