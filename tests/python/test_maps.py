@@ -275,7 +275,7 @@ def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) 
         # Cycles in less than 1 % of the plane, strongly stretched before they shrink.
         (
             {"gamma": 0.5, "p": 2.68962157, "omega": 2.30547203, "torque": 0.1},
-            "oscillation 7:0 (-)",
+            "oscillation 7:0 (+)",
         ),
         ({"gamma": 0.02, "p": 1.23286585, "omega": 0.94662087}, "oscillation 4:0 (+)"),
         # A running state next to the resonance 17/5: it takes long to fill its curve.
