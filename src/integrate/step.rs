@@ -44,27 +44,33 @@ impl<R: Real> Moving<R> {
     #[inline(always)]
     pub fn step<D: Degree>(&mut self, loads: &StageLoads, decay: f64) {
         let Self { half_turns, kick } = *self;
-        let mut k =
-            [conservative_load::<D, R>(loads.modulation[0], loads.torque[0], half_turns); STAGES];
-        for i in 1..STAGES {
-            let mut at = kick.scale_add(C[i], half_turns);
-            for j in 0..i {
-                if A[i][j] != 0.0 {
-                    at = k[j].scale_add(A[i][j], at);
-                }
-            }
-            k[i] = conservative_load::<D, R>(loads.modulation[i], loads.torque[i], at);
+        let mut k = [half_turns; STAGES];
+        // Written out by a macro: as a loop over the stages the compiler keeps it a loop, looks the
+        // coefficients up and branches on their zeros.
+        macro_rules! stage {
+            ($i:literal: $($j:literal)*) => {
+                let at = if C[$i] == 0.0 { half_turns } else { kick.scale_add(C[$i], half_turns) };
+                $(let at = if A[$i][$j] == 0.0 { at } else { k[$j].scale_add(A[$i][$j], at) };)*
+                k[$i] = conservative_load::<D, R>(loads.modulation[$i], loads.torque[$i], at);
+            };
         }
+        stage!(0:);
+        stage!(1: 0);
+        stage!(2: 0 1);
+        stage!(3: 0 1 2);
+        stage!(4: 0 1 2 3);
+        stage!(5: 0 1 2 3 4);
+        stage!(6: 0 1 2 3 4 5);
+        stage!(7: 0 1 2 3 4 5 6);
         let mut position = half_turns + kick;
         let mut speed = kick;
-        for i in 0..STAGES {
-            if B[i] != 0.0 {
-                position = k[i].scale_add(B[i], position);
-            }
-            if BP[i] != 0.0 {
-                speed = k[i].scale_add(BP[i], speed);
-            }
+        macro_rules! weigh {
+            ($($i:literal)*) => {$(
+                position = if B[$i] == 0.0 { position } else { k[$i].scale_add(B[$i], position) };
+                speed = if BP[$i] == 0.0 { speed } else { k[$i].scale_add(BP[$i], speed) };
+            )*};
         }
+        weigh!(0 1 2 3 4 5 6 7);
         *self = Self { half_turns: position, kick: speed.scale(decay) };
     }
 

@@ -43,7 +43,7 @@ mod x86 {
 
     impl Isa for V2 {
         const FUSED: bool = false;
-        type Lanes = Bundle<Self, 8>;
+        type Lanes = Bundle<Self, 6>;
         type Single = f64;
 
         #[inline(always)]
@@ -58,7 +58,7 @@ mod x86 {
 
     impl Isa for V3 {
         const FUSED: bool = true;
-        type Lanes = Bundle<Self, 8>;
+        type Lanes = Bundle<Self, 6>;
         type Single = Fused;
 
         #[inline(always)]
