@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::catalogue::Kind;
+use super::kind::Kind;
 use super::trap::Band;
 use crate::integrate::stroboscopic::State;
 use crate::integrate::{Moving, Strobe};

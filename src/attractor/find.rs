@@ -3,8 +3,9 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::capture::{self, Fate, Traps};
-use super::catalogue::{Attractor, Kind, arrange};
+use super::catalogue::{Attractor, arrange};
 use super::chaos::{self, ChaoticSet, Region};
+use super::kind::Kind;
 use super::trap::{Band, Ellipse, ellipses};
 use crate::integrate::accuracy::{distance, wrapped};
 use crate::integrate::{State, Strobe};

@@ -1,7 +1,8 @@
 //! Attractors: how they are found, told apart, named and recognised.
 //!
 //! - [`find`]: the search, from starts to a catalogue
-//! - [`catalogue`]: kinds, keys, names, twins
+//! - [`kind`]: what a motion looks like
+//! - [`catalogue`]: keys, names, twins
 //! - [`trap`]: regions that nothing leaves
 //! - [`capture`]: trajectories run until a trap holds them
 //! - [`chaos`]: what never closes
@@ -10,7 +11,9 @@ pub mod capture;
 pub mod catalogue;
 pub mod chaos;
 pub mod find;
+pub mod kind;
 pub mod trap;
 
-pub use catalogue::{Attractor, Kind};
+pub use catalogue::Attractor;
 pub use find::Catalogue;
+pub use kind::Kind;

@@ -63,9 +63,7 @@ impl Strobe {
         turns: &mut [f64],
         periods: usize,
     ) -> Result<(), Error> {
-        same_length(("theta", theta.len()), ("velocity", velocity.len()))?;
-        same_length(("theta", theta.len()), ("turns", turns.len()))?;
-        dispatch::run(self.path, Advance { strobe: self, theta, velocity, turns, periods });
+        dispatch::run(self.path, Advance::new(self, theta, velocity, turns, periods)?);
         Ok(())
     }
 
@@ -80,10 +78,7 @@ impl Strobe {
         turns: &mut [f64],
         periods: usize,
     ) -> Result<(), Error> {
-        same_length(("theta", theta.len()), ("velocity", velocity.len()))?;
-        same_length(("theta", theta.len()), ("turns", turns.len()))?;
-        let job = Advance { strobe: self, theta, velocity, turns, periods };
-        dispatch::run(self.path, Singly(job));
+        dispatch::run(self.path, Singly(Advance::new(self, theta, velocity, turns, periods)?));
         Ok(())
     }
 
@@ -149,7 +144,19 @@ struct Advance<'a> {
     periods: usize,
 }
 
-impl Advance<'_> {
+impl<'a> Advance<'a> {
+    fn new(
+        strobe: &'a Strobe,
+        theta: &'a mut [f64],
+        velocity: &'a mut [f64],
+        turns: &'a mut [f64],
+        periods: usize,
+    ) -> Result<Self, Error> {
+        same_length(("theta", theta.len()), ("velocity", velocity.len()))?;
+        same_length(("theta", theta.len()), ("turns", turns.len()))?;
+        Ok(Self { strobe, theta, velocity, turns, periods })
+    }
+
     #[inline(always)]
     fn over<D: Degree, L: Lane>(self, token: L::Token) {
         let schedule = &self.strobe.schedule;

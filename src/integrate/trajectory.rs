@@ -13,8 +13,10 @@ use crate::model::Pendulum;
 
 /// Longest step, in units of 1/sqrt(1 + |p|).
 const LONGEST_STEP: f64 = 0.25;
-/// Halvings at the most.
-const HALVINGS: usize = 9;
+/// Steps between two samples at the most.
+const MOST_SUBSTEPS: usize = 4096;
+/// Errors below this may be those of rounding, amplified by the motion.
+const ROUNDING: f64 = 1e-7;
 /// Batches whose spread gives the standard error of an exponent.
 const BATCHES: usize = 20;
 /// The part of a trajectory that turns the tangent into the direction of growth.
@@ -88,22 +90,26 @@ pub fn simulate(
     let longest = LONGEST_STEP / (1.0 + pendulum.drive.p.abs()).sqrt();
     let mut substeps = (interval / longest).ceil().max(1.0) as usize;
     let mut coarse = Run::of(pendulum, request, substeps, cancel)?;
-    for halving in 0..HALVINGS {
+    let mut before = f64::INFINITY;
+    loop {
         let fine = Run::of(pendulum, request, 2 * substeps, cancel)?;
-        let check = (PERIODS * request.samples).min(fine.theta.len() - 1);
         let last = fine.theta.len() - 1;
         let distance = |i: usize| {
             (fine.theta[i] - coarse.theta[i]).hypot(fine.velocity[i] - coarse.velocity[i])
         };
-        let (error, end_error) = (distance(check), distance(last));
-        substeps *= 2;
-        let done = error <= request.tol || halving + 1 == HALVINGS || !error.is_finite();
-        coarse = fine;
-        if done {
+        let error = distance((PERIODS * request.samples).min(last));
+        let end_error = distance(last);
+        // Where halving no longer helps, rounding is all that is left, and more steps make more.
+        let rounding = error < ROUNDING && error > 0.25 * before;
+        if rounding || !error.is_finite() {
             return Ok(coarse.finish(pendulum, request, substeps, error, end_error));
         }
+        substeps *= 2;
+        if error <= request.tol || substeps >= MOST_SUBSTEPS {
+            return Ok(fine.finish(pendulum, request, substeps, error, end_error));
+        }
+        (coarse, before) = (fine, error);
     }
-    Ok(coarse.finish(pendulum, request, substeps, f64::INFINITY, f64::INFINITY))
 }
 
 #[derive(Default)]

@@ -20,7 +20,8 @@ const SEARCH_SAMPLE: usize = 400;
 const FURTHER_SAMPLE: usize = 256;
 /// Further searches at the most.
 const FURTHER: usize = 6;
-/// Periods after which a search begins to watch what is left.
+/// Periods after which a search begins to watch what is left, whatever bound is set for the starts:
+/// what counts as chaos does not depend on it.
 const SEARCH_BOUND: u32 = 1000;
 /// Where chaos coexists with other attractors, a start is given this many times the longest
 /// settling time that the search saw before it counts as chaotic.
@@ -128,7 +129,7 @@ pub fn basins(
     let mut catalogue = Catalogue::new(&strobe);
     let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
     let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
-    catalogue.search(&strobe, &seeds, SEARCH_BOUND.min(max_periods), control.flag());
+    catalogue.search(&strobe, &seeds, SEARCH_BOUND, control.flag());
     control.check()?;
 
     let plane = if !pendulum.is_dissipative() {
@@ -201,7 +202,7 @@ fn to_capture(
         let stride = labels.open.len().div_ceil(FURTHER_SAMPLE);
         let states: Vec<State> = labels.open.iter().step_by(stride).map(|(_, s)| *s).collect();
         let keys: Vec<[u64; 2]> = catalogue.attractors.iter().map(key).collect();
-        if !catalogue.search(strobe, &states, SEARCH_BOUND.min(max_periods), control.flag()) {
+        if !catalogue.search(strobe, &states, SEARCH_BOUND, control.flag()) {
             break;
         }
         control.check()?;

@@ -1,11 +1,13 @@
 //! Periodic orbits of the stroboscopic map by Newton's method.
 
+use std::f64::consts::TAU;
+
 use nalgebra::Matrix2;
 
 use super::floquet::{Multipliers, multipliers};
 use super::poincare::{PoincareMap, closing_gap};
 use crate::integrate::State;
-use crate::integrate::accuracy::distance;
+use crate::integrate::accuracy::{distance, wrapped};
 
 /// Largest `|P^n(x) - x|` of an orbit that counts as found.
 pub const RESIDUAL: f64 = 1e-12;
@@ -55,7 +57,7 @@ impl PeriodicOrbit {
 /// shrink by `exp(-gamma T)` in each period, which makes the multipliers' product `exp(-gamma n T)`.
 #[must_use]
 pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<PeriodicOrbit> {
-    let point = polish(map, start, n, reach)?;
+    let point = polish(map, [wrapped(start[0]), start[1]], n, reach)?;
     let image = |d: usize| map.iterate(point, d);
     let smallest = (1..=n)
         .filter(|d| n.is_multiple_of(*d))
@@ -99,15 +101,17 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<State
 fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> {
     let mut points = Vec::with_capacity(n);
     let mut derivatives = Vec::with_capacity(n);
-    let mut w = 0;
+    let mut way = 0.0;
     let mut state = first;
     for _ in 0..n {
         points.push(state);
         let image = map.once(state);
         derivatives.push(image.derivative);
-        w += image.turns;
+        // Not the turns taken off alone: a point at pi may come back at -pi.
+        way += image.turns as f64 * TAU + image.state[0] - state[0];
         state = image.state;
     }
+    let w = (way / TAU).round() as i64;
     let residual = closing_gap(first, state).norm();
     let lowest = (0..n).min_by(|a, b| points[*a][0].total_cmp(&points[*b][0]))?;
     points.rotate_left(lowest);

@@ -1,16 +1,26 @@
 //! Chaotic attractors, and transients that must not be taken for such.
 
+use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
+use pendmap::attractor::Kind;
 use pendmap::attractor::capture::{Fate, outcomes};
-use pendmap::attractor::{Catalogue, Kind};
 use pendmap::integrate::State;
-use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::maps::basins::{BasinMap, Plane};
+use pendmap::maps::label::NEVER;
 
-use crate::support::{basins_on_plane, driven, path, plane};
+use crate::support::{basins_on_plane, chaos_among_others, driven, plane};
 use crate::truths::{model, number, table, truths};
+
+/// The three points of figure 2 and one more with a reference exponent: p, omega and the map.
+fn planes() -> &'static [(f64, f64, BasinMap); 4] {
+    static PLANES: OnceLock<[(f64, f64, BasinMap); 4]> = OnceLock::new();
+    PLANES.get_or_init(|| {
+        [(1.03, 0.87), (1.7, 0.87), (1.5, 1.8), (2.0, 2.0)]
+            .map(|(p, omega)| (p, omega, basins_on_plane(&driven(0.1, p, omega), 40)))
+    })
+}
 
 /// The one chaotic attractor of a plane that has nothing else.
 fn only_chaos(map: &BasinMap) -> &pendmap::attractor::Attractor {
@@ -26,9 +36,8 @@ fn only_chaos(map: &BasinMap) -> &pendmap::attractor::Attractor {
 
 #[test]
 fn tumbling_chaos_takes_everything_at_the_three_points_of_figure_2() {
-    for (p, omega) in [(1.03, 0.87), (1.7, 0.87), (1.5, 1.8)] {
-        let map = basins_on_plane(&driven(0.1, p, omega), 40);
-        let chaos = only_chaos(&map);
+    for (_, _, map) in planes() {
+        let chaos = only_chaos(map);
         // The points lie on it: none is captured by anything, and both senses are there.
         assert!(
             chaos.points.iter().any(|s| s[1] > 0.5) && chaos.points.iter().any(|s| s[1] < -0.5)
@@ -45,8 +54,12 @@ fn tumbling_chaos_takes_everything_at_the_three_points_of_figure_2() {
 #[test]
 fn exponents_are_the_reference_ones() {
     for (name, entry) in table(&truths()["lyapunov"]) {
-        let map = basins_on_plane(&model(entry), 20);
-        let chaos = only_chaos(&map);
+        let drive = model(entry).drive;
+        let own = |(p, omega, _): &&(f64, f64, BasinMap)| {
+            (p - drive.p).hypot(omega - drive.omega) < 1e-12
+        };
+        let (_, _, map) = planes().iter().find(own).expect("its plane");
+        let chaos = only_chaos(map);
         let (exact, stderr) = (number(&entry["lle_per_tau"]), number(&entry["se"]));
         let allowed = 3.0 * stderr.hypot(chaos.exponent_stderr);
         let error = (chaos.exponent - exact).abs();
@@ -90,25 +103,20 @@ fn long_transients_are_not_called_chaotic() {
 
 #[test]
 fn chaos_beside_other_attractors() {
-    let pendulum = driven(0.1, 1.52, 1.1);
     let starts = plane(24);
-    let map = basins_on_plane(&pendulum, 24);
-    assert_eq!(map.plane, Plane::Basins);
-    let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
+    let (strobe, catalogue, labels) = chaos_among_others();
+    assert!(catalogue.has_chaos() && catalogue.only_chaos().is_none());
+    let names: Vec<&str> = catalogue.attractors.iter().map(|a| a.name.as_str()).collect();
     assert!(names.contains(&"rest") && names.contains(&"tumbling chaos"), "{names:?}");
     let chaos = names.iter().position(|name| *name == "tumbling chaos").expect("it");
-    assert!(map.fractions[chaos] > 0.02 && map.fractions[chaos] < 0.1, "{:?}", map.fractions);
+    let own = |i: &usize| labels.label[*i] == chaos as i16 + 1;
+    let cells: Vec<usize> = (0..starts.len()).filter(own).collect();
+    let share = cells.len() as f64 / starts.len() as f64;
+    assert!(share > 0.02 && share < 0.1, "{share}");
+    assert!(cells.iter().all(|i| labels.settle[*i] == NEVER));
     // What is labelled so is captured by none of the others for very long.
-    let label = chaos as i16 + 1;
-    let cells: Vec<usize> = (0..576).filter(|i| map.labels.label[*i] == label).collect();
-    assert!(cells.iter().all(|i| map.labels.settle[*i] == -1));
-    let sample = starts.sampled_states(400, 0);
-    let (strobe, _) = choose(&pendulum, &sample, 1e-6, path()).expect("steps");
-    let mut catalogue = Catalogue::new(&strobe);
-    assert!(catalogue.search(&strobe, &sample, 1000, &AtomicBool::new(false)));
-    assert!(catalogue.has_chaos() && catalogue.only_chaos().is_none());
     let states: Vec<State> = cells.iter().map(|i| starts.get(*i)).collect();
-    for outcome in outcomes(&strobe, &catalogue.traps, 3000, &states) {
+    for outcome in outcomes(strobe, &catalogue.traps, 3000, &states) {
         assert_eq!(outcome.fate, Fate::Open);
     }
 }

@@ -1,13 +1,17 @@
 //! What several modules need: paths, pendulums, starts that cover a plane, whole maps.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
 
+use pendmap::attractor::Catalogue;
+use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::{Moving, Schedule, State, Strobe};
 use pendmap::lanes::Path;
 use pendmap::lanes::sine::Fine;
 use pendmap::maps::basins::{BasinMap, Options, basins};
-use pendmap::maps::control::Control;
-use pendmap::maps::label::Labels;
+use pendmap::maps::control::{Control, pool};
+use pendmap::maps::label::{Labels, label};
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 
@@ -64,6 +68,40 @@ pub fn unchecked() -> Options {
 /// The basins of `pendulum` on [`plane`].
 pub fn basins_on_plane(pendulum: &Pendulum, count: usize) -> BasinMap {
     basins(pendulum, &plane(count), &unchecked(), &Control::default()).expect("a map")
+}
+
+/// The steps and attractors of a plane on a chosen path.
+pub fn searched(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Catalogue) {
+    let sample = starts.sampled_states(400, 0);
+    let (strobe, _) = choose(pendulum, &sample, 1e-6, path).expect("steps");
+    let mut catalogue = Catalogue::new(&strobe);
+    catalogue.search(&strobe, &sample, 1000, &AtomicBool::new(false));
+    (strobe, catalogue)
+}
+
+/// The steps, attractors and labels of a plane on a chosen path.
+pub fn labelled(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Catalogue, Labels) {
+    let (strobe, catalogue) = searched(pendulum, starts, path);
+    let labels = relabelled(&strobe, &catalogue, starts, None, 1);
+    (strobe, catalogue, labels)
+}
+
+/// Chaos beside other attractors, on `plane(24)`: p = 1.52, omega = 1.1.
+pub fn chaos_among_others() -> &'static (Strobe, Catalogue, Labels) {
+    static FOUND: OnceLock<(Strobe, Catalogue, Labels)> = OnceLock::new();
+    FOUND.get_or_init(|| labelled(&driven(0.1, 1.52, 1.1), &plane(24), path()))
+}
+
+/// The labels of all starts, or of `picks`.
+pub fn relabelled(
+    strobe: &Strobe,
+    catalogue: &Catalogue,
+    starts: &Starts,
+    picks: Option<&[usize]>,
+    threads: usize,
+) -> Labels {
+    let pool = pool(threads).expect("a pool");
+    label(strobe, catalogue, starts, picks, 4000, &pool, &Control::default()).expect("labels")
 }
 
 /// The name of every cell's attractor.

@@ -5,41 +5,53 @@ use std::time::{Duration, Instant};
 use pendmap::error::Error;
 use pendmap::integrate::Strobe;
 use pendmap::maps::advance::advance;
-use pendmap::maps::basins::{BasinMap, Options, basins};
+use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::{Control, pool};
 use pendmap::maps::layers::finite_time;
 use pendmap::model::Pendulum;
 
 use crate::support::{
-    assert_same, bits, cell_names, columns, driven, path, plane, spread, unchecked,
+    assert_same, bits, cell_names, chaos_among_others, columns, driven, path, plane, relabelled,
+    searched, spread, unchecked,
 };
 
 #[test]
-fn threads_do_not_show() {
-    let quasiperiodic = Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range");
-    let cases = [
+fn threads_do_not_show_in_a_map() {
+    for (what, pendulum) in [
         ("periodic", driven(0.1, 1.0, 2.0)),
-        ("slow", driven(0.1, 1.8, 2.0)),
-        ("only chaos", driven(0.1, 1.5, 1.8)),
-        ("chaos and others", driven(0.1, 1.52, 1.1)),
         ("conservative", driven(0.0, 0.5, 2.0)),
-        ("quasiperiodic", quasiperiodic),
-    ];
-    for (what, pendulum) in cases {
+        ("quasiperiodic", Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range")),
+    ] {
         let [a, b] = [1, 2].map(|threads| {
             let options = Options { threads, ..unchecked() };
-            basins(&pendulum, &plane(24), &options, &Control::default()).expect("a map")
+            basins(&pendulum, &plane(40), &options, &Control::default()).expect("a map")
         });
         assert_same(&a.labels, &b.labels, what);
         assert_eq!(bits(&a.fractions), bits(&b.fractions), "{what}");
         assert_eq!(cell_names(&a), cell_names(&b), "{what}");
-        let layers = |map: &BasinMap| {
-            map.layers.as_ref().map(|l| {
-                (l.turns.clone(), l.exponent.iter().map(|e| e.to_bits()).collect::<Vec<_>>())
-            })
-        };
-        assert_eq!(layers(&a), layers(&b), "{what}");
     }
+}
+
+#[test]
+fn threads_do_not_show_in_labels() {
+    let (starts, slow) = (plane(24), driven(0.1, 1.8, 2.0));
+    let (strobe, catalogue) = searched(&slow, &starts, path());
+    let [a, b] = [1, 2].map(|threads| relabelled(&strobe, &catalogue, &starts, None, threads));
+    assert_same(&a, &b, "slow");
+    let (strobe, catalogue, labels) = chaos_among_others();
+    assert_same(labels, &relabelled(strobe, catalogue, &starts, None, 2), "chaos among others");
+}
+
+#[test]
+fn threads_do_not_show_in_layers() {
+    let strobe = Strobe::new(&driven(0.1, 1.7, 0.87), 40, path());
+    let [a, b] = [1, 2].map(|threads| {
+        let pool = pool(threads).expect("a pool");
+        let layers = finite_time(&strobe, &plane(100), 5, &pool, &Control::default());
+        let layers = layers.expect("layers");
+        (layers.turns, layers.exponent.iter().map(|e| e.to_bits()).collect::<Vec<_>>())
+    });
+    assert_eq!(a, b);
 }
 
 #[test]

@@ -1,24 +1,16 @@
 //! Traps: whatever starts inside one ends on its attractor.
 
 use std::f64::consts::TAU;
-use std::sync::atomic::AtomicBool;
+use std::sync::OnceLock;
 
 use pendmap::attractor::Catalogue;
 use pendmap::attractor::capture::{Fate, outcomes};
 use pendmap::attractor::trap::Ellipse;
-use pendmap::integrate::accuracy::{choose, distance};
+use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::{State, Strobe};
 use pendmap::model::Pendulum;
 
-use crate::support::{advanced, driven, fine_strobe, path, plane, undriven};
-
-fn searched(pendulum: &Pendulum, tol: f64) -> (Strobe, Catalogue) {
-    let starts = plane(100).sampled_states(400, 0);
-    let (strobe, _) = choose(pendulum, &starts, tol, path()).expect("steps");
-    let mut catalogue = Catalogue::new(&strobe);
-    catalogue.search(&strobe, &starts, 1000, &AtomicBool::new(false));
-    (strobe, catalogue)
-}
+use crate::support::{advanced, driven, fine_strobe, path, plane, searched, undriven};
 
 /// States inside an ellipse: spread over its area, and close to its edge all round.
 fn inside(ellipse: &Ellipse) -> Vec<State> {
@@ -35,19 +27,26 @@ fn inside(ellipse: &Ellipse) -> Vec<State> {
     edge.chain(area).collect()
 }
 
-fn pendulums() -> Vec<Pendulum> {
-    [0.3, 0.5, 1.0, 1.34, 1.8]
-        .map(|p| driven(0.1, p, 2.0))
-        .into_iter()
-        .chain([Pendulum::new(0.1, 0.5, 1.5, 0.3, 0.2).expect("in range"), undriven(0.2, 0.0)])
-        .collect()
+/// Pendulums with their maps and attractors, each searched once.
+fn cases() -> &'static [(Pendulum, Strobe, Catalogue)] {
+    static CASES: OnceLock<Vec<(Pendulum, Strobe, Catalogue)>> = OnceLock::new();
+    CASES.get_or_init(|| {
+        [0.3, 0.5, 1.0, 1.34, 1.8]
+            .map(|p| driven(0.1, p, 2.0))
+            .into_iter()
+            .chain([Pendulum::new(0.1, 0.5, 1.5, 0.3, 0.2).expect("in range"), undriven(0.2, 0.0)])
+            .map(|pendulum| {
+                let (strobe, catalogue) = searched(&pendulum, &plane(100), path());
+                (pendulum, strobe, catalogue)
+            })
+            .collect()
+    })
 }
 
 #[test]
 fn whatever_is_inside_an_ellipse_converges_to_its_attractor() {
-    for pendulum in pendulums() {
-        let (strobe, catalogue) = searched(&pendulum, 1e-6);
-        let fine = fine_strobe(&pendulum, 2 * strobe.steps(), path());
+    for (pendulum, strobe, catalogue) in cases() {
+        let fine = fine_strobe(pendulum, 2 * strobe.steps(), path());
         assert!(!catalogue.traps.ellipses.is_empty(), "{pendulum:?}");
         for ellipse in &catalogue.traps.ellipses {
             let attractor = &catalogue.attractors[ellipse.attractor];
@@ -69,8 +68,7 @@ fn whatever_is_inside_an_ellipse_converges_to_its_attractor() {
 
 #[test]
 fn within_four_returns_the_height_has_fallen() {
-    for pendulum in pendulums() {
-        let (strobe, catalogue) = searched(&pendulum, 1e-6);
+    for (pendulum, strobe, catalogue) in cases() {
         for ellipse in &catalogue.traps.ellipses {
             let n = catalogue.attractors[ellipse.attractor].n.expect("a cycle");
             let states = inside(ellipse);
@@ -90,7 +88,7 @@ fn within_four_returns_the_height_has_fallen() {
             let mut now = states.clone();
             let mut lowest = before.clone();
             for _ in 0..4 {
-                now = advanced(&strobe, &now, n);
+                now = advanced(strobe, &now, n);
                 for (low, height) in lowest.iter_mut().zip(heights(&now)) {
                     *low = low.min(height);
                 }
@@ -104,8 +102,7 @@ fn within_four_returns_the_height_has_fallen() {
 
 #[test]
 fn ellipses_are_centred_on_the_points_of_their_attractors() {
-    for pendulum in pendulums() {
-        let (_, catalogue) = searched(&pendulum, 1e-6);
+    for (pendulum, _, catalogue) in cases() {
         for (i, attractor) in catalogue.attractors.iter().enumerate() {
             for (k, point) in attractor.points.iter().enumerate() {
                 let at = |e: &&Ellipse| e.attractor == i && e.point == k;
@@ -124,7 +121,7 @@ fn ellipses_are_centred_on_the_points_of_their_attractors() {
 fn capture_agrees_with_waiting() {
     // Labels by traps against where trajectories are after 3000 periods, at a smooth point.
     let pendulum = driven(0.1, 0.6, 2.0);
-    let (strobe, catalogue) = searched(&pendulum, 1e-6);
+    let (strobe, catalogue) = searched(&pendulum, &plane(100), path());
     let starts: Vec<State> = (0..1600).map(|i| plane(40).get(i)).collect();
     let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
     let ends = advanced(&fine, &starts, 3000);
@@ -146,7 +143,7 @@ fn capture_agrees_with_waiting() {
 fn a_band_holds_the_running_state() {
     for pendulum in [undriven(0.1, 0.5), Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range")]
     {
-        let (strobe, catalogue) = searched(&pendulum, 1e-6);
+        let (strobe, catalogue) = searched(&pendulum, &plane(100), path());
         let [band] = catalogue.traps.bands.as_slice() else { panic!("one band: {pendulum:?}") };
         assert!(band.half_width > 0.1, "{}", band.half_width);
         let states: Vec<State> = (0..500)
