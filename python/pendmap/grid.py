@@ -47,6 +47,11 @@ class Axis:
         return self.low + (index + 0.5) * ((self.high - self.low) / self.count)
 
     @property
+    def bounds(self) -> dict[str, float]:
+        """The outer edges, as attributes of a coordinate."""
+        return {"low": float(self.low), "high": float(self.high)}
+
+    @property
     def as_tuple(self) -> tuple[float, float, int]:
         """``(low, high, count)``."""
         return (float(self.low), float(self.high), int(self.count))

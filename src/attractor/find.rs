@@ -24,7 +24,7 @@ const TRIES: usize = 24;
 /// Periods before the first cycle test; each later round is twice as long as the one before.
 const FIRST_ROUND: u32 = 32;
 /// Trajectories that nothing has captured are watched for this many times the first bound more.
-const WATCH: u32 = 4;
+pub const WATCH: u32 = 4;
 /// Of the trajectories left over, so many are watched.
 const WATCHED: usize = 256;
 

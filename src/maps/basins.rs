@@ -6,6 +6,7 @@ use super::layers::{FiniteTime, finite_time};
 use super::reliability::{Reliability, reliability};
 use super::starts::Starts;
 use super::texture::{Texture, texture};
+use crate::attractor::find::WATCH;
 use crate::attractor::{Attractor, Catalogue};
 use crate::error::Error;
 use crate::integrate::{State, Strobe, accuracy};
@@ -23,6 +24,8 @@ const FURTHER: usize = 6;
 /// Periods after which a search begins to watch what is left, whatever bound is set for the starts:
 /// what counts as chaos does not depend on it.
 const SEARCH_BOUND: u32 = 1000;
+/// Periods within which nothing may capture a trajectory that counts as chaotic.
+pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + WATCH);
 /// Where chaos coexists with other attractors, a start is given this many times the longest
 /// settling time that the search saw before it counts as chaotic.
 const PATIENCE: u32 = 10;

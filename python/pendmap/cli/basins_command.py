@@ -89,6 +89,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "longest_settle",
         "neighbours_agree",
         "neighbours_chance",
+        "chaos_bound",
         "plane",
         "layer_periods",
         "steps_per_period",

@@ -56,8 +56,8 @@ def figure(
         style.colour_map(colormap)
         if shown == ("labels",):
             raise InputError(f"colormap {colormap!r}: labels are coloured by attractor")
-    theta = plane.cell_edges(dataset["theta"].values)
-    velocity = plane.cell_edges(dataset["velocity"].values)
+    theta = plane.cell_edges(dataset["theta"])
+    velocity = plane.cell_edges(dataset["velocity"])
     extent = (*theta, *velocity)
     listed = legend.entries(dataset)
     chaos = [e for e in listed if e.chaotic and len(e.points)]

@@ -21,9 +21,15 @@ FEWEST, MOST = 2.0, 6.5
 """Steps between ticks that a range of angles may have."""
 
 
-def cell_edges(centres: npt.ArrayLike) -> tuple[float, float]:
-    """Return the outer edges of cells with equidistant centres; a lone cell counts as 1 wide."""
-    x = np.asarray(centres, dtype=float)
+def cell_edges(axis: xr.DataArray) -> tuple[float, float]:
+    """Return the outer edges of an axis of cells.
+
+    Its attributes ``low`` and ``high``, or else half a cell beyond its equidistant centres, where a
+    lone cell counts as 1 wide.
+    """
+    if "low" in axis.attrs and "high" in axis.attrs:
+        return float(axis.attrs["low"]), float(axis.attrs["high"])
+    x = np.asarray(axis.values, dtype=float)
     half = 0.5 * (x[-1] - x[0]) / (x.size - 1) if x.size > 1 else 0.5
     return float(x[0] - half), float(x[-1] + half)
 

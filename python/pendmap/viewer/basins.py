@@ -75,9 +75,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
-    return frame.Frame(
-        plane.cell_edges(dataset["theta"].values), plane.cell_edges(dataset["velocity"].values)
-    )
+    return frame.Frame(plane.cell_edges(dataset["theta"]), plane.cell_edges(dataset["velocity"]))
 
 
 def _around_attractors(listed: list[legend.Entry]) -> frame.Frame:

@@ -1,0 +1,155 @@
+"""The labelled dataset of a basin map: cells, table of attractors, attributes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap import _core
+from pendmap.store import FORMAT_VERSION
+from pendmap.summary import summarise
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pendmap.model import Pendulum
+
+__all__ = ["RELIABLE", "cells", "complete", "table"]
+
+RELIABLE: Final = 0.05
+"""Labels of which a larger share changes under half the step or mirroring are not reliable."""
+
+_LAYERS: Final = {
+    "basins": "labels",
+    "only_chaos": "finite_time",
+    "conservative": "finite_time",
+}
+
+
+def cells(raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...]) -> dict[str, Any]:
+    """Return the variables with one value a start, over ``dims`` of ``shape``."""
+    finite_time = _LAYERS[raw["plane"]] == "finite_time"
+    when = f"after {raw['layer_periods']} periods" if finite_time else "until settled"
+    label = {
+        "long_name": "attractor",
+        "comment": "number of the attractor; 0 undecided within the bound, -1 failed or diverged",
+    }
+    cells: dict[str, Any] = {
+        "label": (dims, raw["label"].reshape(shape), label),
+        "settle_periods": (
+            dims,
+            raw["settle"].reshape(shape),
+            {
+                "long_name": "forcing periods until an attractor's trap holds the trajectory",
+                "units": "1",
+                "comment": "-1 where no attractor captured it",
+            },
+        ),
+        "net_turns": (
+            dims,
+            raw["turns"].reshape(shape),
+            {"long_name": f"net full turns {when}", "units": "1"},
+        ),
+    }
+    exponent = raw["finite_time_exponent"]
+    if exponent is not None:
+        attributes = {"long_name": f"finite-time Lyapunov exponent {when}", "units": "1 per tau"}
+        cells["finite_time_exponent"] = (dims, exponent.reshape(shape), attributes)
+    return cells
+
+
+def complete(
+    dataset: xr.Dataset,
+    raw: dict[str, Any],
+    pendulum: Pendulum,
+    choices: _core._Choices,
+    seconds: float,
+) -> xr.Dataset:
+    """Add the table of attractors, all attributes and the summary to the cells."""
+    count = dataset["label"].size
+    dataset = dataset.assign(table(raw["attractors"], count)).assign_coords(
+        attractor=("attractor", np.array([a["name"] for a in raw["attractors"]], dtype=str)),
+    )
+    settle = dataset["settle_periods"].values
+    settled = settle[settle >= 0]
+    mirror = raw["unreliable_mirror"]
+    dataset.attrs = {
+        "kind": "basins",
+        "title": pendulum.title,
+        "gamma": pendulum.gamma,
+        "p": pendulum.p,
+        "omega": pendulum.omega,
+        "phase": pendulum.phase,
+        "torque": pendulum.torque,
+        "section": "tau = 0 mod T, T = 2 pi / omega (2 pi without drive), at the drive's phase",
+        "tol": choices["tol"],
+        "reached_error": raw["reached_error"],
+        "steps_per_period": raw["steps_per_period"],
+        "max_periods": raw["bound"],
+        "chaos_bound": raw["chaos_bound"],
+        "plane": raw["plane"],
+        "layers": _LAYERS[raw["plane"]],
+        "layer_periods": raw["layer_periods"],
+        "cells": count,
+        "undecided": raw["undecided"],
+        "failed": raw["failed"],
+        "mean_periods": raw["mean_periods"],
+        "mean_settle": float(settled.mean()) if settled.size else -1.0,
+        "longest_settle": int(settled.max()) if settled.size else -1,
+        "basin_entropy": raw["basin_entropy"],
+        "neighbours_agree": raw["neighbours_agree"],
+        "neighbours_chance": raw["chance"],
+        "unreliable": raw["unreliable"],
+        "unreliable_half_step": raw["unreliable_half_step"],
+        **({} if mirror is None else {"unreliable_mirror": mirror}),
+        "labels_sampled": raw["labels_sampled"],
+        "labels_reliable": int(raw["unreliable"] <= RELIABLE),
+        "seconds": seconds,
+        "simd": raw["simd"],
+        "threads": choices["threads"] or _core.default_threads(),
+        "seed": choices["seed"],
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    dataset.attrs["summary"] = summarise(dataset)
+    return dataset
+
+
+def table(attractors: list[dict[str, Any]], count: int) -> dict[str, Any]:
+    """The attractors and their stroboscopic points as variables."""
+
+    def column(key: str, none: float) -> list[float]:
+        return [none if a[key] is None else a[key] for a in attractors]
+
+    multipliers = np.full((len(attractors), 2, 2), np.nan)
+    for row, attractor in zip(multipliers, attractors, strict=True):
+        for k, pair in enumerate(attractor["multipliers"]):
+            row[k] = pair
+    closed = [a["points"][0] if a["n"] is not None else (np.nan, np.nan) for a in attractors]
+    fraction = np.array([a["fraction"] for a in attractors], dtype=float)
+    points = [(k + 1, *p) for k, a in enumerate(attractors) for p in a["points"]]
+    flat = np.array(points, dtype=float).reshape(-1, 3)
+    one = "attractor"
+    return {
+        "id": (one, np.arange(1, len(attractors) + 1, dtype=np.int32)),
+        "kind": (one, np.array([a["kind"] for a in attractors], dtype=str)),
+        "n": (one, np.array(column("n", 0), dtype=np.int32), {"comment": "0: no meaning"}),
+        "w": (one, np.array(column("w", 0), dtype=np.int32)),
+        "theta_point": (one, np.array([c[0] for c in closed], dtype=float), {"units": "rad"}),
+        "velocity_point": (one, np.array([c[1] for c in closed], dtype=float), {"units": "1"}),
+        "period": (one, np.array(column("period", np.nan), dtype=float), {"units": "tau"}),
+        "exponent": (one, np.array(column("exponent", np.nan), dtype=float)),
+        "exponent_stderr": (one, np.array(column("exponent_stderr", np.nan), dtype=float)),
+        "fraction": (one, fraction),
+        "stderr": (one, np.sqrt(fraction * (1 - fraction) / max(count, 1))),
+        "twin": (
+            one,
+            np.array(column("twin", 0), dtype=np.int32),
+            {"comment": "number of the mirror image; its own where symmetric, 0 if not known"},
+        ),
+        "multipliers": ((one, "eigenvalue", "part"), multipliers, {"comment": "part: re, im"}),
+        "point_attractor": ("point", flat[:, 0].astype(np.int32)),
+        "point_theta": ("point", flat[:, 1], {"units": "rad"}),
+        "point_velocity": ("point", flat[:, 2], {"units": "1"}),
+    }
