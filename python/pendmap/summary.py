@@ -50,13 +50,14 @@ def _conservative(dataset: xr.Dataset) -> str:
 
 
 def _only_chaos(dataset: xr.Dataset) -> str:
+    a = dataset.attrs
     name = str(dataset["attractor"].values[0])
     exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
     return (
         f"One chaotic attractor takes everything: {name}, exponent {exponent:.4f} +- {error:.4f} "
-        f"per unit of tau; nothing captured a sampled trajectory within "
-        f"{dataset.attrs['chaos_bound']} periods. Labels tell nothing here: net turns and the finite-time exponent after "
-        f"{dataset.attrs['layer_periods']} periods are shown instead."
+        f"per unit of tau; nothing captured a sampled trajectory within {a['chaos_bound']} periods.\n"
+        "Labels tell nothing here: net turns and the finite-time exponent after "
+        f"{a['layer_periods']} periods are shown instead."
     )
 
 

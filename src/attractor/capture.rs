@@ -64,9 +64,15 @@ pub fn run(
     dispatch::run(strobe.path, Capture { strobe, traps, bound, cancel, source });
 }
 
-/// All outcomes of `starts`, in their order.
+/// All outcomes of `starts`, in their order; `None` if `cancel` was set.
 #[must_use]
-pub fn outcomes(strobe: &Strobe, traps: &Traps, bound: u32, starts: &[State]) -> Vec<Outcome> {
+pub fn outcomes(
+    strobe: &Strobe,
+    traps: &Traps,
+    bound: u32,
+    starts: &[State],
+    cancel: &AtomicBool,
+) -> Option<Vec<Outcome>> {
     struct Slice<'a>(std::iter::Enumerate<std::slice::Iter<'a, State>>, Vec<Option<Outcome>>);
     impl Source for Slice<'_> {
         fn next(&mut self) -> Option<(usize, State)> {
@@ -77,8 +83,8 @@ pub fn outcomes(strobe: &Strobe, traps: &Traps, bound: u32, starts: &[State]) ->
         }
     }
     let mut slice = Slice(starts.iter().enumerate(), vec![None; starts.len()]);
-    run(strobe, traps, bound, &AtomicBool::new(false), &mut slice);
-    slice.1.into_iter().flatten().collect()
+    run(strobe, traps, bound, cancel, &mut slice);
+    slice.1.into_iter().collect()
 }
 
 struct Capture<'a> {
@@ -230,27 +236,28 @@ impl<'a> Block<'a> {
         true
     }
 
-    /// The trap that holds `lane`, as attractor and point.
-    fn trap(&self, lane: usize) -> Option<(usize, usize)> {
+    /// The trap that holds `lane`, as attractor, point and length of its cycle.
+    fn trap(&self, lane: usize) -> Option<(usize, usize, usize)> {
         let state = [self.half_turns.0[lane], self.kick.0[lane]];
         if let Some(e) = self.scaled.iter().find(|e| e.height(state) < 1.0) {
-            return Some((e.attractor, e.point));
+            return Some((e.attractor, e.point, e.cycle));
         }
         let state = [self.theta(lane), self.velocity(lane)];
-        self.job.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0))
+        self.job.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0, 1))
     }
 
     /// Whether `lane` has hit the same attractor, one point on, two periods running; if so its
     /// outcome has been handed over.
     #[inline(never)]
     fn captured(&mut self, lane: usize) -> bool {
-        let (Some(mut tenant), Some((attractor, point))) = (self.tenants[lane], self.trap(lane))
+        let (Some(mut tenant), Some((attractor, point, cycle))) =
+            (self.tenants[lane], self.trap(lane))
         else {
             return false;
         };
         if let Some(hit) = tenant.hit {
             let consecutive = hit.clock + 1 == self.clock && hit.attractor == attractor;
-            if consecutive && self.follows(attractor, hit.point, point) {
+            if consecutive && point == (hit.point + 1) % cycle {
                 let end = (hit.theta, hit.velocity, hit.turns, hit.clock);
                 self.hand_over(tenant, Fate::Captured(attractor), end);
                 return true;
@@ -266,18 +273,6 @@ impl<'a> Block<'a> {
         });
         self.tenants[lane] = Some(tenant);
         false
-    }
-
-    /// Whether `after` is the point that follows `before` on the cycle of `attractor`.
-    fn follows(&self, attractor: usize, before: usize, after: usize) -> bool {
-        let count = self
-            .scaled
-            .iter()
-            .filter(|e| e.attractor == attractor)
-            .map(|e| e.point + 1)
-            .max()
-            .unwrap_or(1);
-        after == (before + 1) % count
     }
 
     fn theta(&self, lane: usize) -> f64 {

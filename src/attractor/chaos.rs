@@ -2,6 +2,7 @@
 //! rotation, told apart from transients that have not ended yet.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::kind::Kind;
 use super::trap::Band;
@@ -95,10 +96,16 @@ impl Region {
 /// more, into sets; those sets of which no member was captured in the second stretch are returned.
 ///
 /// `states` are the trajectories after the first stretch, `lost` says which of them a trap took in
-/// the second one.
+/// the second one. None are returned if `cancel` was set.
 #[must_use]
-pub fn sets(strobe: &Strobe, states: &[State], lost: &[bool], watch: usize) -> Vec<ChaoticSet> {
-    let walks = walk(strobe, states, watch);
+pub fn sets(
+    strobe: &Strobe,
+    states: &[State],
+    lost: &[bool],
+    watch: usize,
+    cancel: &AtomicBool,
+) -> Vec<ChaoticSet> {
+    let Some(walks) = walk(strobe, states, watch, cancel) else { return Vec::new() };
     let mut groups: Vec<(Vec<usize>, Region)> = Vec::new();
     for (i, walk) in walks.iter().enumerate() {
         let mut joined = (vec![i], walk.region.clone());
@@ -135,7 +142,13 @@ struct Walk {
     exponent: f64,
 }
 
-fn walk(strobe: &Strobe, states: &[State], periods: usize) -> Vec<Walk> {
+/// The long runs of all states; `None` if `cancel` was set.
+fn walk(
+    strobe: &Strobe,
+    states: &[State],
+    periods: usize,
+    cancel: &AtomicBool,
+) -> Option<Vec<Walk>> {
     let count = states.len();
     let speed = 1.5 * states.iter().fold(4.0_f64, |m, s| m.max(s[1].abs()));
     let mut theta: Vec<f64> = states.iter().map(|s| s[0]).collect();
@@ -149,6 +162,9 @@ fn walk(strobe: &Strobe, states: &[State], periods: usize) -> Vec<Walk> {
         .collect();
     let align = periods / 2;
     for period in 0..periods {
+        if cancel.load(Ordering::Relaxed) {
+            return None;
+        }
         if period == align {
             // Count from here: the tangents have turned into the direction of growth, and the shear
             // of regular motion, which grows them in proportion to time, adds no more than ln 2.
@@ -174,7 +190,7 @@ fn walk(strobe: &Strobe, states: &[State], periods: usize) -> Vec<Walk> {
         walk.turns = turns[i];
         walk.exponent = growth[i] / (periods - align).max(1) as f64;
     }
-    walks
+    Some(walks)
 }
 
 fn describe(

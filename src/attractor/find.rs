@@ -6,12 +6,13 @@ use super::capture::{self, Fate, Traps};
 use super::catalogue::{Attractor, arrange};
 use super::chaos::{self, ChaoticSet, Region};
 use super::kind::Kind;
-use super::trap::{Band, Ellipse, ellipses};
+use super::trap::{self, Band, Ellipse, ellipses};
 use crate::integrate::accuracy::{distance, wrapped};
 use crate::integrate::{State, Strobe};
+use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
-use crate::orbit::rotation::running_states;
+use crate::orbit::rotation::{Rotation, running_states};
 
 /// Longest cycle that is looked for, in forcing periods.
 pub const LONGEST_CYCLE: usize = 32;
@@ -39,7 +40,8 @@ pub struct Catalogue {
     pub regions: Vec<(usize, Region)>,
     /// Longest time to capture that the searches saw, in periods.
     pub longest_settle: u32,
-    orbits: Vec<PeriodicOrbit>,
+    orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
+    rotations: Vec<(Rotation, Option<Band>)>,
     sets: Vec<ChaoticSet>,
 }
 
@@ -47,15 +49,18 @@ impl Catalogue {
     /// What is known without a search: the running states of an undriven pendulum.
     #[must_use]
     pub fn new(strobe: &Strobe) -> Self {
+        let band = |r: &Rotation| Band::around(strobe, &r.curve, 0);
+        let rotations = running_states(&strobe.pendulum);
         let mut empty = Self {
             attractors: Vec::new(),
             traps: Traps::default(),
             regions: Vec::new(),
             longest_settle: 0,
             orbits: Vec::new(),
+            rotations: rotations.into_iter().map(|r| (r.clone(), band(&r))).collect(),
             sets: Vec::new(),
         };
-        empty.rebuild(strobe);
+        empty.rebuild(&strobe.pendulum);
         empty
     }
 
@@ -81,23 +86,31 @@ impl Catalogue {
         let (mut elapsed, mut round) = (0, FIRST_ROUND);
         while elapsed < bound && !alive.is_empty() && !cancel.load(Ordering::Relaxed) {
             let length = round.min(bound - elapsed);
-            alive = self.run(strobe, &alive, length, elapsed);
+            alive = self.run(strobe, &alive, length, elapsed, cancel);
             elapsed += length;
             round *= 2;
-            if self.find_cycles(strobe, &map, &alive) {
+            if self.find_cycles(strobe, &map, &alive, cancel) {
                 // What the new traps hold is captured at once.
-                alive = self.run(strobe, &alive, FIRST_ROUND, elapsed);
+                alive = self.run(strobe, &alive, FIRST_ROUND, elapsed, cancel);
             }
         }
         if !alive.is_empty() && !cancel.load(Ordering::Relaxed) {
-            self.watch(strobe, &alive, bound);
+            self.watch(strobe, &alive, bound, cancel);
         }
         self.attractors.len() > known
     }
 
     /// Advances `alive` by `length` periods; those still free come back.
-    fn run(&mut self, strobe: &Strobe, alive: &[State], length: u32, elapsed: u32) -> Vec<State> {
-        let outcomes = capture::outcomes(strobe, &self.traps, length, alive);
+    fn run(
+        &mut self,
+        strobe: &Strobe,
+        alive: &[State],
+        length: u32,
+        elapsed: u32,
+        cancel: &AtomicBool,
+    ) -> Vec<State> {
+        let outcomes =
+            capture::outcomes(strobe, &self.traps, length, alive, cancel).unwrap_or_default();
         let mut free = Vec::new();
         for outcome in outcomes {
             match outcome.fate {
@@ -115,7 +128,13 @@ impl Catalogue {
     ///
     /// The closest returns are tried first: those that have converged come before the chance
     /// returns of chaos, of which only a few are tried.
-    fn find_cycles(&mut self, strobe: &Strobe, map: &PoincareMap, alive: &[State]) -> bool {
+    fn find_cycles(
+        &mut self,
+        strobe: &Strobe,
+        map: &PoincareMap,
+        alive: &[State],
+        cancel: &AtomicBool,
+    ) -> bool {
         let mut returns: Vec<(f64, State, usize)> = Vec::new();
         for track in tracks(strobe, alive) {
             let near = (1..=LONGEST_CYCLE)
@@ -127,7 +146,7 @@ impl Catalogue {
         let (mut found, mut tries) = (Vec::new(), 0);
         for (_, start, n) in returns {
             let held = |e: &Ellipse| e.height([wrapped(start[0]), start[1]]) < 1.0;
-            if tries == TRIES {
+            if tries == TRIES || cancel.load(Ordering::Relaxed) {
                 break;
             }
             if found.iter().any(held) {
@@ -135,78 +154,83 @@ impl Catalogue {
             }
             tries += 1;
             let Some(orbit) = newton::find(map, start, n, REACH) else { continue };
-            if !orbit.is_stable() || self.orbits.iter().any(|o| o.contains(orbit.points[0], 1e-6)) {
+            if !orbit.is_stable()
+                || self.orbits.iter().any(|(o, _)| o.contains(orbit.points[0], 1e-6))
+            {
                 continue;
             }
-            let traps = self.admit(strobe, map, orbit);
+            let traps = self.admit(strobe, orbit, cancel);
             if !traps.is_empty() {
                 tries = 0;
             }
             found.extend(traps);
         }
         if !found.is_empty() {
-            self.rebuild(strobe);
+            self.rebuild(&strobe.pendulum);
         }
         !found.is_empty()
     }
 
     /// Takes an orbit and its mirror image, if they can be trapped, and returns their traps.
-    fn admit(&mut self, strobe: &Strobe, map: &PoincareMap, orbit: PeriodicOrbit) -> Vec<Ellipse> {
-        let mut traps = ellipses(strobe, &orbit, 0);
-        if traps.is_empty() {
-            return traps;
+    fn admit(
+        &mut self,
+        strobe: &Strobe,
+        orbit: PeriodicOrbit,
+        cancel: &AtomicBool,
+    ) -> Vec<Ellipse> {
+        let own = ellipses(strobe, &orbit, cancel);
+        if own.is_empty() {
+            return own;
         }
-        let [theta, velocity] = orbit.points[0];
-        let mirror = [wrapped(-theta), -velocity];
+        let mut traps = own.clone();
+        let (image, moved) = orbit.mirrored();
         let symmetric = strobe.pendulum.is_mirror_symmetric();
-        if symmetric
-            && !orbit.contains(mirror, 1e-6)
-            && let Some(twin) = newton::find(map, mirror, orbit.n, REACH)
-        {
-            traps.extend(ellipses(strobe, &twin, 0));
-            self.orbits.push(twin);
+        if symmetric && !orbit.contains(image.points[0], 1e-6) {
+            let twins = trap::mirrored(&own, moved);
+            traps.extend(&twins);
+            self.orbits.push((image, twins));
         }
-        self.orbits.push(orbit);
+        self.orbits.push((orbit, own));
         traps
     }
 
     /// Decides what the trajectories that nothing captured are.
-    fn watch(&mut self, strobe: &Strobe, alive: &[State], bound: u32) {
+    fn watch(&mut self, strobe: &Strobe, alive: &[State], bound: u32, cancel: &AtomicBool) {
         let stride = alive.len().div_ceil(WATCHED);
         let sample: Vec<State> = alive.iter().step_by(stride).copied().collect();
         let length = WATCH * bound;
-        let outcomes = capture::outcomes(strobe, &self.traps, length, &sample);
+        let Some(outcomes) = capture::outcomes(strobe, &self.traps, length, &sample, cancel) else {
+            return;
+        };
         let lost: Vec<bool> = outcomes.iter().map(|o| !matches!(o.fate, Fate::Open)).collect();
         if lost.iter().all(|l| *l) {
             return;
         }
-        let new: Vec<ChaoticSet> = chaos::sets(strobe, &sample, &lost, length as usize)
+        let new: Vec<ChaoticSet> = chaos::sets(strobe, &sample, &lost, length as usize, cancel)
             .into_iter()
             .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
             .collect();
         if !new.is_empty() {
             self.sets.extend(new);
-            self.rebuild(strobe);
+            self.rebuild(&strobe.pendulum);
         }
     }
 
-    /// Attractors, traps and regions anew from orbits and sets.
-    fn rebuild(&mut self, strobe: &Strobe) {
-        let pendulum = &strobe.pendulum;
-        let rotations = running_states(pendulum);
+    /// Attractors, traps and regions anew from orbits, rotations and sets.
+    fn rebuild(&mut self, pendulum: &Pendulum) {
         let mut all: Vec<Attractor> =
-            self.orbits.iter().map(|o| Attractor::periodic(pendulum, o)).collect();
-        all.extend(rotations.iter().map(Attractor::running));
+            self.orbits.iter().map(|(o, _)| Attractor::periodic(pendulum, o)).collect();
+        all.extend(self.rotations.iter().map(|(r, _)| Attractor::running(r)));
         all.extend(self.sets.iter().map(Attractor::sampled));
         let (attractors, place) = arrange(pendulum, all);
         let mut traps = Traps::default();
         let mut regions = Vec::new();
         let mut place = place.into_iter();
-        for (orbit, at) in self.orbits.iter().zip(place.by_ref()) {
-            traps.ellipses.extend(ellipses(strobe, orbit, at));
+        for ((_, ellipses), at) in self.orbits.iter().zip(place.by_ref()) {
+            traps.ellipses.extend(ellipses.iter().map(|e| Ellipse { attractor: at, ..*e }));
         }
-        for (rotation, at) in rotations.iter().zip(place.by_ref()) {
-            traps.bands.extend(Band::around(strobe, &rotation.curve, at));
+        for ((_, band), at) in self.rotations.iter().zip(place.by_ref()) {
+            traps.bands.extend(band.iter().map(|b| Band { attractor: at, ..b.clone() }));
         }
         for (set, at) in self.sets.iter().zip(place) {
             match &set.band {

@@ -8,6 +8,7 @@
 //! map is sampled: the largest level such that every sample within it comes back lower.
 
 use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
@@ -26,6 +27,8 @@ pub struct Ellipse {
     pub attractor: usize,
     /// Index of the point on the attractor's cycle.
     pub point: usize,
+    /// Length of that cycle.
+    pub cycle: usize,
 }
 
 impl Ellipse {
@@ -38,8 +41,10 @@ impl Ellipse {
     }
 }
 
+/// Points of a cycle that get an ellipse.
+const MOST_POINTS: usize = 8;
 /// Directions that are sampled.
-const RAYS: usize = 96;
+const RAYS: usize = 64;
 /// Levels that are sampled, each `RATIO` of the one before in radius.
 const LEVELS: usize = 54;
 const RATIO: f64 = 0.82;
@@ -54,16 +59,22 @@ const BAND_LOWER: f64 = 0.999;
 /// The part of the sampled radius that is used.
 const MARGIN: f64 = 0.9;
 
-/// The ellipses of all points of `orbit`, empty where sampling finds no level that is safe.
+/// The ellipses of the points of `orbit`, empty where sampling finds no level that is safe or
+/// `cancel` was set.
 ///
+/// Of long cycles the first [`MOST_POINTS`] will do: a trajectory passes there once a cycle.
 /// Ellipses that cross `theta = pi` stand a second time, one turn on.
 #[must_use]
-pub fn ellipses(strobe: &Strobe, orbit: &PeriodicOrbit, attractor: usize) -> Vec<Ellipse> {
+pub fn ellipses(strobe: &Strobe, orbit: &PeriodicOrbit, cancel: &AtomicBool) -> Vec<Ellipse> {
     let mut traps = Vec::new();
-    for (point, (centre, monodromy)) in orbit.points.iter().zip(&orbit.monodromy).enumerate() {
-        let shrink = orbit.multipliers.largest().sqrt().max(LEAST_SHRINK);
+    let shrink = orbit.multipliers.largest().sqrt().max(LEAST_SHRINK);
+    let lower = 1.0 - LEFT * (1.0 - shrink);
+    let points = orbit.points.iter().zip(&orbit.monodromy).enumerate();
+    for (point, (centre, monodromy)) in points.take(MOST_POINTS) {
         let Some(root) = lyapunov_root(&(monodromy / shrink)) else { return Vec::new() };
-        let lower = 1.0 - LEFT * (1.0 - shrink);
+        if cancel.load(Ordering::Relaxed) {
+            return Vec::new();
+        }
         let Some(radius) = safe_radius(strobe, orbit.n, *centre, &root, lower) else {
             return Vec::new();
         };
@@ -72,11 +83,23 @@ pub fn ellipses(strobe: &Strobe, orbit: &PeriodicOrbit, attractor: usize) -> Vec
         for turn in [-TAU, 0.0, TAU] {
             let centre = [centre[0] + turn, centre[1]];
             if centre[0].abs() - reach <= std::f64::consts::PI {
-                traps.push(Ellipse { centre, shape, attractor, point });
+                traps.push(Ellipse { centre, shape, attractor: 0, point, cycle: orbit.n });
             }
         }
     }
     traps
+}
+
+/// The same ellipses around the mirror image of their orbit, whose points have moved by `moved`
+/// places (see [`PeriodicOrbit::mirrored`]).
+#[must_use]
+pub fn mirrored(ellipses: &[Ellipse], moved: usize) -> Vec<Ellipse> {
+    let image = |e: &Ellipse| Ellipse {
+        centre: [-e.centre[0], -e.centre[1]],
+        point: (e.point + e.cycle - moved) % e.cycle,
+        ..*e
+    };
+    ellipses.iter().map(image).collect()
 }
 
 /// The upper triangular root `R` of `S = R^T R`, where `M^T S M - S = -I`, as `[r11, r12, r22]`.

@@ -12,7 +12,7 @@ use crate::error::Error;
 /// same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Path {
-    /// AVX-512: 64 lanes in eight registers.
+    /// AVX-512: 96 lanes in twelve registers.
     Avx512,
     /// AVX2 with FMA: 24 lanes in six registers.
     Avx2,

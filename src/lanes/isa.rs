@@ -11,6 +11,8 @@ pub trait Isa: Simd {
     const FUSED: bool;
     /// Trajectories side by side: enough registers to hide the latency of one.
     type Lanes: Lane<Token = Self>;
+    /// The same for numbers with a derivative, which need twice the registers.
+    type Narrow: Lane<Token = Self>;
     /// One trajectory with the same arithmetic, bit for bit.
     type Single: Lane<Token = ()>;
 
@@ -23,6 +25,7 @@ pub trait Isa: Simd {
 impl Isa for Scalar {
     const FUSED: bool = false;
     type Lanes = Bundle<Self, 8>;
+    type Narrow = Bundle<Self, 6>;
     type Single = f64;
 
     #[inline(always)]
@@ -44,6 +47,7 @@ mod x86 {
     impl Isa for V2 {
         const FUSED: bool = false;
         type Lanes = Bundle<Self, 6>;
+        type Narrow = Bundle<Self, 4>;
         type Single = f64;
 
         #[inline(always)]
@@ -59,6 +63,7 @@ mod x86 {
     impl Isa for V3 {
         const FUSED: bool = true;
         type Lanes = Bundle<Self, 6>;
+        type Narrow = Bundle<Self, 4>;
         type Single = Fused;
 
         #[inline(always)]
@@ -73,7 +78,8 @@ mod x86 {
 
     impl Isa for V4 {
         const FUSED: bool = true;
-        type Lanes = Bundle<Self, 8>;
+        type Lanes = Bundle<Self, 12>;
+        type Narrow = Bundle<Self, 4>;
         type Single = Fused;
 
         #[inline(always)]

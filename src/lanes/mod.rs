@@ -16,4 +16,4 @@ pub use isa::Isa;
 pub use real::{Lane, Real};
 
 /// No bundle is wider than this.
-pub const MAX_WIDTH: usize = 64;
+pub const MAX_WIDTH: usize = 96;

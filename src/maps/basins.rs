@@ -161,8 +161,16 @@ pub fn basins(
         map.texture = texture(&labels, starts);
         map.bound = bound;
         if options.check {
-            map.reliability =
-                reliability(&strobe, &catalogue, starts, &labels, bound, options.seed, &pool)?;
+            map.reliability = reliability(
+                &strobe,
+                &catalogue,
+                starts,
+                &labels,
+                bound,
+                options.seed,
+                &pool,
+                control,
+            )?;
         }
         map.labels = labels;
     } else {

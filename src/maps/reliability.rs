@@ -30,7 +30,8 @@ pub struct Reliability {
 /// would do.
 ///
 /// # Errors
-/// [`Error::Threads`] without a pool.
+/// [`Error::Interrupted`] if `control` was cancelled.
+#[allow(clippy::too_many_arguments)] // what a map is made of
 pub fn reliability(
     strobe: &Strobe,
     catalogue: &Catalogue,
@@ -39,12 +40,12 @@ pub fn reliability(
     bound: u32,
     seed: u64,
     pool: &rayon::ThreadPool,
+    control: &Control,
 ) -> Result<Reliability, Error> {
     let picks = starts.sample(SAMPLE, seed.wrapping_add(1));
     let states: Vec<State> = picks.iter().map(|i| starts.get(*i)).collect();
-    let control = Control::default();
     let again = |strobe: &Strobe, states: Vec<State>| {
-        label(strobe, catalogue, &Starts::List(states), None, bound, pool, &control)
+        label(strobe, catalogue, &Starts::List(states), None, bound, pool, control)
     };
     let own: Vec<i16> = picks.iter().map(|i| labels.label[*i]).collect();
     let halved = again(&strobe.refined(2), states.clone())?.label;

@@ -43,6 +43,23 @@ impl PeriodicOrbit {
         self.multipliers.largest() < 1.0
     }
 
+    /// Its image under `(th, v) -> (-th, -v)`, and the number of places that the points have moved:
+    /// point `i` of this orbit is point `i - moved` (modulo n) of the image.
+    ///
+    /// An orbit of the same pendulum where that has the symmetry; the derivatives are the same.
+    #[must_use]
+    pub fn mirrored(&self) -> (Self, usize) {
+        let mut image = self.clone();
+        for point in &mut image.points {
+            *point = [-point[0], -point[1]];
+        }
+        image.w = -self.w;
+        let moved = lowest(&image.points);
+        image.points.rotate_left(moved);
+        image.monodromy.rotate_left(moved);
+        (image, moved)
+    }
+
     /// Whether `state` is one of its points, within `tolerance`.
     #[must_use]
     pub fn contains(&self, state: State, tolerance: f64) -> bool {
@@ -64,6 +81,11 @@ pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<Per
         .find(|d| *d == n || distance(image(*d).state, point) < SAME_POINT)?;
     let point = if smallest == n { point } else { polish(map, point, smallest, reach)? };
     complete(map, point, smallest)
+}
+
+/// The place of the point with the lowest angle.
+fn lowest(points: &[State]) -> usize {
+    (0..points.len()).min_by(|a, b| points[*a][0].total_cmp(&points[*b][0])).unwrap_or(0)
 }
 
 fn polish(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<State> {
@@ -113,7 +135,7 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
     }
     let w = (way / TAU).round() as i64;
     let residual = closing_gap(first, state).norm();
-    let lowest = (0..n).min_by(|a, b| points[*a][0].total_cmp(&points[*b][0]))?;
+    let lowest = lowest(&points);
     points.rotate_left(lowest);
     derivatives.rotate_left(lowest);
     let monodromy: Vec<Matrix2<f64>> = (0..n)

@@ -116,7 +116,9 @@ fn chaos_beside_other_attractors() {
     assert!(cells.iter().all(|i| labels.settle[*i] == NEVER));
     // What is labelled so is captured by none of the others for very long.
     let states: Vec<State> = cells.iter().map(|i| starts.get(*i)).collect();
-    for outcome in outcomes(strobe, &catalogue.traps, 3000, &states) {
+    for outcome in outcomes(strobe, &catalogue.traps, 3000, &states, &AtomicBool::new(false))
+        .expect("outcomes")
+    {
         assert_eq!(outcome.fate, Fate::Open);
     }
 }

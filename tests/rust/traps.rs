@@ -3,6 +3,8 @@
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
+use std::sync::atomic::AtomicBool;
+
 use pendmap::attractor::Catalogue;
 use pendmap::attractor::capture::{Fate, outcomes};
 use pendmap::attractor::trap::Ellipse;
@@ -126,7 +128,12 @@ fn capture_agrees_with_waiting() {
     let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
     let ends = advanced(&fine, &starts, 3000);
     let mut different = 0;
-    for (outcome, end) in outcomes(&strobe, &catalogue.traps, 4000, &starts).iter().zip(ends) {
+    for (outcome, end) in
+        outcomes(&strobe, &catalogue.traps, 4000, &starts, &AtomicBool::new(false))
+            .expect("outcomes")
+            .iter()
+            .zip(ends)
+    {
         let Fate::Captured(label) = outcome.fate else { panic!("{outcome:?}") };
         let reached = catalogue
             .attractors
