@@ -11,8 +11,10 @@ demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
 
 develop: $(VENV)/.develop ## set up everything for work on pendmap itself
 
-test: $(VENV)/.develop ## set up everything and run all tests
+test: $(VENV)/.develop ## set up everything and run all tests, the Rust ones on every instruction set
 	cargo test --locked --quiet
+	for path in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
+		PENDMAP_SIMD=$$path cargo test --locked --quiet --test rust || exit 1; done
 	$(BIN)/python -m pytest -q
 
 lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of imports
