@@ -55,7 +55,8 @@ def _only_chaos(dataset: xr.Dataset) -> str:
     exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
     return (
         f"One chaotic attractor takes everything: {name}, exponent {exponent:.4f} +- {error:.4f} "
-        f"per unit of tau; nothing captured a sampled trajectory within {a['chaos_bound']} periods.\n"
+        "per unit of tau; nothing captured a sampled trajectory within "
+        f"{a['chaos_bound']} periods.\n"
         "Labels tell nothing here: net turns and the finite-time exponent after "
         f"{a['layer_periods']} periods are shown instead."
     )

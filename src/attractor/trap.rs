@@ -62,7 +62,7 @@ const MARGIN: f64 = 0.9;
 /// The ellipses of the points of `orbit`, empty where sampling finds no level that is safe or
 /// `cancel` was set.
 ///
-/// Of long cycles the first [`MOST_POINTS`] will do: a trajectory passes there once a cycle.
+/// Of long cycles the first eight points will do: a trajectory passes there once a cycle.
 /// Ellipses that cross `theta = pi` stand a second time, one turn on.
 #[must_use]
 pub fn ellipses(strobe: &Strobe, orbit: &PeriodicOrbit, cancel: &AtomicBool) -> Vec<Ellipse> {
