@@ -49,7 +49,11 @@ def cells(raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...]) ->
         "net_turns": (
             dims,
             raw["turns"].reshape(shape),
-            {"long_name": f"net full turns {when}", "units": "1"},
+            {
+                "long_name": f"net turns {when}",
+                "units": "1",
+                "comment": "the angle's displacement over 2 pi, rounded",
+            },
         ),
     }
     exponent = raw["finite_time_exponent"]
