@@ -46,11 +46,18 @@ impl Control {
     }
 }
 
+/// More workers than this only wait for one another.
+const MOST_THREADS: usize = 256;
+
 /// A pool of `threads` workers; 0 means one for each processor.
 ///
 /// # Errors
-/// [`Error::Threads`] if the system refuses.
+/// [`Error::Range`] above 256, [`Error::Threads`] if the system refuses.
 pub fn pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
+    if threads > MOST_THREADS {
+        let value = threads as f64;
+        return Err(Error::Range { name: "threads", value, allowed: "1 to 256" });
+    }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()

@@ -164,6 +164,7 @@ def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path:
         ("basins --preset fig9", "fig9"),
         ("basins --model absent.toml", "absent.toml"),
         ("basins --threads 0", "0"),
+        ("basins --threads 100000", "1 to 256"),
         ("basins surplus", "surplus"),
         ("simulate --until 0", "until"),
         ("simulate --theta x", "x"),
