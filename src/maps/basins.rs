@@ -158,7 +158,7 @@ pub fn basins(
     };
     if plane == Plane::Basins {
         let (labels, bound) = to_capture(&strobe, &mut catalogue, starts, options, &pool, control)?;
-        map.texture = texture(&labels, starts);
+        map.texture = texture(&labels, starts, &pool);
         map.bound = bound;
         if options.check {
             map.reliability = reliability(

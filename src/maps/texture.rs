@@ -1,5 +1,7 @@
 //! How finely the basins are interwoven.
 
+use rayon::prelude::*;
+
 use super::label::Labels;
 use super::starts::Starts;
 
@@ -21,57 +23,66 @@ pub struct Texture {
 
 /// From the labels of a grid; zeros for a list of starts, which has no neighbours.
 #[must_use]
-pub fn texture(labels: &Labels, starts: &Starts) -> Texture {
+pub fn texture(labels: &Labels, starts: &Starts, pool: &rayon::ThreadPool) -> Texture {
     let Starts::Grid { theta, velocity } = starts else {
         return Texture { basin_entropy: 0.0, neighbours_agree: 0.0, chance: 0.0 };
     };
     let (columns, rows) = (theta.count, velocity.count);
-    let at = |i: usize, j: usize| labels.label[j * columns + i];
-    let mut entropy = 0.0;
-    let mut boxes = 0_usize;
-    for top in (0..rows).step_by(BOX) {
-        for left in (0..columns).step_by(BOX) {
-            let mut counts: Vec<(i16, usize)> = Vec::new();
-            let mut total = 0_usize;
-            for j in top..(top + BOX).min(rows) {
-                for i in left..(left + BOX).min(columns) {
-                    count(&mut counts, at(i, j));
-                    total += 1;
-                }
-            }
-            boxes += 1;
-            entropy -= counts
-                .iter()
-                .map(|(_, c)| *c as f64 / total as f64)
-                .map(|p| p * p.ln())
-                .sum::<f64>();
-        }
-    }
-    let (mut same, mut pairs) = (0_usize, 0_usize);
+    let cells = labels.label.as_slice();
+    // Bands of one box's height, summed in their order: the result does not depend on threads.
+    let bands: Vec<Band> = pool.install(|| {
+        let tops: Vec<usize> = (0..rows).step_by(BOX).collect();
+        tops.into_par_iter().map(|top| band(cells, columns, rows, top)).collect()
+    });
     let mut all: Vec<(i16, usize)> = Vec::new();
-    for j in 0..rows {
-        for i in 0..columns {
-            let own = at(i, j);
-            count(&mut all, own);
-            for other in [(i + 1, j), (i, j + 1)] {
-                if other.0 < columns && other.1 < rows {
-                    pairs += 1;
-                    same += usize::from(at(other.0, other.1) == own);
-                }
-            }
-        }
+    for (label, number) in bands.iter().flat_map(|b| &b.counts) {
+        count(&mut all, *label, *number);
     }
-    let cells = (rows * columns) as f64;
+    let boxes = rows.div_ceil(BOX) * columns.div_ceil(BOX);
+    let pairs = rows * (columns - 1) + columns * (rows - 1);
+    let same: usize = bands.iter().map(|b| b.same).sum();
     Texture {
-        basin_entropy: (entropy / boxes as f64).max(0.0),
+        basin_entropy: (bands.iter().map(|b| b.entropy).sum::<f64>() / boxes as f64).max(0.0),
         neighbours_agree: same as f64 / pairs.max(1) as f64,
-        chance: all.iter().map(|(_, c)| (*c as f64 / cells).powi(2)).sum(),
+        chance: all.iter().map(|(_, c)| (*c as f64 / cells.len() as f64).powi(2)).sum(),
     }
 }
 
-fn count(counts: &mut Vec<(i16, usize)>, label: i16) {
+/// What a row of boxes adds.
+struct Band {
+    entropy: f64,
+    same: usize,
+    counts: Vec<(i16, usize)>,
+}
+
+fn band(cells: &[i16], columns: usize, rows: usize, top: usize) -> Band {
+    let bottom = (top + BOX).min(rows);
+    let mut band = Band { entropy: 0.0, same: 0, counts: Vec::new() };
+    let mut counts: Vec<(i16, usize)> = Vec::new();
+    for left in (0..columns).step_by(BOX) {
+        let right = (left + BOX).min(columns);
+        counts.clear();
+        for j in top..bottom {
+            for i in left..right {
+                let own = cells[j * columns + i];
+                count(&mut counts, own, 1);
+                band.same += usize::from(i + 1 < columns && cells[j * columns + i + 1] == own);
+                band.same += usize::from(j + 1 < rows && cells[(j + 1) * columns + i] == own);
+            }
+        }
+        let total = ((bottom - top) * (right - left)) as f64;
+        for (label, number) in &counts {
+            let p = *number as f64 / total;
+            band.entropy -= p * p.ln();
+            count(&mut band.counts, *label, *number);
+        }
+    }
+    band
+}
+
+fn count(counts: &mut Vec<(i16, usize)>, label: i16, number: usize) {
     match counts.iter_mut().find(|(l, _)| *l == label) {
-        Some((_, c)) => *c += 1,
-        None => counts.push((label, 1)),
+        Some((_, c)) => *c += number,
+        None => counts.push((label, number)),
     }
 }

@@ -65,7 +65,11 @@ fn labels_of(label: Vec<i16>) -> Labels {
 fn texture_of_known_patterns() {
     let starts = plane(20);
     let pattern = |f: &dyn Fn(usize, usize) -> i16| {
-        texture(&labels_of((0..400).map(|i| f(i % 20, i / 20)).collect()), &starts)
+        texture(
+            &labels_of((0..400).map(|i| f(i % 20, i / 20)).collect()),
+            &starts,
+            &pool(2).expect("a pool"),
+        )
     };
     let plain = pattern(&|_, _| 1);
     assert_eq!(
@@ -83,7 +87,11 @@ fn texture_of_known_patterns() {
     assert!((chequers.basin_entropy + a * a.ln() + b * b.ln()).abs() < 1e-12);
     assert!(chequers.neighbours_agree.abs() < 1e-12 && (chequers.chance - 0.5).abs() < 1e-12);
     // Stripes of four: every box has shares of 4, 4, 4, 4 of 20 and one label twice.
-    let list = texture(&labels_of(vec![1, 2, 3]), &Starts::List(spread(3, 1.0, 1.0)));
+    let list = texture(
+        &labels_of(vec![1, 2, 3]),
+        &Starts::List(spread(3, 1.0, 1.0)),
+        &pool(2).expect("a pool"),
+    );
     assert!(list.neighbours_agree.abs() < 1e-12 && list.basin_entropy.abs() < 1e-12);
 }
 
