@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import xarray as xr
 
 from pendmap.errors import InputError
-from pendmap.files import whole_file
+from pendmap.files import held_interrupts, whole_file
 
 if TYPE_CHECKING:
     import os
@@ -71,14 +71,15 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
         raise FileNotFoundError(2, "the folder does not exist", str(target.parent))
     part = target.with_name(f".{target.stem}-{uuid.uuid4().hex[:8]}.part.zarr")
     old = part.with_suffix(".old")
-    try:
-        dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
-        if target.exists():
-            target.rename(old)
-        part.rename(target)
-    finally:
-        for leftover in (part, old):
-            shutil.rmtree(leftover, ignore_errors=True)
+    with held_interrupts():
+        try:
+            dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
+            if target.exists():
+                target.rename(old)
+            part.rename(target)
+        finally:
+            for leftover in (part, old):
+                shutil.rmtree(leftover, ignore_errors=True)
     return target
 
 

@@ -200,8 +200,25 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
     _, stderr = process.communicate(timeout=20)
     assert process.returncode == 130
     assert "Traceback" not in stderr
+    assert "nothing was written" in stderr
     assert list(tmp_path.iterdir()) == []
 
+
+@pytest.mark.parametrize(
+    ("option", "file"), [("--out", "map.nc"), ("--plot", "map.png"), ("--rerun", "map.rrd")]
+)
+def test_ctrl_c_waits_for_the_file_being_written(tmp_path: Path, option: str, file: str) -> None:
+    words = [str(COMMAND), "basins", "--p", "0.6", "--grid", "1500", option, file]
+    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and not list(tmp_path.glob(".map*")):
+        time.sleep(0.001)
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert f"interrupted, {file} written" in stderr
+    assert [path.name for path in tmp_path.iterdir()] == [file]
+    if option == "--out":
+        assert pendmap.load(tmp_path / file).sizes["theta"] == 1500
 
 @pytest.mark.parametrize(
     ("text", "value"),

@@ -67,8 +67,10 @@ def _exit_code() -> int:  # noqa: PLR0911 (one for each way to end)
         return _refuse(error.format_message())
     except InputError as error:
         return _refuse(str(error))
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("pendmap: interrupted, nothing was written", err=True)
+    except (click.Abort, KeyboardInterrupt) as stop:
+        # click makes an Abort of the interrupt that names what is complete.
+        files = (stop.__cause__ or stop.__context__ or stop).args
+        click.echo(f"pendmap: interrupted, {', '.join(files) or 'nothing was'} written", err=True)
         return INTERRUPTED
     except BrokenPipeError:
         # Whoever reads has seen enough: no message, and none from the interpreter at the end.

@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.files import held_interrupts
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     import xarray as xr
 
@@ -44,27 +47,24 @@ def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], Non
 
 
 def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], Any]) -> None:
-    """Write the files asked for, then JSON or the summary to stdout."""
-    written = []
-    if outputs.out is not None:
-        from pendmap.store import save
+    """Write the files asked for, then JSON or the summary to stdout.
 
-        written.append(save(dataset, outputs.out))
-    if outputs.plot is not None:
-        from pendmap import figures
-
-        written.append(figures.draw(dataset, outputs.plot))
-    if outputs.rerun is not None:
-        from pendmap import viewer
-
-        written.append(viewer.record(dataset, outputs.rerun))
+    An interrupt takes effect between two files and names those that are complete.
+    """
+    written: list[str] = []
+    try:
+        for write, path in _files(outputs):
+            with held_interrupts():
+                written.append(str(write(dataset, path)))
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(*written) from None
     if outputs.as_json:
         click.echo(json.dumps(plain(as_json(dataset)), allow_nan=False))
     elif not outputs.quiet:
         click.echo(dataset.attrs["title"])
         click.echo(dataset.attrs["summary"])
         if written:
-            click.echo("Written: " + ", ".join(str(path) for path in written))
+            click.echo("Written: " + ", ".join(written))
     if outputs.view and outputs.rerun is not None:
         from pendmap import viewer
 
@@ -72,6 +72,22 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
             viewer.open_viewer(outputs.rerun)
         except viewer.ViewerError as error:
             raise click.ClickException(str(error)) from error
+
+
+def _files(outputs: Outputs) -> Iterator[tuple[Callable[[xr.Dataset, Path], Path], Path]]:
+    # Each is imported when its turn comes: matplotlib and Rerun take a while.
+    if outputs.out is not None:
+        from pendmap.store import save
+
+        yield save, outputs.out
+    if outputs.plot is not None:
+        from pendmap import figures
+
+        yield figures.draw, outputs.plot
+    if outputs.rerun is not None:
+        from pendmap import viewer
+
+        yield viewer.record, outputs.rerun
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)
