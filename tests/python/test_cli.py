@@ -220,6 +220,7 @@ def test_ctrl_c_waits_for_the_file_being_written(tmp_path: Path, option: str, fi
     if option == "--out":
         assert pendmap.load(tmp_path / file).sizes["theta"] == 1500
 
+
 @pytest.mark.parametrize(
     ("text", "value"),
     [
