@@ -14,6 +14,29 @@ pub enum Error {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// A parameter of an effect is not finite, or outside its range.
+    Parameter {
+        /// The effect.
+        effect: &'static str,
+        /// Its parameter.
+        parameter: &'static str,
+        /// What was given.
+        value: f64,
+        /// The bounds.
+        allowed: [f64; 2],
+    },
+    /// No effect of that name.
+    Effect {
+        /// What was given.
+        name: String,
+    },
+    /// One thing said twice.
+    Twice {
+        /// What was given.
+        name: &'static str,
+        /// What it repeats.
+        other: &'static str,
+    },
     /// Arrays that belong together have different lengths.
     Lengths {
         /// What was given.
@@ -44,6 +67,15 @@ impl fmt::Display for Error {
         match self {
             Self::Range { name, value, allowed } => {
                 write!(f, "{name} is {value}: allowed is {allowed}")
+            }
+            Self::Parameter { effect, parameter, value, allowed: [low, high] } => {
+                write!(f, "{effect}: {parameter} is {value}: allowed is {low} to {high}, finite")
+            }
+            Self::Effect { name } => {
+                write!(f, "no effect is named '{name}': pendmap effects lists them")
+            }
+            Self::Twice { name, other } => {
+                write!(f, "{name} and {other}: allowed is one of them, they are the same effect")
             }
             Self::Lengths { given, names } => write!(
                 f,

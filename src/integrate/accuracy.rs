@@ -76,7 +76,7 @@ pub fn choose(
         let error = error_reached(&strobe, starts);
         (strobe, error)
     };
-    let pull = (1.0 + pendulum.drive.p.abs()).sqrt();
+    let pull = pendulum.greatest_pull().sqrt();
     let guess = pendulum.period() * pull / 0.25 * (1e-6 / tol).powf(1.0 / 8.0);
     let mut steps = (guess.ceil() as usize).clamp(4, MOST_STEPS);
     let (mut too_few, mut enough) = (3_usize, None::<(Strobe, f64)>);

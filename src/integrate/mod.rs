@@ -1,6 +1,6 @@
 //! From a state to a later one.
 //!
-//! - [`tableau`]: coefficients and their source
+//! - [`tableau`], [`dop853`]: coefficients and their source
 //! - [`schedule`]: what all trajectories of a run of equal steps share, damping folded in
 //! - [`step`]: one step, for any number type
 //! - [`tangent`]: numbers with derivatives, for the variational equations
@@ -9,6 +9,7 @@
 //! - [`trajectory`]: one trajectory, sampled in time
 
 pub mod accuracy;
+pub mod dop853;
 pub mod schedule;
 pub mod step;
 pub mod stroboscopic;

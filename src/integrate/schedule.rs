@@ -38,6 +38,7 @@ impl Schedule {
     #[must_use]
     pub fn new(pendulum: &Pendulum, tau: f64, duration: f64, steps: usize) -> Self {
         let gamma = pendulum.gamma;
+        let equation = pendulum.equation();
         let h = duration / steps as f64;
         // The step in the folded time u.
         let folded = if gamma == 0.0 { h } else { -(-gamma * h).exp_m1() / gamma };
@@ -49,7 +50,7 @@ impl Schedule {
                 let mut loads = StageLoads::default();
                 for (i, s) in stage_time.into_iter().enumerate() {
                     let factor = folded * folded * (2.0 * gamma * s).exp() * FRAC_1_PI;
-                    loads.modulation[i] = factor * pendulum.drive.modulation(start + s);
+                    loads.modulation[i] = factor * equation.forcing(start + s).vertical;
                     loads.torque[i] = factor * pendulum.torque;
                 }
                 loads

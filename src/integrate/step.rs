@@ -6,7 +6,7 @@ use super::schedule::{Schedule, StageLoads};
 use super::tableau::{A, B, BP, C, STAGES};
 use crate::lanes::Real;
 use crate::lanes::sine::Degree;
-use crate::model::pendulum::conservative_load;
+use crate::model::equation::conservative_load;
 
 /// A trajectory within a schedule: the angle in half turns, and the velocity times the schedule's
 /// `kick`.

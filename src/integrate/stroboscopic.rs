@@ -34,9 +34,9 @@ impl Strobe {
     #[must_use]
     pub fn new(pendulum: &Pendulum, steps: usize, path: Path) -> Self {
         let schedule = Schedule::period(pendulum, steps);
-        let pull = (1.0 + pendulum.drive.p.abs()).sqrt();
+        let pull = pendulum.greatest_pull().sqrt();
         let fine = pendulum.period() / steps as f64 * pull < COARSE_SINE_FROM;
-        Self { pendulum: *pendulum, schedule, path, fine }
+        Self { pendulum: pendulum.clone(), schedule, path, fine }
     }
 
     /// The same map with `factor` times as many steps.

@@ -1,6 +1,6 @@
 //! Numbers that carry derivatives: the variational equations without writing them a second time.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::lanes::sine::Degree;
 use crate::lanes::{Lane, Real};
@@ -49,6 +49,19 @@ impl<L: Lane, const N: usize> Mul for Tangent<L, N> {
             self.slope[i] = self.slope[i].mul_add(other.value, other.slope[i] * self.value);
         }
         self.value = self.value * other.value;
+        self
+    }
+}
+
+impl<L: Lane, const N: usize> Div for Tangent<L, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(mut self, other: Self) -> Self {
+        // d(a/b) = (da - (a/b) db)/b.
+        self.value = self.value / other.value;
+        for i in 0..N {
+            self.slope[i] = (self.slope[i] - self.value * other.slope[i]) / other.value;
+        }
         self
     }
 }
@@ -102,5 +115,48 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
         }
         self.value = self.value.sine::<D>();
         self
+    }
+
+    #[inline(always)]
+    fn cosine<D: Degree>(mut self) -> Self {
+        let slope_of_cosine = self.value.sine::<D>().scale(-std::f64::consts::PI);
+        for slope in &mut self.slope {
+            *slope = *slope * slope_of_cosine;
+        }
+        self.value = self.value.cosine::<D>();
+        self
+    }
+
+    #[inline(always)]
+    fn exponential(mut self) -> Self {
+        self.value = self.value.exponential();
+        for slope in &mut self.slope {
+            *slope = *slope * self.value;
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn logarithm(mut self) -> Self {
+        for slope in &mut self.slope {
+            *slope = *slope / self.value;
+        }
+        self.value = self.value.logarithm();
+        self
+    }
+
+    #[inline(always)]
+    fn magnitude(mut self) -> Self {
+        let sign = self.value.like(1.0).with_sign_of(self.value);
+        for slope in &mut self.slope {
+            *slope = *slope * sign;
+        }
+        self.value = self.value.magnitude();
+        self
+    }
+
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Self { value: self.value.like(value), slope: [self.value.like(0.0); N] }
     }
 }

@@ -87,7 +87,7 @@ pub fn simulate(
         return Err(Error::Range { name: "samples", value: 0.0, allowed: "1 or more" });
     }
     let interval = pendulum.period() / request.samples as f64;
-    let longest = LONGEST_STEP / (1.0 + pendulum.drive.p.abs()).sqrt();
+    let longest = LONGEST_STEP / pendulum.greatest_pull().sqrt();
     let mut substeps = (interval / longest).ceil().max(1.0) as usize;
     let mut coarse = Run::of(pendulum, request, substeps, cancel)?;
     let mut before = f64::INFINITY;

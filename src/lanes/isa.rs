@@ -20,6 +20,8 @@ pub trait Isa: Simd {
     fn multiply_add(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s;
     /// Moves the lowest bit of each number to its sign and clears the others.
     fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s;
+    /// A bit for each number whose sign bit is set, the first one's lowest.
+    fn sign_bits(self, values: Self::f64s) -> u8;
 }
 
 impl Isa for Scalar {
@@ -35,6 +37,10 @@ impl Isa for Scalar {
     #[inline(always)]
     fn lowest_bit_to_sign(self, bits: u64) -> u64 {
         bits << 63
+    }
+    #[inline(always)]
+    fn sign_bits(self, value: f64) -> u8 {
+        u8::from(value.is_sign_negative())
     }
 }
 
@@ -58,6 +64,10 @@ mod x86 {
         fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
             cast(self.sse2._mm_slli_epi64::<63>(cast(bits)))
         }
+        #[inline(always)]
+        fn sign_bits(self, values: Self::f64s) -> u8 {
+            self.sse2._mm_movemask_pd(cast(values)) as u8
+        }
     }
 
     impl Isa for V3 {
@@ -74,6 +84,10 @@ mod x86 {
         fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
             cast(self.avx2._mm256_slli_epi64::<63>(cast(bits)))
         }
+        #[inline(always)]
+        fn sign_bits(self, values: Self::f64s) -> u8 {
+            self.avx._mm256_movemask_pd(cast(values)) as u8
+        }
     }
 
     impl Isa for V4 {
@@ -89,6 +103,10 @@ mod x86 {
         #[inline(always)]
         fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
             cast(self.avx512f._mm512_slli_epi64::<63>(cast(bits)))
+        }
+        #[inline(always)]
+        fn sign_bits(self, values: Self::f64s) -> u8 {
+            self.avx512dq._mm512_movepi64_mask(cast(values))
         }
     }
 }

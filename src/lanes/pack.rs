@@ -1,9 +1,10 @@
 //! Vectors of an instruction set as numbers: [`Pack`] is one register, [`Bundle`] several.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use super::elementary;
 use super::isa::Isa;
-use super::real::{Lane, Real};
+use super::real::{EXPONENT_BITS, INTEGER_BITS, INTEGER_OFFSET, Lane, ROOT_BITS, Real};
 use super::sine::{self, Degree};
 
 /// One vector register of the instruction set `S`.
@@ -54,6 +55,7 @@ macro_rules! operator {
 operator!(Add, add, add_f64s);
 operator!(Sub, sub, sub_f64s);
 operator!(Mul, mul, mul_f64s);
+operator!(Div, div, div_f64s);
 
 impl<S: Isa, const N: usize> Neg for Bundle<S, N> {
     type Output = Self;
@@ -99,6 +101,34 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
     fn sine<D: Degree>(self) -> Self {
         sine::sine::<D, Self>(self)
     }
+
+    #[inline(always)]
+    fn cosine<D: Degree>(self) -> Self {
+        sine::cosine::<D, Self>(self)
+    }
+
+    #[inline(always)]
+    fn exponential(self) -> Self {
+        elementary::exponential(self)
+    }
+
+    #[inline(always)]
+    fn logarithm(self) -> Self {
+        elementary::logarithm(self)
+    }
+
+    #[inline(always)]
+    fn magnitude(mut self) -> Self {
+        for a in &mut self.0 {
+            a.value = a.isa.abs_f64s(a.value);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Self([self.0[0].constant(value); N])
+    }
 }
 
 impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
@@ -131,11 +161,6 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
     }
 
     #[inline(always)]
-    fn like(self, value: f64) -> Self {
-        Self([self.0[0].constant(value); N])
-    }
-
-    #[inline(always)]
     fn mul_add(mut self, a: Self, b: Self) -> Self {
         for i in 0..N {
             self.0[i] = self.0[i].mul_add(a.0[i], b.0[i]);
@@ -149,6 +174,67 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
             a.value = a.isa.min_f64s(a.value, b.value);
         }
         self
+    }
+
+    #[inline(always)]
+    fn max(mut self, other: Self) -> Self {
+        for (a, b) in self.0.iter_mut().zip(&other.0) {
+            a.value = a.isa.max_f64s(a.value, b.value);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn with_sign_of(mut self, other: Self) -> Self {
+        for (a, b) in self.0.iter_mut().zip(&other.0) {
+            let isa = a.isa;
+            let sign = isa.splat_u64s(1 << 63);
+            let other = isa.and_u64s(isa.transmute_u64s_f64s(b.value), sign);
+            let bits = isa.transmute_u64s_f64s(isa.abs_f64s(a.value));
+            a.value = isa.transmute_f64s_u64s(isa.or_u64s(bits, other));
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn signs(self) -> u128 {
+        let mut bits = 0;
+        for (i, a) in self.0.iter().enumerate() {
+            bits |= u128::from(a.isa.sign_bits(a.value)) << (i * S::F64_LANES);
+        }
+        bits
+    }
+
+    #[inline(always)]
+    fn add_to_exponent(mut self, count: Self) -> Self {
+        for (a, c) in self.0.iter_mut().zip(&count.0) {
+            let isa = a.isa;
+            let mask = isa.splat_u64s(EXPONENT_BITS);
+            let shifted = isa.rotate_right_u64s(isa.transmute_u64s_f64s(c.value), 12);
+            let shifted = isa.and_u64s(shifted, mask);
+            let bits = isa.add_u64s(isa.transmute_u64s_f64s(a.value), shifted);
+            a.value = isa.transmute_f64s_u64s(bits);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn split(self) -> (Self, Self) {
+        let (mut mantissa, mut exponent) = (self, self);
+        for i in 0..N {
+            let isa = self.0[i].isa;
+            let bits = isa.transmute_u64s_f64s(self.0[i].value);
+            let mask = isa.splat_u64s(EXPONENT_BITS);
+            let part = isa.and_u64s(isa.sub_u64s(bits, isa.splat_u64s(ROOT_BITS)), mask);
+            let one = isa.splat_u64s(1023 << 52);
+            let bits = isa.add_u64s(isa.sub_u64s(bits, part), one);
+            mantissa.0[i].value = isa.transmute_f64s_u64s(bits);
+            let integer = isa.rotate_left_u64s(part, 12);
+            let integer = isa.or_u64s(integer, isa.splat_u64s(INTEGER_BITS));
+            let offset = isa.splat_f64s(INTEGER_OFFSET);
+            exponent.0[i].value = isa.sub_f64s(isa.transmute_f64s_u64s(integer), offset);
+        }
+        (mantissa, exponent)
     }
 
     #[inline(always)]

@@ -1,8 +1,9 @@
 //! The arithmetic that the equation of motion is written over: one number, a bundle of lanes, or
 //! either of them with its derivatives.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use super::elementary;
 use super::sine::{self, Degree};
 
 /// A number as the model and the integrators see it.
@@ -10,8 +11,16 @@ use super::sine::{self, Degree};
 /// `f64`, [`Fused`], [`super::pack::Bundle`] and [`crate::integrate::tangent::Tangent`] are such
 /// numbers, so that the equation of motion and the Runge-Kutta-Nystrom step stand once.
 pub trait Real:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
 {
+    /// The constant `value`, in the shape of `self`.
+    #[must_use]
+    fn like(self, value: f64) -> Self;
     /// `self * factor + addend`, fused where the instruction set can.
     #[must_use]
     fn scale_add(self, factor: f64, addend: Self) -> Self;
@@ -24,6 +33,18 @@ pub trait Real:
     /// `sin(pi self)`, to the precision of `D`: the angle is in half turns.
     #[must_use]
     fn sine<D: Degree>(self) -> Self;
+    /// `cos(pi self)`, to the precision of `D`: the angle is in half turns.
+    #[must_use]
+    fn cosine<D: Degree>(self) -> Self;
+    /// `exp self`, held to the range of normal numbers.
+    #[must_use]
+    fn exponential(self) -> Self;
+    /// `ln self` of a positive normal number.
+    #[must_use]
+    fn logarithm(self) -> Self;
+    /// `|self|`.
+    #[must_use]
+    fn magnitude(self) -> Self;
 }
 
 /// A [`Real`] without derivatives: it can be stored, compared and reduced modulo a turn.
@@ -41,26 +62,40 @@ pub trait Lane: Real {
     fn load(token: Self::Token, source: &[f64]) -> Self;
     /// Writes [`Lane::WIDTH`] values to the front of `target`.
     fn store(self, target: &mut [f64]);
-    /// The constant `value`, in the shape of `self`.
-    #[must_use]
-    fn like(self, value: f64) -> Self;
     /// `self * a + b`, fused where the instruction set can.
     #[must_use]
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// The smaller of two values, lane by lane.
     #[must_use]
     fn min(self, other: Self) -> Self;
+    /// The larger of two values, lane by lane.
+    #[must_use]
+    fn max(self, other: Self) -> Self;
+    /// The magnitude of `self` with the sign of `other`.
+    #[must_use]
+    fn with_sign_of(self, other: Self) -> Self;
+    /// A bit for each lane whose sign bit is set, the first lane's lowest.
+    #[must_use]
+    fn signs(self) -> u128;
+    /// `self` times two to the integer that adding `1.5 * 2^52` has left in the bits of `count`.
+    #[must_use]
+    fn add_to_exponent(self, count: Self) -> Self;
+    /// A positive normal number as a mantissa between `sqrt(1/2)` and `sqrt 2` and an exponent of 2.
+    #[must_use]
+    fn split(self) -> (Self, Self);
     /// Changes the sign in the lanes where the lowest bit of `count` is set.
     #[must_use]
     fn flip_where_odd(self, count: Self) -> Self;
-
-    /// `cos(pi self)`, to the precision of `D`: the angle is in half turns.
-    #[inline(always)]
-    #[must_use]
-    fn cosine<D: Degree>(self) -> Self {
-        sine::cosine::<D, Self>(self)
-    }
 }
+
+/// Bits of `sqrt(1/2)` less those of 1, so that an exponent counts from 0 at the square root.
+pub(super) const ROOT_BITS: u64 = 0x3fe6_a09e_667f_3bcd_u64.wrapping_sub(1023 << 52);
+/// Sign and exponent of a number.
+pub(super) const EXPONENT_BITS: u64 = 0xfff << 52;
+/// Bits of `2^52`: an integer or-ed into them is that number plus `2^52`.
+pub(super) const INTEGER_BITS: u64 = 0x433 << 52;
+/// `2^52`, and the exponent's offset.
+pub(super) const INTEGER_OFFSET: f64 = 4_503_599_627_370_496.0 + 1023.0;
 
 macro_rules! scalar_lane {
     ($type:ty, $get:expr, $make:expr, $fused:expr, $mul_add:expr) => {
@@ -80,6 +115,26 @@ macro_rules! scalar_lane {
             #[inline(always)]
             fn sine<D: Degree>(self) -> Self {
                 sine::sine::<D, Self>(self)
+            }
+            #[inline(always)]
+            fn cosine<D: Degree>(self) -> Self {
+                sine::cosine::<D, Self>(self)
+            }
+            #[inline(always)]
+            fn exponential(self) -> Self {
+                elementary::exponential(self)
+            }
+            #[inline(always)]
+            fn logarithm(self) -> Self {
+                elementary::logarithm(self)
+            }
+            #[inline(always)]
+            fn magnitude(self) -> Self {
+                $make($get(self).abs())
+            }
+            #[inline(always)]
+            fn like(self, value: f64) -> Self {
+                $make(value)
             }
         }
 
@@ -101,16 +156,37 @@ macro_rules! scalar_lane {
                 target[0] = $get(self);
             }
             #[inline(always)]
-            fn like(self, value: f64) -> Self {
-                $make(value)
-            }
-            #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
                 $make($mul_add($get(self), $get(a), $get(b)))
             }
             #[inline(always)]
             fn min(self, other: Self) -> Self {
                 if $get(self) < $get(other) { self } else { other }
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if $get(self) > $get(other) { self } else { other }
+            }
+            #[inline(always)]
+            fn with_sign_of(self, other: Self) -> Self {
+                $make($get(self).copysign($get(other)))
+            }
+            #[inline(always)]
+            fn signs(self) -> u128 {
+                u128::from($get(self).to_bits() >> 63)
+            }
+            #[inline(always)]
+            fn add_to_exponent(self, count: Self) -> Self {
+                let shifted = $get(count).to_bits() << 52;
+                $make(f64::from_bits($get(self).to_bits().wrapping_add(shifted)))
+            }
+            #[inline(always)]
+            fn split(self) -> (Self, Self) {
+                let bits = $get(self).to_bits();
+                let part = bits.wrapping_sub(ROOT_BITS) & EXPONENT_BITS;
+                let mantissa = bits.wrapping_sub(part).wrapping_add(1023 << 52);
+                let exponent = f64::from_bits((part >> 52) | INTEGER_BITS) - INTEGER_OFFSET;
+                ($make(f64::from_bits(mantissa)), $make(exponent))
             }
             #[inline(always)]
             fn flip_where_odd(self, count: Self) -> Self {
@@ -155,6 +231,14 @@ impl Mul for Fused {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Self(self.0 * other.0)
+    }
+}
+
+impl Div for Fused {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.0 / other.0)
     }
 }
 

@@ -1,6 +1,8 @@
 //! What moves the pivot.
 
 use crate::error::Error;
+use crate::lanes::Real;
+use crate::lanes::sine::Fine;
 
 /// Harmonic vertical motion of the pivot: the factor `1 + p cos(omega tau + phase)` on gravity.
 ///
@@ -33,22 +35,50 @@ impl HarmonicDrive {
         }
         Ok(Self { p, omega, phase })
     }
+}
 
-    /// `1 + p cos(omega tau + phase)`.
-    #[must_use]
-    pub fn modulation(&self, tau: f64) -> f64 {
-        1.0 + self.p * (self.omega * tau + self.phase).cos()
+/// The pivot's acceleration over gravity, with all that effects have added to the harmonic drive.
+///
+/// Upward `p cos(a) + second cos(2 a + second_phase)` and, toward positive theta,
+/// `lateral cos(a + lateral_phase)`, where `a = omega tau + phase`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion<R> {
+    /// Amplitude of the harmonic drive.
+    pub p: R,
+    /// Its angular frequency.
+    pub omega: R,
+    /// Its phase at `tau = 0`, rad.
+    pub phase: R,
+    /// Amplitude at twice the frequency.
+    pub second: R,
+    /// Its phase against the drive, rad.
+    pub second_phase: R,
+    /// Amplitude of the sideways acceleration.
+    pub lateral: R,
+    /// Its phase against the drive, rad.
+    pub lateral_phase: R,
+}
+
+impl<R: Real> Motion<R> {
+    /// `1 + a(tau)` with the upward acceleration `a`; without the second harmonic if `plain`.
+    #[inline(always)]
+    pub fn vertical(&self, tau: R, plain: bool) -> R {
+        let angle = self.omega * tau + self.phase;
+        let first = self.p * cosine(angle) + tau.like(1.0);
+        if plain {
+            return first;
+        }
+        self.second * cosine(angle.scale(2.0) + self.second_phase) + first
     }
 
-    /// Whether the pivot rests.
-    #[must_use]
-    pub fn is_still(&self) -> bool {
-        self.p == 0.0
+    /// The sideways acceleration.
+    #[inline(always)]
+    pub fn sideways(&self, tau: R) -> R {
+        self.lateral * cosine(self.omega * tau + self.phase + self.lateral_phase)
     }
+}
 
-    /// The forcing period `2 pi / omega`; `2 pi` where the pivot rests.
-    #[must_use]
-    pub fn period(&self) -> f64 {
-        if self.is_still() { std::f64::consts::TAU } else { std::f64::consts::TAU / self.omega }
-    }
+#[inline(always)]
+fn cosine<R: Real>(angle: R) -> R {
+    angle.scale(std::f64::consts::FRAC_1_PI).cosine::<Fine>()
 }

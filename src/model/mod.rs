@@ -1,7 +1,11 @@
-//! The equation of motion and what drives it.
+//! The equation of motion, what drives it and what else acts.
 
 pub mod drive;
+pub mod effects;
+pub mod equation;
 pub mod pendulum;
 
 pub use drive::HarmonicDrive;
+pub use effects::{Effect, Kind};
+pub use equation::Equation;
 pub use pendulum::Pendulum;

@@ -1,18 +1,14 @@
-//! The equation of motion, once.
-//!
-//! `th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque`, nondimensional time
-//! `tau = w0 t`, `gamma = c / (m w0)`: eq. 1.2 of Horton, Wiercigroch & Xu (2008) with a constant
-//! torque (over `m l^2 w0^2`) on the right.
+//! The pendulum: its parameters and effects.
 
-use std::f64::consts::FRAC_1_PI;
+use std::f64::consts::TAU;
 
-use super::drive::HarmonicDrive;
+use super::drive::{HarmonicDrive, Motion};
+use super::effects::{Action, Effect, Kind, Mappable};
+use super::equation::Equation;
 use crate::error::Error;
-use crate::lanes::sine::Degree;
-use crate::lanes::{Lane, Real};
 
-/// The parametrically excited pendulum, nondimensional.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The parametrically excited pendulum, nondimensional; [`Equation`] is what it obeys.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Pendulum {
     /// Viscous damping `c / (m w0)`, twice the damping ratio.
     pub gamma: f64,
@@ -20,10 +16,28 @@ pub struct Pendulum {
     pub drive: HarmonicDrive,
     /// Constant torque over `m l^2 w0^2`.
     pub torque: f64,
+    /// Coulomb friction `Tr / w0^2`.
+    pub theta_r: f64,
+    /// Whatever else acts.
+    pub effects: Vec<Effect>,
+    /// Time in the laboratory at `tau = 0`, for effects that drift.
+    pub lab_time: f64,
+}
+
+/// Which path of the kernel a pendulum takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// Torques of angle and time, viscous damping: Runge-Kutta-Nystrom.
+    Smooth,
+    /// The same with a friction that does not depend on the velocity: Runge-Kutta-Nystrom and events.
+    Friction,
+    /// Torques of the velocity: Runge-Kutta, with events where something changes with its sign.
+    General,
 }
 
 impl Pendulum {
-    /// Checks the ranges: all finite, gamma not negative, omega positive.
+    /// Without friction and effects. Checks the ranges: all finite, gamma not negative, omega
+    /// positive.
     ///
     /// # Errors
     /// [`Error::Range`] for the first value outside them.
@@ -35,49 +49,163 @@ impl Pendulum {
             let allowed = "any finite number";
             return Err(Error::Range { name: "torque", value: torque, allowed });
         }
-        Ok(Self { gamma, drive: HarmonicDrive::new(p, omega, phase)?, torque })
+        let drive = HarmonicDrive::new(p, omega, phase)?;
+        Ok(Self { gamma, drive, torque, theta_r: 0.0, effects: Vec::new(), lab_time: 0.0 })
+    }
+
+    /// The same with Coulomb friction.
+    ///
+    /// # Errors
+    /// [`Error::Range`] if it is negative or not finite.
+    pub fn with_friction(mut self, theta_r: f64) -> Result<Self, Error> {
+        if !(theta_r.is_finite() && theta_r >= 0.0) {
+            return Err(Error::Range { name: "theta_r", value: theta_r, allowed: "0 or more" });
+        }
+        self.theta_r = theta_r;
+        Ok(self)
+    }
+
+    /// The same with one effect more.
+    ///
+    /// Viscous damping, Coulomb friction and a bias torque become `gamma`, `theta_r` and `torque`:
+    /// they are the same effects under the paper's names.
+    ///
+    /// # Errors
+    /// [`Error::Twice`] if it is there already.
+    pub fn with_effect(mut self, effect: Effect) -> Result<Self, Error> {
+        let name = effect.kind.definition().name;
+        let place = match effect.kind {
+            Kind::ViscousDamping => Some(("gamma", &mut self.gamma)),
+            Kind::CoulombFriction => Some(("theta_r", &mut self.theta_r)),
+            Kind::BiasTorque => Some(("torque", &mut self.torque)),
+            _ => None,
+        };
+        if let Some((other, slot)) = place {
+            if *slot != 0.0 {
+                return Err(Error::Twice { name, other });
+            }
+            *slot = effect.parameters[0];
+            return Ok(self);
+        }
+        let several = effect.kind == Kind::BearingHarmonic;
+        if !several && self.effects.iter().any(|e| e.kind == effect.kind) {
+            return Err(Error::Twice { name, other: name });
+        }
+        self.effects.push(effect);
+        Ok(self)
+    }
+
+    /// The equation of motion with its numbers.
+    #[must_use]
+    pub fn equation(&self) -> Equation<f64> {
+        Equation::lift(self, |_, value| value)
+    }
+
+    /// The names and values of all parameters, in the order in which [`Equation::lift`] asks for
+    /// them.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<(String, f64)> {
+        let own = [
+            ("gamma", self.gamma),
+            ("theta_r", self.theta_r),
+            ("torque", self.torque),
+            ("p", self.drive.p),
+            ("omega", self.drive.omega),
+            ("phase", self.drive.phase),
+        ];
+        let mut all: Vec<(String, f64)> = own.map(|(name, value)| (name.to_owned(), value)).into();
+        for effect in &self.effects {
+            let definition = effect.kind.definition();
+            all.extend(definition.parameters.iter().zip(effect.values()).map(
+                |(parameter, value)| (format!("{}.{}", definition.name, parameter.name), *value),
+            ));
+        }
+        all
+    }
+
+    /// The acceleration `th''` at time `tau`, moving in the sense of `velocity`.
+    #[must_use]
+    pub fn acceleration(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
+        let equation = self.equation();
+        let forcing = equation.forcing(tau);
+        let at = equation.point(&forcing, theta, velocity, 1_f64.copysign(velocity));
+        equation.acceleration(&forcing, &at)
+    }
+
+    /// The pivot's motion with all that effects add to it.
+    #[must_use]
+    pub fn motion(&self) -> Motion<f64> {
+        self.equation().motion
+    }
+
+    /// The greatest factor on gravity that the drive reaches, at most.
+    #[must_use]
+    pub fn greatest_pull(&self) -> f64 {
+        let motion = self.motion();
+        1.0 + motion.p.abs() + motion.second.abs() + motion.lateral.abs()
     }
 
     /// The unit of "periods": `2 pi / omega`, or `2 pi` without drive.
     #[must_use]
     pub fn period(&self) -> f64 {
-        self.drive.period()
+        if self.is_autonomous() { TAU } else { TAU / self.motion().omega }
     }
 
     /// Whether the equation does not depend on time.
     #[must_use]
     pub fn is_autonomous(&self) -> bool {
-        self.drive.is_still()
+        let motion = self.motion();
+        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0
     }
 
     /// Whether `(th, th') -> (-th, -th')` maps motions to motions.
     #[must_use]
     pub fn is_mirror_symmetric(&self) -> bool {
-        self.torque == 0.0
+        self.torque == 0.0 && self.effects.iter().all(Effect::is_mirror_symmetric)
     }
 
     /// Whether attractors can exist: without damping phase area is kept, and there are none.
     #[must_use]
     pub fn is_dissipative(&self) -> bool {
         self.gamma > 0.0
+            || self.theta_r > 0.0
+            || self.effects.iter().any(|e| e.is(&[Action::Velocity, Action::Kinked]) || e.rubs())
     }
 
-    /// The acceleration `th''` at time `tau`.
+    /// Which path of the kernel it takes.
     #[must_use]
-    pub fn acceleration<L: Lane>(&self, tau: f64, theta: L, velocity: L) -> L {
-        let load = conservative_load::<crate::lanes::sine::Fine, L>(
-            self.drive.modulation(tau),
-            self.torque,
-            theta.scale(FRAC_1_PI),
-        );
-        velocity.scale_add(-self.gamma, load)
+    pub fn path(&self) -> Path {
+        let has = |actions: &[Action]| self.effects.iter().any(|e| e.is(actions));
+        if has(&[Action::Velocity, Action::Kinked, Action::SlidingFriction]) {
+            Path::General
+        } else if self.has_friction() {
+            Path::Friction
+        } else {
+            Path::Smooth
+        }
     }
-}
 
-/// What acts besides the viscous damping: `torque - modulation sin(pi half_turns)`.
-///
-/// The angle is in half turns, as the kernel counts it (see [`crate::lanes::sine`]). Linear in `modulation` and `torque`, so that an integrator may put its own factor into both.
-#[inline(always)]
-pub fn conservative_load<D: Degree, R: Real>(modulation: f64, torque: f64, half_turns: R) -> R {
-    half_turns.sine::<D>().affine(-modulation, torque)
+    /// Whether something can hold it fast.
+    #[must_use]
+    pub fn has_friction(&self) -> bool {
+        self.theta_r > 0.0 || self.effects.iter().any(Effect::rubs)
+    }
+
+    /// Whether its equation changes where the velocity passes zero.
+    #[must_use]
+    pub fn has_events(&self) -> bool {
+        self.has_friction() || self.effects.iter().any(|e| e.is(&[Action::Kinked]))
+    }
+
+    /// Whether a torque of angle and time acts besides gravity and the constant torque.
+    #[must_use]
+    pub fn has_extra_torque(&self) -> bool {
+        self.motion().lateral != 0.0 || self.effects.iter().any(|e| e.is(&[Action::Position]))
+    }
+
+    /// Whether an effect changes with the time in the laboratory.
+    #[must_use]
+    pub fn drifts(&self) -> bool {
+        self.effects.iter().any(|e| e.kind.definition().mappable == Mappable::Frozen)
+    }
 }

@@ -35,9 +35,9 @@ impl PoincareMap {
     /// The map of `pendulum` at `tau = 0 mod T`.
     #[must_use]
     pub fn new(pendulum: &Pendulum) -> Self {
-        let pull = (1.0 + pendulum.drive.p.abs()).sqrt();
+        let pull = pendulum.greatest_pull().sqrt();
         let steps = (pendulum.period() * pull / STEP).ceil() as usize;
-        Self { pendulum: *pendulum, schedule: Schedule::period(pendulum, steps.max(32)) }
+        Self { pendulum: pendulum.clone(), schedule: Schedule::period(pendulum, steps.max(32)) }
     }
 
     /// One period on.

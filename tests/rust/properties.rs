@@ -32,7 +32,7 @@ fn mirrored(state: State) -> State {
 
 /// The same pendulum with a torque.
 fn with_torque(pendulum: &Pendulum, torque: f64) -> Pendulum {
-    Pendulum { torque, ..*pendulum }
+    Pendulum { torque, ..pendulum.clone() }
 }
 
 proptest! {

@@ -1,0 +1,31 @@
+//! Dry friction of constant magnitude, the paper's `theta_r = Tr / w0^2`.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use crate::lanes::Real;
+
+pub struct CoulombFriction;
+
+impl Law for CoulombFriction {
+    const DEFINITION: Definition = Definition {
+        name: "coulomb_friction",
+        group: Group::Damping,
+        action: Action::Friction,
+        formula: "-theta_r sign(v)",
+        parameters: &[Parameter {
+            name: "theta_r",
+            unit: "rad/s^2",
+            power: Power::Of(2),
+            range: [0.0, f64::INFINITY],
+            typical: [1e-4, 0.3],
+            meaning: "friction torque over m l^2 w0^2; in SI Tr",
+        }],
+        keeps_mirror: true,
+        revealed_by: "the last swings of a decay, which it ends in a finite time",
+        mappable: Mappable::Yes,
+    };
+
+    #[inline(always)]
+    fn friction<R: Real>([theta_r, ..]: &[R; MOST_PARAMETERS], _: &Point<R>) -> R {
+        *theta_r
+    }
+}

@@ -1,0 +1,194 @@
+//! What an effect is: its definition, and the formulas that it may have.
+
+use crate::lanes::Real;
+use crate::lanes::sine::Fine;
+use crate::model::drive::Motion;
+
+/// No effect has more parameters.
+pub const MOST_PARAMETERS: usize = 3;
+
+/// Where an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// It takes energy out of the motion.
+    Damping,
+    /// A torque that does not.
+    Torque,
+    /// It changes what moves the pivot.
+    Drive,
+    /// It changes what the sensor reads; the motion is the same.
+    Reading,
+}
+
+impl Group {
+    /// The word for it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Damping => "damping",
+            Self::Torque => "torque",
+            Self::Drive => "drive",
+            Self::Reading => "reading",
+        }
+    }
+}
+
+/// What of the motion an effect's torque depends on: it decides which path of the kernel runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// A torque of angle and time.
+    Position,
+    /// A smooth torque of the velocity.
+    Velocity,
+    /// A continuous torque of the velocity whose formula changes with its sign.
+    Kinked,
+    /// A force against the motion that jumps with the sign of the velocity and can hold the
+    /// pendulum fast, of angle and time only.
+    Friction,
+    /// The same, and depending on the velocity besides.
+    SlidingFriction,
+    /// Another motion of the pivot.
+    Drive,
+    /// Another reading; no torque.
+    Reading,
+}
+
+/// Whether a map over initial conditions can have the effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mappable {
+    /// It can.
+    Yes,
+    /// With time in the laboratory held at a stated value.
+    Frozen,
+}
+
+impl Mappable {
+    /// The word for it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Yes => "yes",
+            Self::Frozen => "frozen",
+        }
+    }
+}
+
+/// How a parameter scales: its value in SI units is the one without dimensions times a power of
+/// `w0`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Power {
+    /// `w0^k`.
+    Of(i32),
+    /// `w0^(2 - n)` where `n` is the effect's parameter of that place.
+    TwoMinus(usize),
+}
+
+/// A parameter of an effect.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    /// Its name in model files.
+    pub name: &'static str,
+    /// Its unit in SI.
+    pub unit: &'static str,
+    /// How it scales with `w0`.
+    pub power: Power,
+    /// The least and the greatest value that make sense, without dimensions.
+    pub range: [f64; 2],
+    /// Smallest and largest value of interest: where a search looks.
+    pub typical: [f64; 2],
+    /// What it is.
+    pub meaning: &'static str,
+}
+
+/// All that is said about an effect, besides its formulas.
+#[derive(Clone, Copy, Debug)]
+pub struct Definition {
+    /// Its name, the field's standard term.
+    pub name: &'static str,
+    /// Where it acts.
+    pub group: Group,
+    /// What it depends on.
+    pub action: Action,
+    /// The term on the right of `th'' = ...`, per inertia, or the reading, or the drive.
+    pub formula: &'static str,
+    /// Its parameters, in order.
+    pub parameters: &'static [Parameter],
+    /// Whether it maps mirrored motions, `(th, v) -> (-th, -v)`, to mirrored motions.
+    pub keeps_mirror: bool,
+    /// Which data show it.
+    pub revealed_by: &'static str,
+    /// Whether maps can have it.
+    pub mappable: Mappable,
+}
+
+/// Where a formula is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Point<R> {
+    /// Angle, rad, not wrapped.
+    pub theta: R,
+    /// Velocity.
+    pub velocity: R,
+    /// 1 or -1: the sense of the motion, held over a step even where the velocity passes zero.
+    pub sense: R,
+    /// `sin theta`.
+    pub sine: R,
+    /// `1 + a(t)`: gravity and the pivot's vertical acceleration over gravity.
+    pub vertical: R,
+    /// Time in the laboratory.
+    pub lab: R,
+}
+
+impl<R: Real> Point<R> {
+    /// `cos theta`.
+    #[inline(always)]
+    #[must_use]
+    pub fn cosine(&self) -> R {
+        self.theta.scale(std::f64::consts::FRAC_1_PI).cosine::<Fine>()
+    }
+
+    /// `|velocity|`, smooth across zero while the sense is held.
+    #[inline(always)]
+    #[must_use]
+    pub fn speed(&self) -> R {
+        self.velocity * self.sense
+    }
+
+    /// A constant.
+    #[inline(always)]
+    #[must_use]
+    pub fn constant(&self, value: f64) -> R {
+        self.theta.like(value)
+    }
+}
+
+/// An effect's definition and formulas. Parameters come in the order of the definition.
+///
+/// The formulas are written over [`Real`], so that lanes, single numbers and numbers with
+/// derivatives, by the state and by the parameters alike, run through the same lines.
+pub trait Law {
+    /// Name, formula, parameters and the rest.
+    const DEFINITION: Definition;
+
+    /// The torque per inertia, `th'' = ... + torque`.
+    #[inline(always)]
+    fn torque<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        at.constant(0.0)
+    }
+
+    /// The magnitude of a friction, `th'' = ... - friction sign(th')`; at rest its value at `th' = 0`
+    /// is what a load must exceed to move the pendulum.
+    #[inline(always)]
+    fn friction<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        at.constant(0.0)
+    }
+
+    /// Changes the pivot's motion.
+    #[inline(always)]
+    fn drive<R: Real>(_: &[R; MOST_PARAMETERS], _: &mut Motion<R>) {}
+
+    /// What a sensor reads at the angle `theta`.
+    #[inline(always)]
+    fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R) -> R {
+        theta
+    }
+}

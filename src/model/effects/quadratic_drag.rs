@@ -1,0 +1,31 @@
+//! Drag in proportion to the square of the velocity: air at high speed.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use crate::lanes::Real;
+
+pub struct QuadraticDrag;
+
+impl Law for QuadraticDrag {
+    const DEFINITION: Definition = Definition {
+        name: "quadratic_drag",
+        group: Group::Damping,
+        action: Action::Kinked,
+        formula: "-q v |v|",
+        parameters: &[Parameter {
+            name: "q",
+            unit: "1/rad",
+            power: Power::Of(0),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [1e-4, 0.3],
+            meaning: "drag coefficient over the moment of inertia",
+        }],
+        keeps_mirror: true,
+        revealed_by: "large amplitudes and rotation",
+        mappable: Mappable::Yes,
+    };
+
+    #[inline(always)]
+    fn torque<R: Real>([q, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        -(*q * at.velocity * at.speed())
+    }
+}

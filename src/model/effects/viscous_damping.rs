@@ -1,0 +1,31 @@
+//! Damping in proportion to the velocity, the paper's `gamma`.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use crate::lanes::Real;
+
+pub struct ViscousDamping;
+
+impl Law for ViscousDamping {
+    const DEFINITION: Definition = Definition {
+        name: "viscous_damping",
+        group: Group::Damping,
+        action: Action::Velocity,
+        formula: "-gamma v",
+        parameters: &[Parameter {
+            name: "gamma",
+            unit: "1/s",
+            power: Power::Of(1),
+            range: [0.0, f64::INFINITY],
+            typical: [1e-3, 1.0],
+            meaning: "c/(m w0), twice the damping ratio; in SI c/m",
+        }],
+        keeps_mirror: true,
+        revealed_by: "any decay",
+        mappable: Mappable::Yes,
+    };
+
+    #[inline(always)]
+    fn torque<R: Real>([gamma, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        -(*gamma * at.velocity)
+    }
+}

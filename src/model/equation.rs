@@ -1,0 +1,170 @@
+//! The equation of motion, once.
+//!
+//! `th'' + gamma th' + (1 + a(tau)) sin th + l(tau) cos th = torque - theta_r sign(th') + effects`:
+//! eq. 1.2 of Horton, Wiercigroch & Xu (2008), their eq. 2.1 without dimensions where there is
+//! friction, a constant torque (over `m l^2 w0^2`) and the library of effects. `a` and `l` are the
+//! pivot's accelerations over gravity, upward and toward positive theta; nondimensional time
+//! `tau = w0 t`, `gamma = c / (m w0)`.
+
+use std::f64::consts::FRAC_1_PI;
+
+use super::drive::Motion;
+use super::effects::{Action, Kind, MOST_PARAMETERS, Point};
+use super::pendulum::Pendulum;
+use crate::lanes::Real;
+use crate::lanes::sine::{Degree, Fine};
+
+/// The equation of motion with its parameters as numbers of some kind.
+#[derive(Clone, Debug)]
+pub struct Equation<R> {
+    /// Viscous damping.
+    pub gamma: R,
+    /// Coulomb friction.
+    pub theta_r: R,
+    /// Constant torque.
+    pub torque: R,
+    /// The pivot's motion.
+    pub motion: Motion<R>,
+    /// Time in the laboratory at `tau = 0`.
+    pub lab_time: R,
+    /// Whether the time in the laboratory goes on with `tau`; a map holds it.
+    pub ages: bool,
+    /// Effects with a torque.
+    torques: Vec<(Kind, [R; MOST_PARAMETERS])>,
+    /// Effects with a friction.
+    frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
+    sideways: bool,
+    plain: bool,
+}
+
+/// What the drive does at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Forcing<R> {
+    /// `1 + a`.
+    pub vertical: R,
+    /// `l`.
+    pub lateral: R,
+    /// Time in the laboratory.
+    pub lab: R,
+}
+
+impl<R: Real> Equation<R> {
+    /// The equation of `pendulum`; `number` makes a number of parameter `index`
+    /// ([`Pendulum::parameters`] lists them) and its value.
+    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
+        let mut index = 0;
+        let mut next = |value: f64| {
+            index += 1;
+            number(index - 1, value)
+        };
+        let gamma = next(pendulum.gamma);
+        let theta_r = next(pendulum.theta_r);
+        let torque = next(pendulum.torque);
+        let (p, omega) = (next(pendulum.drive.p), next(pendulum.drive.omega));
+        let phase = next(pendulum.drive.phase);
+        let zero = gamma.like(0.0);
+        let mut motion = Motion {
+            p,
+            omega,
+            phase,
+            second: zero,
+            second_phase: zero,
+            lateral: zero,
+            lateral_phase: zero,
+        };
+        let (mut torques, mut frictions) = (Vec::new(), Vec::new());
+        let (mut sideways, mut plain) = (false, true);
+        for effect in &pendulum.effects {
+            let mut parameters = [zero; MOST_PARAMETERS];
+            for (slot, value) in effect.values().iter().enumerate() {
+                parameters[slot] = next(*value);
+            }
+            match effect.kind.definition().action {
+                Action::Position | Action::Velocity | Action::Kinked => {
+                    torques.push((effect.kind, parameters));
+                }
+                Action::Friction | Action::SlidingFriction => {
+                    frictions.push((effect.kind, parameters));
+                }
+                Action::Drive => {
+                    effect.kind.drive(&parameters, &mut motion);
+                    (sideways, plain) = (true, false);
+                }
+                Action::Reading => {}
+            }
+        }
+        let lab_time = gamma.like(pendulum.lab_time);
+        let ages = false;
+        Self { gamma, theta_r, torque, motion, lab_time, ages, torques, frictions, sideways, plain }
+    }
+
+    /// What the drive does at time `tau`.
+    #[inline(always)]
+    pub fn forcing(&self, tau: R) -> Forcing<R> {
+        let lateral = if self.sideways { self.motion.sideways(tau) } else { tau.like(0.0) };
+        let lab = if self.ages { self.lab_time + tau } else { self.lab_time };
+        Forcing { vertical: self.motion.vertical(tau, self.plain), lateral, lab }
+    }
+
+    /// Where the formulas are evaluated; `sense` is 1 or -1.
+    #[inline(always)]
+    pub fn point(&self, forcing: &Forcing<R>, theta: R, velocity: R, sense: R) -> Point<R> {
+        let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
+        Point { theta, velocity, sense, sine, vertical: forcing.vertical, lab: forcing.lab }
+    }
+
+    /// All torques per inertia but friction.
+    #[inline(always)]
+    pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
+        let bias = Kind::BiasTorque.torque(&Self::only(self.torque), at);
+        let gravity = -(forcing.vertical * at.sine);
+        self.extra(forcing, at) + gravity + bias + damping
+    }
+
+    /// What acts besides gravity, the constant torque, viscous damping and friction.
+    #[inline(always)]
+    pub fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let mut sum = at.constant(0.0);
+        if self.sideways {
+            sum = -(forcing.lateral * at.cosine());
+        }
+        for (kind, parameters) in &self.torques {
+            sum = sum + kind.torque(parameters, at);
+        }
+        sum
+    }
+
+    /// The magnitude of the friction.
+    #[inline(always)]
+    pub fn friction(&self, at: &Point<R>) -> R {
+        let mut sum = Kind::CoulombFriction.friction(&Self::only(self.theta_r), at);
+        for (kind, parameters) in &self.frictions {
+            sum = sum + kind.friction(parameters, at);
+        }
+        sum
+    }
+
+    /// `th''` while moving in the sense of `at`.
+    #[inline(always)]
+    pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        self.load(forcing, at) - self.friction(at) * at.sense
+    }
+
+    #[inline(always)]
+    fn only(value: R) -> [R; MOST_PARAMETERS] {
+        let zero = value.like(0.0);
+        let mut parameters = [zero; MOST_PARAMETERS];
+        parameters[0] = value;
+        parameters
+    }
+}
+
+/// What acts besides damping, friction and effects: `torque - vertical sin(pi half_turns)`.
+///
+/// The angle is in half turns, as the kernel counts it (see [`crate::lanes::sine`]). Linear in
+/// `vertical` and `torque`, so that an integrator may put its own factor into both.
+#[inline(always)]
+pub fn conservative_load<D: Degree, R: Real>(vertical: f64, torque: f64, half_turns: R) -> R {
+    half_turns.sine::<D>().affine(-vertical, torque)
+}
