@@ -5,10 +5,10 @@ use std::f64::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::trap::{Band, Ellipse};
-use crate::integrate::stroboscopic::Buffer;
-use crate::integrate::{Moving, State, Strobe};
-use crate::lanes::sine::{Coarse, Degree, Fine, wrap};
-use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
+use crate::integrate::block::Block;
+use crate::integrate::{State, Strobe};
+use crate::lanes::sine::wrap;
+use crate::lanes::{Isa, Job, Lane, Real, dispatch};
 
 /// All regions that capture.
 #[derive(Clone, Debug, Default)]
@@ -61,7 +61,7 @@ pub fn run(
     cancel: &AtomicBool,
     source: &mut dyn Source,
 ) {
-    dispatch::run(strobe.path, Capture { strobe, traps, bound, cancel, source });
+    Watch::new(Capture { strobe, traps, bound, cancel, source }).run();
 }
 
 /// All outcomes of `starts`, in their order; `None` if `cancel` was set.
@@ -115,33 +115,21 @@ struct Tenant {
     hit: Option<Hit>,
 }
 
-impl Job for Capture<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<S: Isa>(self, isa: S) {
-        if self.strobe.fine {
-            Block::new(self).run::<Fine, S::Lanes>(isa);
-        } else {
-            Block::new(self).run::<Coarse, S::Lanes>(isa);
-        }
-    }
-}
-
-struct Block<'a> {
+/// A block whose lanes take a new start when one has ended.
+struct Watch<'a> {
     job: Capture<'a>,
     /// Ellipses in the coordinates of a lane: half turns and kick.
     scaled: Vec<Ellipse>,
-    half_turns: Buffer,
-    kick: Buffer,
-    turns: Buffer,
-    height: Buffer,
-    tenants: [Option<Tenant>; MAX_WIDTH],
+    block: Block,
+    height: Vec<f64>,
+    tenants: Vec<Option<Tenant>>,
     clock: u64,
     next_expiry: u64,
 }
 
-impl<'a> Block<'a> {
+impl<'a> Watch<'a> {
     fn new(job: Capture<'a>) -> Self {
+        let width = job.strobe.block_width();
         let scale = job.strobe.schedule.kick;
         let scaled = job
             .traps
@@ -156,35 +144,39 @@ impl<'a> Block<'a> {
         Self {
             job,
             scaled,
-            half_turns: Buffer::default(),
-            kick: Buffer::default(),
-            turns: Buffer::default(),
-            height: Buffer::default(),
-            tenants: [None; MAX_WIDTH],
+            block: Block::new(width),
+            height: vec![f64::INFINITY; width],
+            tenants: vec![None; width],
             clock: 0,
             next_expiry: u64::MAX,
         }
     }
 
-    #[inline(always)]
-    fn run<D: Degree, L: Lane>(mut self, token: L::Token) {
+    fn run(mut self) {
+        let width = self.tenants.len();
         let mut occupied = 0;
-        for lane in 0..L::WIDTH {
+        for lane in 0..width {
             occupied += usize::from(self.refill(lane));
         }
         while occupied > 0 {
-            let low = self.period::<D, L>(token);
+            self.job.strobe.period(&mut self.block);
+            let heights = Heights {
+                block: &mut self.block,
+                ellipses: &self.scaled,
+                height: &mut self.height,
+            };
+            let low = dispatch::run(self.job.strobe.path, heights);
             self.clock += 1;
             let bands = !self.job.traps.bands.is_empty();
             if low < 1.0 || bands {
-                for lane in 0..L::WIDTH {
-                    if (self.height.0[lane] < 1.0 || bands) && self.captured(lane) {
+                for lane in 0..width {
+                    if (self.height[lane] < 1.0 || bands) && self.captured(lane) {
                         occupied -= usize::from(!self.refill(lane));
                     }
                 }
             }
             if self.clock >= self.next_expiry {
-                occupied -= self.expire(L::WIDTH);
+                occupied -= self.expire(width);
             }
             if self.job.cancel.load(Ordering::Relaxed) {
                 return;
@@ -192,44 +184,17 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// One forcing period for all lanes; the lowest height above the traps' centres.
-    #[inline(always)]
-    fn period<D: Degree, L: Lane>(&mut self, token: L::Token) -> f64 {
-        let schedule = &self.job.strobe.schedule;
-        let mut lanes = Moving {
-            half_turns: L::load(token, &self.half_turns.0),
-            kick: L::load(token, &self.kick.0),
-        };
-        lanes.run::<D>(schedule);
-        let (half_turns, whole) = wrap(lanes.half_turns);
-        let mut height = L::splat(token, f64::INFINITY);
-        for e in &self.scaled {
-            let x = half_turns - half_turns.like(e.centre[0]);
-            let y = lanes.kick - half_turns.like(e.centre[1]);
-            let y1 = x.scale_add(e.shape[0], y.scale(e.shape[1]));
-            let y2 = y.scale(e.shape[2]);
-            height = y1.mul_add(y1, y2 * y2).min(height);
-        }
-        half_turns.store(&mut self.half_turns.0);
-        lanes.kick.store(&mut self.kick.0);
-        (L::load(token, &self.turns.0) + whole).store(&mut self.turns.0);
-        height.store(&mut self.height.0);
-        self.height.0[..L::WIDTH]
-            .iter()
-            .fold(f64::INFINITY, |low, h| if *h < low { *h } else { low })
-    }
-
     /// Puts the next start into `lane`; false if there is none.
     #[inline(never)]
     fn refill(&mut self, lane: usize) -> bool {
         let Some((index, [theta, velocity])) = self.job.source.next() else {
             self.tenants[lane] = None;
-            (self.half_turns.0[lane], self.kick.0[lane]) = (0.0, 0.0);
+            (self.block.half_turns[lane], self.block.kick[lane]) = (0.0, 0.0);
             return false;
         };
-        self.half_turns.0[lane] = theta * FRAC_1_PI;
-        self.kick.0[lane] = velocity * self.job.strobe.schedule.kick;
-        self.turns.0[lane] = 0.0;
+        self.block.half_turns[lane] = theta * FRAC_1_PI;
+        self.block.kick[lane] = velocity * self.job.strobe.schedule.kick;
+        self.block.turns[lane] = 0.0;
         self.tenants[lane] =
             Some(Tenant { index, first_theta: theta, born: self.clock, hit: None });
         self.next_expiry = self.next_expiry.min(self.clock + u64::from(self.job.bound));
@@ -238,7 +203,7 @@ impl<'a> Block<'a> {
 
     /// The trap that holds `lane`, as attractor, point and length of its cycle.
     fn trap(&self, lane: usize) -> Option<(usize, usize, usize)> {
-        let state = [self.half_turns.0[lane], self.kick.0[lane]];
+        let state = [self.block.half_turns[lane], self.block.kick[lane]];
         if let Some(e) = self.scaled.iter().find(|e| e.height(state) < 1.0) {
             return Some((e.attractor, e.point, e.cycle));
         }
@@ -267,7 +232,7 @@ impl<'a> Block<'a> {
             attractor,
             point,
             clock: self.clock,
-            turns: self.turns.0[lane],
+            turns: self.block.turns[lane],
             theta: self.theta(lane),
             velocity: self.velocity(lane),
         });
@@ -276,11 +241,11 @@ impl<'a> Block<'a> {
     }
 
     fn theta(&self, lane: usize) -> f64 {
-        self.half_turns.0[lane] * PI
+        self.block.half_turns[lane] * PI
     }
 
     fn velocity(&self, lane: usize) -> f64 {
-        self.kick.0[lane] / self.job.strobe.schedule.kick
+        self.block.kick[lane] / self.job.strobe.schedule.kick
     }
 
     fn hand_over(&mut self, tenant: Tenant, fate: Fate, end: (f64, f64, f64, u64)) {
@@ -312,9 +277,46 @@ impl<'a> Block<'a> {
             let (theta, velocity) = (self.theta(lane), self.velocity(lane));
             let finite = theta.is_finite() && velocity.is_finite() && velocity.abs() < 1e6;
             let fate = if finite { Fate::Open } else { Fate::Failed };
-            self.hand_over(tenant, fate, (theta, velocity, self.turns.0[lane], self.clock));
+            self.hand_over(tenant, fate, (theta, velocity, self.block.turns[lane], self.clock));
             emptied += usize::from(!self.refill(lane));
         }
         emptied
+    }
+}
+
+/// Takes off whole turns; the lowest height above the traps' centres.
+struct Heights<'a> {
+    block: &'a mut Block,
+    ellipses: &'a [Ellipse],
+    height: &'a mut [f64],
+}
+
+impl Job for Heights<'_> {
+    type Output = f64;
+    #[inline(always)]
+    fn run<S: Isa>(self, isa: S) -> f64 {
+        let mut lowest = f64::INFINITY;
+        let mut at = 0;
+        while at < self.height.len() {
+            let (half_turns, whole) = wrap(S::Lanes::load(isa, &self.block.half_turns[at..]));
+            let kick = S::Lanes::load(isa, &self.block.kick[at..]);
+            let mut height = S::Lanes::splat(isa, f64::INFINITY);
+            for e in self.ellipses {
+                let x = half_turns - half_turns.like(e.centre[0]);
+                let y = kick - half_turns.like(e.centre[1]);
+                let y1 = x.scale_add(e.shape[0], y.scale(e.shape[1]));
+                let y2 = y.scale(e.shape[2]);
+                height = y1.mul_add(y1, y2 * y2).min(height);
+            }
+            half_turns.store(&mut self.block.half_turns[at..]);
+            (S::Lanes::load(isa, &self.block.turns[at..]) + whole)
+                .store(&mut self.block.turns[at..]);
+            height.store(&mut self.height[at..]);
+            for h in &self.height[at..at + S::Lanes::WIDTH] {
+                lowest = if *h < lowest { *h } else { lowest };
+            }
+            at += S::Lanes::WIDTH;
+        }
+        lowest
     }
 }

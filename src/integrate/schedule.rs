@@ -12,14 +12,19 @@ use std::f64::consts::FRAC_1_PI;
 
 use super::tableau::{C, STAGES};
 use crate::model::Pendulum;
+use crate::model::equation::Forcing;
 
-/// One step's loads, stage by stage, each times `h_u^2 exp(2 gamma s) / pi`.
-#[derive(Clone, Copy, Debug, Default)]
+/// One step's loads, stage by stage.
+#[derive(Clone, Copy, Debug)]
 pub struct StageLoads {
-    /// `1 + p cos(omega tau + phase)` at the stage.
+    /// `1 + p cos(omega tau + phase)` times `factor`.
     pub modulation: [f64; STAGES],
-    /// The constant torque.
+    /// The constant torque times `factor`.
     pub torque: [f64; STAGES],
+    /// `h_u^2 exp(2 gamma s) / pi`.
+    pub factor: [f64; STAGES],
+    /// What the drive does.
+    pub forcing: [Forcing<f64>; STAGES],
 }
 
 /// A run of equal steps from one time to another, the same for every trajectory.
@@ -47,11 +52,20 @@ impl Schedule {
         let table = (0..steps)
             .map(|k| {
                 let start = tau + duration * (k as f64 / steps as f64);
-                let mut loads = StageLoads::default();
+                let still = Forcing { vertical: 1.0, lateral: 0.0, lab: 0.0 };
+                let none = [0.0; STAGES];
+                let mut loads = StageLoads {
+                    modulation: none,
+                    torque: none,
+                    factor: none,
+                    forcing: [still; STAGES],
+                };
                 for (i, s) in stage_time.into_iter().enumerate() {
                     let factor = folded * folded * (2.0 * gamma * s).exp() * FRAC_1_PI;
-                    loads.modulation[i] = factor * equation.forcing(start + s).vertical;
+                    loads.forcing[i] = equation.forcing(start + s);
+                    loads.modulation[i] = factor * loads.forcing[i].vertical;
                     loads.torque[i] = factor * pendulum.torque;
+                    loads.factor[i] = factor;
                 }
                 loads
             })

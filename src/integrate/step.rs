@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use super::schedule::{Schedule, StageLoads};
 use super::tableau::{A, B, BP, C, STAGES};
 use crate::lanes::Real;
-use crate::lanes::sine::Degree;
-use crate::model::equation::conservative_load;
+use crate::lanes::sine::{Degree, Fine};
+use crate::model::equation::{Equation, conservative_load};
 
 /// A trajectory within a schedule: the angle in half turns, and the velocity times the schedule's
 /// `kick`.
@@ -16,6 +16,37 @@ pub struct Moving<R> {
     pub half_turns: R,
     /// `h_u th' / pi`.
     pub kick: R,
+}
+
+/// What acts besides gravity, drive, constant torque and viscous damping.
+pub trait Extra<R> {
+    /// `load` with it added, at a stage.
+    fn on(&self, loads: &StageLoads, stage: usize, load: R) -> R;
+}
+
+/// Nothing more.
+#[derive(Clone, Copy, Debug)]
+pub struct Nothing;
+
+impl<R: Real> Extra<R> for Nothing {
+    #[inline(always)]
+    fn on(&self, _: &StageLoads, _: usize, load: R) -> R {
+        load
+    }
+}
+
+/// Coulomb friction with the sense of the motion held over the step.
+#[derive(Clone, Copy, Debug)]
+pub struct Rubbing<R>(
+    /// `-theta_r` times the sense, 1 or -1.
+    pub R,
+);
+
+impl<R: Real> Extra<R> for Rubbing<R> {
+    #[inline(always)]
+    fn on(&self, loads: &StageLoads, stage: usize, load: R) -> R {
+        self.0.scale_add(loads.factor[stage], load)
+    }
 }
 
 impl<R: Real> Moving<R> {
@@ -40,9 +71,21 @@ impl<R: Real> Moving<R> {
         self.kick.scale(1.0 / schedule.kick)
     }
 
-    /// One step.
+    /// One step under gravity, drive, constant torque and viscous damping.
     #[inline(always)]
     pub fn step<D: Degree>(&mut self, loads: &StageLoads, decay: f64) {
+        self.step_with::<D, Nothing>(loads, decay, &Nothing);
+    }
+
+    /// One step with `extra` besides; the first and the last stage's load times `factor`: those at
+    /// the step's ends.
+    #[inline(always)]
+    pub fn step_with<D: Degree, X: Extra<R>>(
+        &mut self,
+        loads: &StageLoads,
+        decay: f64,
+        extra: &X,
+    ) -> [R; 2] {
         let Self { half_turns, kick } = *self;
         let mut k = [half_turns; STAGES];
         // Written out by a macro: as a loop over the stages the compiler keeps it a loop, looks the
@@ -51,7 +94,8 @@ impl<R: Real> Moving<R> {
             ($i:literal: $($j:literal)*) => {
                 let at = if C[$i] == 0.0 { half_turns } else { kick.scale_add(C[$i], half_turns) };
                 $(let at = if A[$i][$j] == 0.0 { at } else { k[$j].scale_add(A[$i][$j], at) };)*
-                k[$i] = conservative_load::<D, R>(loads.modulation[$i], loads.torque[$i], at);
+                let load = conservative_load::<D, R>(loads.modulation[$i], loads.torque[$i], at);
+                k[$i] = extra.on(loads, $i, load);
             };
         }
         stage!(0:);
@@ -72,6 +116,48 @@ impl<R: Real> Moving<R> {
         }
         weigh!(0 1 2 3 4 5 6 7);
         *self = Self { half_turns: position, kick: speed.scale(decay) };
+        [k[0], k[STAGES - 1]]
+    }
+
+    /// One step under all that acts, if none of it depends on the velocity but for its sense, 1 or
+    /// -1, which is held. Returns what [`Moving::step_with`] does.
+    ///
+    /// A loop over the stages, so that the effects' formulas are compiled once.
+    #[inline(always)]
+    pub fn step_under(
+        &mut self,
+        equation: &Equation<R>,
+        loads: &StageLoads,
+        decay: f64,
+        sense: R,
+    ) -> [R; 2] {
+        let Self { half_turns, kick } = *self;
+        let standing = sense.like(0.0);
+        let mut k = [standing; STAGES];
+        let mut i = 0;
+        while i < STAGES {
+            let mut at = kick.scale_add(C[i], half_turns);
+            let mut j = 0;
+            while j < i {
+                at = k[j].scale_add(A[i][j], at);
+                j += 1;
+            }
+            let forcing = loads.forcing[i].like(half_turns);
+            let point = equation.point(&forcing, at.scale(PI), standing, sense);
+            let load = conservative_load::<Fine, R>(loads.modulation[i], loads.torque[i], at);
+            let rest = equation.extra(&forcing, &point) - equation.friction(&point) * sense;
+            k[i] = rest.scale_add(loads.factor[i], load);
+            i += 1;
+        }
+        let (mut position, mut speed) = (half_turns + kick, kick);
+        let mut i = 0;
+        while i < STAGES {
+            position = k[i].scale_add(B[i], position);
+            speed = k[i].scale_add(BP[i], speed);
+            i += 1;
+        }
+        *self = Self { half_turns: position, kick: speed.scale(decay) };
+        [k[0], k[STAGES - 1]]
     }
 
     /// All steps of the schedule.

@@ -1,13 +1,18 @@
 //! The stroboscopic map for many trajectories: states at `tau = 0 mod T`, one forcing period at a
 //! time, every lane at the same phase.
 
+use std::f64::consts::PI;
+
+use super::block::Block;
+use super::general::Timetable;
 use super::schedule::Schedule;
 use super::step::Moving;
 use super::tangent::Tangent;
 use crate::error::Error;
-use crate::lanes::sine::{Coarse, Degree, Fine, wrap};
+use crate::lanes::sine::{Fine, wrap};
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, Path, Real, dispatch};
-use crate::model::Pendulum;
+use crate::model::pendulum::Route;
+use crate::model::{Equation, Pendulum};
 
 /// Angle and velocity, `[theta, th']`.
 pub type State = [f64; 2];
@@ -27,6 +32,16 @@ pub struct Strobe {
     pub path: Path,
     /// Whether the sine of degree 15 is used.
     pub fine: bool,
+    /// Which way through the kernel the model takes.
+    pub route: Route,
+    /// Whether the model changes with the sign of the velocity.
+    pub events: bool,
+    /// Whether torques of angle and time act besides gravity and the constant one.
+    pub extra: bool,
+    /// The drive at the stages of the general method; empty on other routes.
+    pub timetable: Timetable,
+    /// The equation, time in the laboratory held.
+    pub equation: Equation<f64>,
 }
 
 impl Strobe {
@@ -36,7 +51,19 @@ impl Strobe {
         let schedule = Schedule::period(pendulum, steps);
         let pull = pendulum.greatest_pull().sqrt();
         let fine = pendulum.period() / steps as f64 * pull < COARSE_SINE_FROM;
-        Self { pendulum: pendulum.clone(), schedule, path, fine }
+        let route = pendulum.route();
+        let general = if route == Route::General { steps } else { 0 };
+        Self {
+            pendulum: pendulum.clone(),
+            schedule,
+            path,
+            fine,
+            route,
+            events: pendulum.has_events(),
+            extra: pendulum.has_extra_torque(),
+            timetable: Timetable::new(pendulum, general),
+            equation: pendulum.equation(),
+        }
     }
 
     /// The same map with `factor` times as many steps.
@@ -64,8 +91,12 @@ impl Strobe {
         turns: &mut [f64],
         periods: usize,
     ) -> Result<(), Error> {
-        dispatch::run(self.path, Advance::new(self, theta, velocity, turns, periods)?);
-        Ok(())
+        self.advance_blocks(theta, velocity, turns, self.block_width(), |block| {
+            for _ in 0..periods {
+                self.period(block);
+                block.wrap();
+            }
+        })
     }
 
     /// As [`Strobe::advance`], one trajectory at a time with the same arithmetic as a lane.
@@ -79,7 +110,36 @@ impl Strobe {
         turns: &mut [f64],
         periods: usize,
     ) -> Result<(), Error> {
-        dispatch::run(self.path, Singly(Advance::new(self, theta, velocity, turns, periods)?));
+        self.advance_blocks(theta, velocity, turns, 1, |block| {
+            for _ in 0..periods {
+                self.period_singly(block);
+                block.wrap();
+            }
+        })
+    }
+
+    fn advance_blocks(
+        &self,
+        theta: &mut [f64],
+        velocity: &mut [f64],
+        turns: &mut [f64],
+        width: usize,
+        run: impl Fn(&mut Block),
+    ) -> Result<(), Error> {
+        same_length(("theta", theta.len()), ("velocity", velocity.len()))?;
+        same_length(("theta", theta.len()), ("turns", turns.len()))?;
+        let kick = self.schedule.kick;
+        let mut block = Block::new(width);
+        let chunks = theta.chunks_mut(width).zip(velocity.chunks_mut(width));
+        for ((theta, velocity), turns) in chunks.zip(turns.chunks_mut(width)) {
+            block.fill(theta, velocity, kick);
+            run(&mut block);
+            for i in 0..theta.len() {
+                theta[i] = block.half_turns[i] * PI;
+                velocity[i] = block.kick[i] * (1.0 / kick);
+                turns[i] += block.turns[i];
+            }
+        }
         Ok(())
     }
 
@@ -137,86 +197,6 @@ impl Buffer {
     }
 }
 
-struct Advance<'a> {
-    strobe: &'a Strobe,
-    theta: &'a mut [f64],
-    velocity: &'a mut [f64],
-    turns: &'a mut [f64],
-    periods: usize,
-}
-
-impl<'a> Advance<'a> {
-    fn new(
-        strobe: &'a Strobe,
-        theta: &'a mut [f64],
-        velocity: &'a mut [f64],
-        turns: &'a mut [f64],
-        periods: usize,
-    ) -> Result<Self, Error> {
-        same_length(("theta", theta.len()), ("velocity", velocity.len()))?;
-        same_length(("theta", theta.len()), ("turns", turns.len()))?;
-        Ok(Self { strobe, theta, velocity, turns, periods })
-    }
-
-    #[inline(always)]
-    fn over<D: Degree, L: Lane>(self, token: L::Token) {
-        let schedule = &self.strobe.schedule;
-        let (mut theta, mut velocity, mut turns) =
-            (Buffer::default(), Buffer::default(), Buffer::default());
-        let chunks = self
-            .theta
-            .chunks_mut(L::WIDTH)
-            .zip(self.velocity.chunks_mut(L::WIDTH))
-            .zip(self.turns.chunks_mut(L::WIDTH));
-        for ((a, b), c) in chunks {
-            theta.fill(a);
-            velocity.fill(b);
-            turns.fill(c);
-            let mut lanes =
-                Moving::new(schedule, L::load(token, &theta.0), L::load(token, &velocity.0));
-            let mut count = L::load(token, &turns.0);
-            for _ in 0..self.periods {
-                lanes.run::<D>(schedule);
-                let (wrapped, whole) = wrap(lanes.half_turns);
-                lanes.half_turns = wrapped;
-                count = count + whole;
-            }
-            lanes.theta().store(&mut theta.0);
-            lanes.velocity(schedule).store(&mut velocity.0);
-            count.store(&mut turns.0);
-            a.copy_from_slice(&theta.0[..a.len()]);
-            b.copy_from_slice(&velocity.0[..b.len()]);
-            c.copy_from_slice(&turns.0[..c.len()]);
-        }
-    }
-}
-
-impl Job for Advance<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<S: Isa>(self, isa: S) {
-        if self.strobe.fine {
-            self.over::<Fine, S::Lanes>(isa);
-        } else {
-            self.over::<Coarse, S::Lanes>(isa);
-        }
-    }
-}
-
-struct Singly<'a>(Advance<'a>);
-
-impl Job for Singly<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<S: Isa>(self, _: S) {
-        if self.0.strobe.fine {
-            self.0.over::<Fine, S::Single>(());
-        } else {
-            self.0.over::<Coarse, S::Single>(());
-        }
-    }
-}
-
 struct Stretch<'a> {
     strobe: &'a Strobe,
     states: (&'a mut [f64], &'a mut [f64]),
@@ -256,7 +236,7 @@ impl Job for Stretch<'_> {
                 let velocity = lanes.velocity(schedule);
                 let (wrapped, whole) = wrap(lanes.half_turns.value);
                 let turns = S::Narrow::load(isa, &buffers[2].0) + whole;
-                wrapped.scale(std::f64::consts::PI).store(&mut buffers[0].0);
+                wrapped.scale(PI).store(&mut buffers[0].0);
                 velocity.value.store(&mut buffers[1].0);
                 turns.store(&mut buffers[2].0);
                 lanes.theta().slope[0].store(&mut buffers[3].0);

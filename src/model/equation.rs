@@ -48,6 +48,19 @@ pub struct Forcing<R> {
     pub lab: R,
 }
 
+impl Forcing<f64> {
+    /// The same in the shape of `number`.
+    #[inline(always)]
+    #[must_use]
+    pub fn like<R: Real>(&self, number: R) -> Forcing<R> {
+        Forcing {
+            vertical: number.like(self.vertical),
+            lateral: number.like(self.lateral),
+            lab: number.like(self.lab),
+        }
+    }
+}
+
 impl<R: Real> Equation<R> {
     /// The equation of `pendulum`; `number` makes a number of parameter `index`
     /// ([`Pendulum::parameters`] lists them) and its value.
@@ -145,6 +158,13 @@ impl<R: Real> Equation<R> {
         sum
     }
 
+    /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at
+    /// rest, against a constant friction.
+    #[must_use]
+    pub fn has_closed_release(&self) -> bool {
+        self.plain && !self.sideways && self.torques.is_empty() && self.frictions.is_empty()
+    }
+
     /// `th''` while moving in the sense of `at`.
     #[inline(always)]
     pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
@@ -167,4 +187,47 @@ impl<R: Real> Equation<R> {
 #[inline(always)]
 pub fn conservative_load<D: Degree, R: Real>(vertical: f64, torque: f64, half_turns: R) -> R {
     half_turns.sine::<D>().affine(-vertical, torque)
+}
+
+impl Equation<f64> {
+    /// The same over numbers in the shape of `number`.
+    #[inline(always)]
+    #[must_use]
+    pub fn map<R: Real>(&self, number: R) -> Equation<R> {
+        let Motion { p, omega, phase, second, second_phase, lateral, lateral_phase } = self.motion;
+        let mut equation = Equation {
+            gamma: number.like(self.gamma),
+            theta_r: number.like(self.theta_r),
+            torque: number.like(self.torque),
+            motion: Motion {
+                p: number.like(p),
+                omega: number.like(omega),
+                phase: number.like(phase),
+                second: number.like(second),
+                second_phase: number.like(second_phase),
+                lateral: number.like(lateral),
+                lateral_phase: number.like(lateral_phase),
+            },
+            lab_time: number.like(self.lab_time),
+            ages: self.ages,
+            torques: Vec::new(),
+            frictions: Vec::new(),
+            sideways: self.sideways,
+            plain: self.plain,
+        };
+        for (kind, [a, b, c]) in &self.torques {
+            equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+        }
+        for (kind, [a, b, c]) in &self.frictions {
+            equation.frictions.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+        }
+        equation
+    }
+
+    /// Whether the pivot rests.
+    #[must_use]
+    pub fn is_autonomous(&self) -> bool {
+        let motion = &self.motion;
+        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0
+    }
 }

@@ -4,6 +4,7 @@ pub mod drive;
 pub mod effects;
 pub mod equation;
 pub mod pendulum;
+pub mod rest;
 
 pub use drive::HarmonicDrive;
 pub use effects::{Effect, Kind};

@@ -24,9 +24,9 @@ pub struct Pendulum {
     pub lab_time: f64,
 }
 
-/// Which path of the kernel a pendulum takes.
+/// Which way through the kernel a pendulum takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Path {
+pub enum Route {
     /// Torques of angle and time, viscous damping: Runge-Kutta-Nystrom.
     Smooth,
     /// The same with a friction that does not depend on the velocity: Runge-Kutta-Nystrom and events.
@@ -154,8 +154,7 @@ impl Pendulum {
     /// Whether the equation does not depend on time.
     #[must_use]
     pub fn is_autonomous(&self) -> bool {
-        let motion = self.motion();
-        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0
+        self.equation().is_autonomous()
     }
 
     /// Whether `(th, th') -> (-th, -th')` maps motions to motions.
@@ -172,16 +171,16 @@ impl Pendulum {
             || self.effects.iter().any(|e| e.is(&[Action::Velocity, Action::Kinked]) || e.rubs())
     }
 
-    /// Which path of the kernel it takes.
+    /// Which way through the kernel it takes.
     #[must_use]
-    pub fn path(&self) -> Path {
+    pub fn route(&self) -> Route {
         let has = |actions: &[Action]| self.effects.iter().any(|e| e.is(actions));
         if has(&[Action::Velocity, Action::Kinked, Action::SlidingFriction]) {
-            Path::General
+            Route::General
         } else if self.has_friction() {
-            Path::Friction
+            Route::Friction
         } else {
-            Path::Smooth
+            Route::Smooth
         }
     }
 

@@ -13,6 +13,7 @@ mod attractors;
 mod bifurcations;
 mod chaos;
 mod exact;
+mod friction;
 mod input;
 mod lanes;
 mod layers;

@@ -1,0 +1,444 @@
+//! A block of trajectories at one phase of the drive, one forcing period at a time.
+//!
+//! Smooth motions run a bundle at a time through the whole period. With friction, or another law that
+//! changes with the sign of the velocity, all bundles take each step with the sign held; lanes whose
+//! velocity passed zero go into a queue that runs in lanes itself, each with its own phase and step
+//! ([`super::event`]). Lanes that are held fast wait for their release.
+
+use std::f64::consts::{FRAC_1_PI, PI};
+
+use super::event::{Progress, Reached, Ticket};
+use super::general::{Own, Running, Shared};
+use super::step::{Moving, Rubbing};
+use super::stroboscopic::Strobe;
+use crate::lanes::sine::{Coarse, Degree, Fine, wrap};
+use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
+use crate::model::Equation;
+use crate::model::pendulum::Route;
+use crate::model::rest::Standstill;
+
+/// Trajectories of a block with events: enough for the queue to fill its lanes.
+const WITH_EVENTS: usize = 1536;
+/// How much further than its first acceleration takes it a velocity may go within a step.
+const REACH: f64 = 1.25;
+
+/// A lane that is held fast.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    lane: usize,
+    half_turns: f64,
+    until: f64,
+    sense: f64,
+}
+
+/// The states of a block, in memory, and those that wait.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Angles over pi.
+    pub half_turns: Vec<f64>,
+    /// Velocities times the schedule's `kick`.
+    pub kick: Vec<f64>,
+    /// Whole turns taken off.
+    pub turns: Vec<f64>,
+    held: Vec<Held>,
+    queue: Vec<Ticket>,
+}
+
+impl Block {
+    /// `width` trajectories at rest.
+    #[must_use]
+    pub fn new(width: usize) -> Self {
+        let zeros = vec![0.0; width];
+        Self {
+            half_turns: zeros.clone(),
+            kick: zeros.clone(),
+            turns: zeros,
+            held: Vec::new(),
+            queue: Vec::new(),
+        }
+    }
+
+    /// These states in front, rest behind them; `kick` is the schedule's.
+    pub fn fill(&mut self, theta: &[f64], velocity: &[f64], kick: f64) {
+        self.half_turns.fill(0.0);
+        self.kick.fill(0.0);
+        self.turns.fill(0.0);
+        for (slot, theta) in self.half_turns.iter_mut().zip(theta) {
+            *slot = theta * FRAC_1_PI;
+        }
+        for (slot, velocity) in self.kick.iter_mut().zip(velocity) {
+            *slot = velocity * kick;
+        }
+    }
+
+    /// Takes whole turns off the angles and adds them to `turns`.
+    pub fn wrap(&mut self) {
+        for (half_turns, turns) in self.half_turns.iter_mut().zip(&mut self.turns) {
+            let (wrapped, whole) = wrap(*half_turns);
+            *half_turns = wrapped;
+            *turns += whole;
+        }
+    }
+}
+
+impl Strobe {
+    /// Number of trajectories of a block: one bundle of lanes, or with events so many that those of a
+    /// step fill the lanes of their queue.
+    #[must_use]
+    pub fn block_width(&self) -> usize {
+        let [wide, both] = dispatch::run(self.path, Widths);
+        match (self.route, self.events, self.extra) {
+            (Route::Smooth, false, false) => wide,
+            (_, true, _) => WITH_EVENTS.next_multiple_of(both),
+            _ => both,
+        }
+    }
+
+    /// One forcing period on; the block is [`Strobe::block_width`] wide.
+    pub fn period(&self, block: &mut Block) {
+        dispatch::run(self.path, Period { strobe: self, block });
+    }
+
+    /// The same for a block of any width, one trajectory at a time with the arithmetic of a lane.
+    pub fn period_singly(&self, block: &mut Block) {
+        dispatch::run(self.path, Singly(Period { strobe: self, block }));
+    }
+}
+
+/// The width of a bundle, and the least that holds whole bundles of either kind.
+struct Widths;
+
+impl Job for Widths {
+    type Output = [usize; 2];
+    #[inline(always)]
+    fn run<S: Isa>(self, _: S) -> [usize; 2] {
+        let (wide, narrow) = (S::Lanes::WIDTH, S::Narrow::WIDTH);
+        let both = (1..=narrow).map(|k| k * wide).find(|w| w % narrow == 0);
+        [wide, both.unwrap_or(wide * narrow)]
+    }
+}
+
+struct Period<'a> {
+    strobe: &'a Strobe,
+    block: &'a mut Block,
+}
+
+impl Job for Period<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Isa>(self, isa: S) {
+        Runner::<S::Lanes, S::Narrow>::new(self.strobe, (isa, isa)).period(self.block);
+    }
+}
+
+struct Singly<'a>(Period<'a>);
+
+impl Job for Singly<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Isa>(self, _: S) {
+        Runner::<S::Single, S::Single>::new(self.0.strobe, ((), ())).period(self.0.block);
+    }
+}
+
+/// What runs a block of one pendulum: `Q` is the narrower kind of lanes, for the queue and for
+/// effects.
+struct Runner<'a, L: Lane, Q: Lane> {
+    strobe: &'a Strobe,
+    tokens: (L::Token, Q::Token),
+    equation: Equation<Q>,
+    single: Equation<f64>,
+    length: f64,
+}
+
+impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
+    #[inline(always)]
+    fn new(strobe: &'a Strobe, tokens: (L::Token, Q::Token)) -> Self {
+        let single = strobe.equation.clone();
+        let equation = single.map(Q::splat(tokens.1, 0.0));
+        Self { strobe, tokens, equation, single, length: strobe.pendulum.period() }
+    }
+
+    #[inline(always)]
+    fn period(&self, block: &mut Block) {
+        let Strobe { route, events, extra, fine, .. } = *self.strobe;
+        if route == Route::Smooth && !extra {
+            if fine {
+                self.smooth::<Fine>(block);
+            } else {
+                self.smooth::<Coarse>(block);
+            }
+            return;
+        }
+        if events {
+            self.begin(block);
+        }
+        let steps = self.strobe.steps();
+        for k in 0..steps {
+            let time = [k, k + 1].map(|k| self.length * k as f64 / steps as f64);
+            match (route, extra) {
+                (Route::General, _) => self.general_step(block, k, time),
+                (Route::Friction, false) => self.friction_step(block, k, time),
+                _ => self.step_with_effects(block, k, time),
+            }
+            if events {
+                self.let_go(block, time);
+                self.work_off(block);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn load(&self, block: &Block, at: usize) -> Moving<L> {
+        Moving {
+            half_turns: L::load(self.tokens.0, &block.half_turns[at..]),
+            kick: L::load(self.tokens.0, &block.kick[at..]),
+        }
+    }
+
+    #[inline(always)]
+    fn smooth<D: Degree>(&self, block: &mut Block) {
+        let mut at = 0;
+        while at < block.kick.len() {
+            let mut lanes = self.load(block, at);
+            lanes.run::<D>(&self.strobe.schedule);
+            lanes.half_turns.store(&mut block.half_turns[at..]);
+            lanes.kick.store(&mut block.kick[at..]);
+            at += L::WIDTH;
+        }
+    }
+
+    /// Lanes at rest are held, or begin to move.
+    #[inline(never)]
+    fn begin(&self, block: &mut Block) {
+        block.held.clear();
+        block.queue.clear();
+        for lane in 0..block.kick.len() {
+            if block.kick[lane] != 0.0 {
+                continue;
+            }
+            let half_turns = block.half_turns[lane];
+            let held = match self.single.standstill(0.0, half_turns * PI) {
+                Standstill::Held { until, sense } => Held { lane, half_turns, until, sense },
+                // Let go at once.
+                Standstill::Moves(sense) => Held { lane, half_turns, until: 0.0, sense },
+            };
+            block.held.push(held);
+        }
+    }
+
+    /// A step under Coulomb friction with the sign of each velocity held.
+    #[inline(always)]
+    fn friction_step(&self, block: &mut Block, k: usize, time: [f64; 2]) {
+        let schedule = &self.strobe.schedule;
+        let loads = &schedule.steps()[k];
+        let one = L::splat(self.tokens.0, 1.0);
+        let mut at = 0;
+        while at < block.kick.len() {
+            let before = self.load(block, at);
+            let mut after = before;
+            let sense = one.with_sign_of(before.kick);
+            let rubbing = Rubbing(sense.scale(-self.single.theta_r));
+            let ends = after.step_with::<Fine, _>(loads, schedule.decay, &rubbing);
+            after.half_turns.store(&mut block.half_turns[at..]);
+            after.kick.store(&mut block.kick[at..]);
+            let flags = passages(before.kick * sense, after.kick * sense, ends, sense);
+            if flags != 0 {
+                self.flagged(block, at, flags, [before.half_turns, before.kick], time);
+            }
+            at += L::WIDTH;
+        }
+    }
+
+    /// The same with effects that do not depend on the velocity but for its sign.
+    #[inline(always)]
+    fn step_with_effects(&self, block: &mut Block, k: usize, time: [f64; 2]) {
+        let schedule = &self.strobe.schedule;
+        let token = self.tokens.1;
+        let one = Q::splat(token, 1.0);
+        let mut at = 0;
+        while at < block.kick.len() {
+            let before = Moving {
+                half_turns: Q::load(token, &block.half_turns[at..]),
+                kick: Q::load(token, &block.kick[at..]),
+            };
+            let mut after = before;
+            let sense = one.with_sign_of(before.kick);
+            let loads = &schedule.steps()[k];
+            let ends = after.step_under(&self.equation, loads, schedule.decay, sense);
+            after.half_turns.store(&mut block.half_turns[at..]);
+            after.kick.store(&mut block.kick[at..]);
+            if self.strobe.events {
+                let flags = passages(before.kick * sense, after.kick * sense, ends, sense);
+                if flags != 0 {
+                    self.flagged(block, at, flags, [before.half_turns, before.kick], time);
+                }
+            }
+            at += Q::WIDTH;
+        }
+    }
+
+    /// The same for torques that depend on the velocity.
+    #[inline(always)]
+    fn general_step(&self, block: &mut Block, k: usize, time: [f64; 2]) {
+        let table = &self.strobe.timetable;
+        let token = self.tokens.1;
+        let scale = self.strobe.schedule.kick;
+        let one = Q::splat(token, 1.0);
+        let clock = Shared { forcing: &table.steps()[k], length: Q::splat(token, table.length) };
+        let mut at = 0;
+        while at < block.kick.len() {
+            let half_turns = Q::load(token, &block.half_turns[at..]);
+            let kick = Q::load(token, &block.kick[at..]);
+            let sense = one.with_sign_of(kick);
+            let mut lanes =
+                Running { theta: half_turns.scale(PI), velocity: kick.scale(1.0 / scale) };
+            let before = lanes.velocity * sense;
+            let first = lanes.step(&self.equation, &clock, sense);
+            lanes.theta.scale(FRAC_1_PI).store(&mut block.half_turns[at..]);
+            lanes.velocity.scale(scale).store(&mut block.kick[at..]);
+            if self.strobe.events {
+                // The end's acceleration costs a stage: only where the begin's is against the motion
+                // and strong enough to stop it within the step.
+                let b0 = first * sense;
+                let reach = b0.scale_add(REACH * table.length, before);
+                let passed = (lanes.velocity * sense).signs();
+                let flags = passed | (b0.signs() & reach.signs());
+                if flags != 0 {
+                    self.flagged(block, at, flags, [half_turns, kick], time);
+                }
+            }
+            at += Q::WIDTH;
+        }
+    }
+
+    #[inline(always)]
+    fn flagged<A: Lane>(
+        &self,
+        block: &mut Block,
+        at: usize,
+        flags: u128,
+        before: [A; 2],
+        time: [f64; 2],
+    ) {
+        let mut old = [[0.0; MAX_WIDTH]; 2];
+        before[0].store(&mut old[0]);
+        before[1].store(&mut old[1]);
+        self.enqueue(block, at, flags, &old, time);
+    }
+
+    /// Tickets for the flagged lanes of the bundle at `at`, but for those at rest.
+    #[inline(never)]
+    fn enqueue(
+        &self,
+        block: &mut Block,
+        at: usize,
+        mut flags: u128,
+        old: &[[f64; MAX_WIDTH]; 2],
+        time: [f64; 2],
+    ) {
+        while flags != 0 {
+            let bit = flags.trailing_zeros() as usize;
+            flags &= flags - 1;
+            let kick = old[1][bit];
+            if kick != 0.0 {
+                let state = [old[0][bit] * PI, kick / self.strobe.schedule.kick];
+                let sense = 1_f64.copysign(kick);
+                block.queue.push(Ticket::new(at + bit, state, sense, time[0], time[1]));
+            }
+        }
+    }
+
+    /// Holds the held lanes through the step, and lets go those whose time has come.
+    #[inline(never)]
+    fn let_go(&self, block: &mut Block, time: [f64; 2]) {
+        let Block { half_turns, kick, held, queue, .. } = block;
+        held.retain(|h| {
+            half_turns[h.lane] = h.half_turns;
+            kick[h.lane] = 0.0;
+            if h.until >= time[1] {
+                return true;
+            }
+            let state = [h.half_turns * PI, 0.0];
+            queue.push(Ticket::new(h.lane, state, h.sense, h.until.max(time[0]), time[1]));
+            false
+        });
+    }
+
+    /// Runs the queue until every ticket has arrived or is held.
+    #[inline(always)]
+    fn work_off(&self, block: &mut Block) {
+        let token = self.tokens.1;
+        while !block.queue.is_empty() {
+            let mut first = 0;
+            while first < block.queue.len() {
+                let count = (block.queue.len() - first).min(Q::WIDTH);
+                let mut asked = [[0.0; MAX_WIDTH]; 5];
+                gather(&block.queue[first..first + count], &mut asked);
+                let mut lanes = Running {
+                    theta: Q::load(token, &asked[0]),
+                    velocity: Q::load(token, &asked[1]),
+                };
+                let sense = Q::load(token, &asked[2]);
+                let clock =
+                    Own { begin: Q::load(token, &asked[3]), length: Q::load(token, &asked[4]) };
+                let begin = lanes.step(&self.equation, &clock, sense);
+                let end = lanes.acceleration(&self.equation, &clock, sense);
+                lanes.theta.store(&mut asked[0]);
+                lanes.velocity.store(&mut asked[1]);
+                begin.store(&mut asked[2]);
+                end.store(&mut asked[3]);
+                self.answer(block, first, count, &asked);
+                first += count;
+            }
+            block.queue.retain(|ticket| ticket.lane != usize::MAX);
+        }
+    }
+
+    #[inline(never)]
+    fn answer(&self, block: &mut Block, first: usize, count: usize, ends: &[[f64; MAX_WIDTH]; 5]) {
+        for i in 0..count {
+            let reached = Reached {
+                theta: ends[0][i],
+                velocity: ends[1][i],
+                acceleration: [ends[2][i], ends[3][i]],
+            };
+            let ticket = &mut block.queue[first + i];
+            let lane = ticket.lane;
+            match ticket.take(&reached, &self.single, self.length) {
+                Progress::Asks => continue,
+                Progress::Arrived { theta, velocity } => {
+                    block.half_turns[lane] = theta * FRAC_1_PI;
+                    block.kick[lane] = velocity * self.strobe.schedule.kick;
+                }
+                Progress::Held { theta, until, sense } => {
+                    let half_turns = theta * FRAC_1_PI;
+                    block.half_turns[lane] = half_turns;
+                    block.kick[lane] = 0.0;
+                    block.held.push(Held { lane, half_turns, until, sense });
+                }
+            }
+            ticket.lane = usize::MAX;
+        }
+    }
+}
+
+#[inline(never)]
+fn gather(tickets: &[Ticket], asked: &mut [[f64; MAX_WIDTH]; 5]) {
+    for (i, ticket) in tickets.iter().enumerate() {
+        asked[0][i] = ticket.theta;
+        asked[1][i] = ticket.velocity;
+        asked[2][i] = ticket.sense;
+        asked[3][i] = ticket.begin;
+        asked[4][i] = ticket.length;
+    }
+}
+
+/// The lanes whose velocity, `u` before and `v` after a step in the sense of the motion, has passed
+/// zero, or may have touched it: its parabola's least value says so, with a margin.
+#[inline(always)]
+fn passages<L: Lane>(u: L, v: L, [first, last]: [L; 2], sense: L) -> u128 {
+    let (b0, b1) = (first * sense, last * sense);
+    let lowest = u.scale(1.6).mul_add(b1 - b0, -(b0 * b0));
+    v.signs() | (b0.signs() & !b1.signs() & lowest.signs())
+}
