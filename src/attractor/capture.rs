@@ -17,7 +17,27 @@ pub struct Traps {
     pub ellipses: Vec<Ellipse>,
     /// Around running states.
     pub bands: Vec<Band>,
+    /// Under friction, all that sticks for ever.
+    pub rests: Rests,
 }
+
+/// The sets of states that friction holds for ever: indices of their attractors, hanging and upside
+/// down.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rests(pub [Option<usize>; 2]);
+
+impl Rests {
+    /// The set that holds the angle `theta`.
+    #[must_use]
+    pub fn of(&self, theta: f64) -> Option<usize> {
+        self.0[usize::from(theta.cos() < 0.0)]
+    }
+}
+
+/// At the edge of a set at rest a pendulum creeps into it, ever more slowly, and never arrives: held
+/// at two periods' ends running, nearer at the second, and within this part of the friction of being
+/// held for ever, it counts as at rest. Held states form a line, on which their map is monotone.
+const CREEPING: f64 = 0.05;
 
 /// How a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,6 +133,8 @@ struct Tenant {
     first_theta: f64,
     born: u64,
     hit: Option<Hit>,
+    /// When friction held it last, and by how much the load exceeds the friction at its greatest.
+    held: Option<(u64, f64)>,
 }
 
 /// A block whose lanes take a new start when one has ended.
@@ -175,6 +197,13 @@ impl<'a> Watch<'a> {
                     }
                 }
             }
+            if self.job.strobe.friction {
+                for lane in 0..width {
+                    if self.block.kick[lane] == 0.0 && self.at_rest(lane) {
+                        occupied -= usize::from(!self.refill(lane));
+                    }
+                }
+            }
             if self.clock >= self.next_expiry {
                 occupied -= self.expire(width);
             }
@@ -196,7 +225,7 @@ impl<'a> Watch<'a> {
         self.block.kick[lane] = velocity * self.job.strobe.schedule.kick;
         self.block.turns[lane] = 0.0;
         self.tenants[lane] =
-            Some(Tenant { index, first_theta: theta, born: self.clock, hit: None });
+            Some(Tenant { index, first_theta: theta, born: self.clock, hit: None, held: None });
         self.next_expiry = self.next_expiry.min(self.clock + u64::from(self.job.bound));
         true
     }
@@ -236,6 +265,31 @@ impl<'a> Watch<'a> {
             theta: self.theta(lane),
             velocity: self.velocity(lane),
         });
+        self.tenants[lane] = Some(tenant);
+        false
+    }
+
+    /// Whether friction holds `lane` for ever, or it creeps to where it will; if so its outcome has
+    /// been handed over.
+    #[inline(never)]
+    fn at_rest(&mut self, lane: usize) -> bool {
+        let theta = self.theta(lane);
+        let (Some(mut tenant), Some(rest)) = (self.tenants[lane], self.job.traps.rests.of(theta))
+        else {
+            return false;
+        };
+        let equation = &self.job.strobe.equation;
+        let excess = equation.excess(theta);
+        let limit = equation.load_at_rest(0.0, theta).1;
+        let creeps = tenant.held.is_some_and(|(clock, before)| {
+            clock + 1 == self.clock && excess < before && excess < CREEPING * limit
+        });
+        if excess <= 0.0 || creeps {
+            let end = (theta, 0.0, self.block.turns[lane], self.clock);
+            self.hand_over(tenant, Fate::Captured(rest), end);
+            return true;
+        }
+        tenant.held = Some((self.clock, excess));
         self.tenants[lane] = Some(tenant);
         false
     }

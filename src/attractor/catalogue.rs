@@ -67,6 +67,30 @@ impl Attractor {
         }
     }
 
+    /// All that friction holds for ever around the state `theta`, hanging or upside down.
+    #[must_use]
+    pub fn resting(theta: f64) -> Self {
+        Self {
+            kind: if theta.cos() < 0.0 { Kind::InvertedRest } else { Kind::Rest },
+            n: Some(1),
+            w: Some(0),
+            points: vec![[theta, 0.0]],
+            multipliers: Vec::new(),
+            exponent: f64::NAN,
+            exponent_stderr: 0.0,
+            period: None,
+            sense: 0,
+            name: String::new(),
+            twin: None,
+        }
+    }
+
+    /// Whether friction holds it: a set, not an orbit.
+    #[must_use]
+    pub fn is_held(&self) -> bool {
+        self.exponent.is_nan()
+    }
+
     /// From a running state without drive; its one multiplier is that of the angle section.
     #[must_use]
     pub fn running(rotation: &Rotation) -> Self {

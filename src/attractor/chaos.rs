@@ -1,14 +1,16 @@
 //! Sets that keep their trajectories without closing: chaotic attractors and quasi-periodic
 //! rotation, told apart from transients that have not ended yet.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::find::LONGEST_CYCLE;
 use super::kind::Kind;
 use super::trap::Band;
+use crate::integrate::Strobe;
+use crate::integrate::accuracy::distance;
+use crate::integrate::block::Block;
 use crate::integrate::stroboscopic::State;
-use crate::integrate::{Moving, Strobe};
-use crate::lanes::sine::Fine;
 
 /// Cells of the occupancy picture along the angle and along the velocity.
 const CELLS: [usize; 2] = [96, 96];
@@ -18,8 +20,12 @@ const KEPT: usize = 2000;
 const CURVES: usize = 32;
 /// Periods over which turns over the top are watched step by step.
 const WATCHED: usize = 400;
+/// Trajectories that are watched so.
+const FOLLOWED: usize = 16;
 /// An exponent this many standard errors above zero is positive.
 const SIGNIFICANCE: f64 = 4.0;
+/// Points this near are the same.
+const SAME: f64 = 1e-6;
 /// Exponents (per period) within this of zero may belong to quasi-periodic motion.
 const NEUTRAL: f64 = 2e-3;
 
@@ -108,6 +114,9 @@ pub fn sets(
     let Some(walks) = walk(strobe, states, watch, cancel) else { return Vec::new() };
     let mut groups: Vec<(Vec<usize>, Region)> = Vec::new();
     for (i, walk) in walks.iter().enumerate() {
+        if walk.closes() {
+            continue;
+        }
         let mut joined = (vec![i], walk.region.clone());
         groups.retain_mut(|(members, region)| {
             let same = region.meets(&walk.region);
@@ -140,6 +149,17 @@ struct Walk {
     turns: f64,
     /// Exponent per period over the run.
     exponent: f64,
+}
+
+impl Walk {
+    /// Whether it repeats itself: a start exactly on an orbit that does not attract, such as upright
+    /// or hanging rest, stays there for want of a perturbation.
+    fn closes(&self) -> bool {
+        (1..=LONGEST_CYCLE).any(|n| {
+            self.points.len() > 2 * n
+                && self.points.iter().zip(&self.points[n..]).all(|(a, b)| distance(*a, *b) < SAME)
+        })
+    }
 }
 
 /// The long runs of all states; `None` if `cancel` was set.
@@ -255,34 +275,35 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
 
 /// Follows the members step by step: passages over the top in one sense, both, or none.
 fn turns_over_the_top(strobe: &Strobe, members: &[&Walk]) -> (Kind, i64) {
-    let (mut forward, mut backward) = (false, false);
-    for member in members.iter().take(16) {
-        let Some([theta, velocity]) = member.points.last().copied() else { continue };
-        let schedule = &strobe.schedule;
-        let mut moving = Moving::new(schedule, theta, velocity);
-        // The well between two upright positions; a passage over the top changes it by one.
-        let well = |angle: f64| ((angle + PI) / TAU).floor() as i64;
-        let (mut last, mut before) = (well(theta), None::<i64>);
-        for _ in 0..WATCHED {
-            for loads in schedule.steps() {
-                moving.step::<Fine>(loads, schedule.decay);
-                let now = well(moving.theta());
-                if now != last {
-                    let sense = (now - last).signum();
+    let ends: Vec<State> = members.iter().filter_map(|m| m.points.last().copied()).collect();
+    let (theta, velocity): (Vec<f64>, Vec<f64>) = ends.iter().map(|s| (s[0], s[1])).unzip();
+    let followed = strobe.block_width().min(theta.len()).min(FOLLOWED);
+    let mut block = Block::new(strobe.block_width());
+    block.fill(&theta[..followed], &velocity[..followed], strobe.schedule.kick);
+    // The well between two upright positions; a passage over the top changes it by one.
+    let well = |half_turns: f64| ((half_turns + 1.0) / 2.0).floor() as i64;
+    let mut last: Vec<i64> = block.half_turns[..followed].iter().map(|x| well(*x)).collect();
+    let mut before = vec![None::<i64>; followed];
+    let mut turned = vec![[false; 2]; followed];
+    for _ in 0..WATCHED {
+        for k in 0..strobe.steps() {
+            strobe.step(&mut block, k);
+            for i in 0..followed {
+                let now = well(block.half_turns[i]);
+                if now != last[i] {
+                    let sense = (now - last[i]).signum();
                     // Over the top and back again at once is no turn; twice in one sense is.
-                    if before == Some(sense) {
-                        forward |= sense > 0;
-                        backward |= sense < 0;
+                    if before[i] == Some(sense) {
+                        turned[i][usize::from(sense > 0)] = true;
                     }
-                    before = Some(sense);
-                    last = now;
+                    (before[i], last[i]) = (Some(sense), now);
                 }
             }
         }
-        if before.is_some() && !forward && !backward {
-            (forward, backward) = (true, true);
-        }
     }
+    let restless = before.iter().zip(&turned).any(|(b, t)| b.is_some() && *t == [false; 2]);
+    let backward = restless || turned.iter().any(|t| t[0]);
+    let forward = restless || turned.iter().any(|t| t[1]);
     match (forward, backward) {
         (false, false) => (Kind::LibrationChaos, 0),
         (true, false) => (Kind::RotatingChaos, 1),

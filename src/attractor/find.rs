@@ -6,6 +6,7 @@ use super::capture::{self, Fate, Traps};
 use super::catalogue::{Attractor, arrange};
 use super::chaos::{self, ChaoticSet, Region};
 use super::kind::Kind;
+use super::rest;
 use super::trap::{self, Band, Ellipse, ellipses};
 use crate::integrate::accuracy::{distance, wrapped};
 use crate::integrate::{State, Strobe};
@@ -26,6 +27,9 @@ const TRIES: usize = 24;
 const FIRST_ROUND: u32 = 32;
 /// Trajectories that nothing has captured are watched for this many times the first bound more.
 pub const WATCH: u32 = 4;
+/// Damping must shrink a motion by this power of e, were it not driven, before what is left can be
+/// called chaos.
+const LEAST_DECAY: f64 = 20.0;
 /// Of the trajectories left over, so many are watched.
 const WATCHED: usize = 256;
 
@@ -42,6 +46,7 @@ pub struct Catalogue {
     pub longest_settle: u32,
     orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
     rotations: Vec<(Rotation, Option<Band>)>,
+    rests: Vec<f64>,
     sets: Vec<ChaoticSet>,
 }
 
@@ -58,6 +63,7 @@ impl Catalogue {
             longest_settle: 0,
             orbits: Vec::new(),
             rotations: rotations.into_iter().map(|r| (r.clone(), band(&r))).collect(),
+            rests: rest::centres(&strobe.pendulum),
             sets: Vec::new(),
         };
         empty.rebuild(&strobe.pendulum);
@@ -154,7 +160,9 @@ impl Catalogue {
             }
             tries += 1;
             let Some(orbit) = newton::find(map, start, n, REACH) else { continue };
+            let held = |p: &State| p[1] == 0.0 && strobe.equation.holds_for_ever(p[0]);
             if !orbit.is_stable()
+                || (strobe.friction && orbit.points.iter().any(held))
                 || self.orbits.iter().any(|(o, _)| o.contains(orbit.points[0], 1e-6))
             {
                 continue;
@@ -199,6 +207,11 @@ impl Catalogue {
         let stride = alive.len().div_ceil(WATCHED);
         let sample: Vec<State> = alive.iter().step_by(stride).copied().collect();
         let length = WATCH * bound;
+        // Nearly conservative motion takes longer than this to show where it ends.
+        let watched = strobe.pendulum.period() * f64::from(bound + length);
+        if strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
+            return;
+        }
         let Some(outcomes) = capture::outcomes(strobe, &self.traps, length, &sample, cancel) else {
             return;
         };
@@ -221,6 +234,7 @@ impl Catalogue {
         let mut all: Vec<Attractor> =
             self.orbits.iter().map(|(o, _)| Attractor::periodic(pendulum, o)).collect();
         all.extend(self.rotations.iter().map(|(r, _)| Attractor::running(r)));
+        all.extend(self.rests.iter().map(|theta| Attractor::resting(*theta)));
         all.extend(self.sets.iter().map(Attractor::sampled));
         let (attractors, place) = arrange(pendulum, all);
         let mut traps = Traps::default();
@@ -231,6 +245,9 @@ impl Catalogue {
         }
         for ((_, band), at) in self.rotations.iter().zip(place.by_ref()) {
             traps.bands.extend(band.iter().map(|b| Band { attractor: at, ..b.clone() }));
+        }
+        for (theta, at) in self.rests.iter().zip(place.by_ref()) {
+            traps.rests.0[usize::from(theta.cos() < 0.0)] = Some(at);
         }
         for (set, at) in self.sets.iter().zip(place) {
             match &set.band {

@@ -12,6 +12,7 @@ pub mod catalogue;
 pub mod chaos;
 pub mod find;
 pub mod kind;
+mod rest;
 pub mod trap;
 
 pub use catalogue::Attractor;

@@ -6,6 +6,7 @@
 //! ([`super::event`]). Lanes that are held fast wait for their release.
 
 use std::f64::consts::{FRAC_1_PI, PI};
+use std::ops::Range;
 
 use super::event::{Progress, Reached, Ticket};
 use super::general::{Own, Running, Shared};
@@ -96,12 +97,17 @@ impl Strobe {
 
     /// One forcing period on; the block is [`Strobe::block_width`] wide.
     pub fn period(&self, block: &mut Block) {
-        dispatch::run(self.path, Period { strobe: self, block });
+        dispatch::run(self.path, Steps { strobe: self, block, range: 0..self.steps() });
+    }
+
+    /// Step `k` of a period alone; the steps of a period follow one another from 0 on.
+    pub fn step(&self, block: &mut Block, k: usize) {
+        dispatch::run(self.path, Steps { strobe: self, block, range: k..k + 1 });
     }
 
     /// The same for a block of any width, one trajectory at a time with the arithmetic of a lane.
     pub fn period_singly(&self, block: &mut Block) {
-        dispatch::run(self.path, Singly(Period { strobe: self, block }));
+        dispatch::run(self.path, Singly(Steps { strobe: self, block, range: 0..self.steps() }));
     }
 }
 
@@ -118,26 +124,29 @@ impl Job for Widths {
     }
 }
 
-struct Period<'a> {
+struct Steps<'a> {
     strobe: &'a Strobe,
     block: &'a mut Block,
+    range: Range<usize>,
 }
 
-impl Job for Period<'_> {
+impl Job for Steps<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
-        Runner::<S::Lanes, S::Narrow>::new(self.strobe, (isa, isa)).period(self.block);
+        let runner = Runner::<S::Lanes, S::Narrow>::new(self.strobe, (isa, isa));
+        runner.run(self.block, self.range);
     }
 }
 
-struct Singly<'a>(Period<'a>);
+struct Singly<'a>(Steps<'a>);
 
 impl Job for Singly<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, _: S) {
-        Runner::<S::Single, S::Single>::new(self.0.strobe, ((), ())).period(self.0.block);
+        let Steps { strobe, block, range } = self.0;
+        Runner::<S::Single, S::Single>::new(strobe, ((), ())).run(block, range);
     }
 }
 
@@ -160,21 +169,21 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
     }
 
     #[inline(always)]
-    fn period(&self, block: &mut Block) {
+    fn run(&self, block: &mut Block, range: Range<usize>) {
         let Strobe { route, events, extra, fine, .. } = *self.strobe;
         if route == Route::Smooth && !extra {
             if fine {
-                self.smooth::<Fine>(block);
+                self.smooth::<Fine>(block, range);
             } else {
-                self.smooth::<Coarse>(block);
+                self.smooth::<Coarse>(block, range);
             }
             return;
         }
-        if events {
+        if events && range.start == 0 {
             self.begin(block);
         }
         let steps = self.strobe.steps();
-        for k in 0..steps {
+        for k in range {
             let time = [k, k + 1].map(|k| self.length * k as f64 / steps as f64);
             match (route, extra) {
                 (Route::General, _) => self.general_step(block, k, time),
@@ -197,11 +206,15 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
     }
 
     #[inline(always)]
-    fn smooth<D: Degree>(&self, block: &mut Block) {
+    fn smooth<D: Degree>(&self, block: &mut Block, range: Range<usize>) {
+        let schedule = &self.strobe.schedule;
+        let steps = &schedule.steps()[range];
         let mut at = 0;
         while at < block.kick.len() {
             let mut lanes = self.load(block, at);
-            lanes.run::<D>(&self.strobe.schedule);
+            for loads in steps {
+                lanes.step::<D>(loads, schedule.decay);
+            }
             lanes.half_turns.store(&mut block.half_turns[at..]);
             lanes.kick.store(&mut block.kick[at..]);
             at += L::WIDTH;

@@ -6,21 +6,30 @@
 //! - [`tangent`]: numbers with derivatives, for the variational equations
 //! - [`general`]: one step where torques depend on the velocity
 //! - [`block`]: a block of trajectories, one forcing period; [`event`]: turns, sticks, releases
+//! - [`course`], [`dense`], [`turning`], [`stick`], [`flight`]: one trajectory of any model, adaptive,
+//!   with exact turns, sticks and releases
+//! - [`flow`]: the stroboscopic map by it, with its derivative
 //! - [`stroboscopic`]: many trajectories, one forcing period at a time
 //! - [`accuracy`]: how many steps a tolerance asks for
 //! - [`trajectory`]: one trajectory, sampled in time
 
 pub mod accuracy;
 pub mod block;
+pub mod course;
+pub mod dense;
 pub mod dop853;
 pub mod event;
+pub mod flight;
+pub mod flow;
 pub mod general;
 pub mod schedule;
 pub mod step;
+pub mod stick;
 pub mod stroboscopic;
 pub mod tableau;
 pub mod tangent;
 pub mod trajectory;
+pub mod turning;
 
 pub use schedule::Schedule;
 pub use step::Moving;

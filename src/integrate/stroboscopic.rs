@@ -1,7 +1,7 @@
 //! The stroboscopic map for many trajectories: states at `tau = 0 mod T`, one forcing period at a
 //! time, every lane at the same phase.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use super::block::Block;
 use super::general::Timetable;
@@ -21,6 +21,9 @@ pub type State = [f64; 2];
 /// coarse sine does, or more: measured from p = 0 to 30, where both grow with the stretching.
 const COARSE_SINE_FROM: f64 = 0.28;
 
+/// Distance of a state's shadow: its square and rounding over it are as small.
+const SHADOW: f64 = 1e-7;
+
 /// The stroboscopic map of one pendulum at a chosen accuracy, on a chosen instruction set.
 #[derive(Clone, Debug)]
 pub struct Strobe {
@@ -36,6 +39,8 @@ pub struct Strobe {
     pub route: Route,
     /// Whether the model changes with the sign of the velocity.
     pub events: bool,
+    /// Whether friction can hold the pendulum fast.
+    pub friction: bool,
     /// Whether torques of angle and time act besides gravity and the constant one.
     pub extra: bool,
     /// The drive at the stages of the general method; empty on other routes.
@@ -60,6 +65,7 @@ impl Strobe {
             fine,
             route,
             events: pendulum.has_events(),
+            friction: pendulum.has_friction(),
             extra: pendulum.has_extra_torque(),
             timetable: Timetable::new(pendulum, general),
             equation: pendulum.equation(),
@@ -164,10 +170,50 @@ impl Strobe {
         same_length(("theta", count), ("tangent theta", tangents.0.len()))?;
         same_length(("theta", count), ("tangent velocity", tangents.1.len()))?;
         same_length(("theta", count), ("growth", growth.len()))?;
+        if self.route != Route::Smooth || self.extra {
+            return self.stretch_by_shadows(states, turns, tangents, growth, periods);
+        }
         dispatch::run(
             self.path,
             Stretch { strobe: self, states, turns, tangents, growth, periods },
         );
+        Ok(())
+    }
+
+    /// Each state and a second one at the distance [`SHADOW`] along its tangent: their distance grows as
+    /// the tangent does, through turns and sticks too.
+    fn stretch_by_shadows(
+        &self,
+        states: (&mut [f64], &mut [f64]),
+        turns: &mut [f64],
+        tangents: (&mut [f64], &mut [f64]),
+        growth: &mut [f64],
+        periods: usize,
+    ) -> Result<(), Error> {
+        let count = states.0.len();
+        let (mut theta, mut velocity) = (vec![0.0; 2 * count], vec![0.0; 2 * count]);
+        for _ in 0..periods {
+            let mut net = vec![0.0; 2 * count];
+            for i in 0..count {
+                (theta[i], velocity[i]) = (states.0[i], states.1[i]);
+                theta[count + i] = states.0[i] + SHADOW * tangents.0[i];
+                velocity[count + i] = states.1[i] + SHADOW * tangents.1[i];
+            }
+            self.advance(&mut theta, &mut velocity, &mut net, 1)?;
+            for i in 0..count {
+                (states.0[i], states.1[i]) = (theta[i], velocity[i]);
+                turns[i] += net[i];
+                let way = theta[count + i] - theta[i] + TAU * (net[count + i] - net[i]);
+                let gain = velocity[count + i] - velocity[i];
+                let length = way.hypot(gain) / SHADOW;
+                growth[i] += length.ln();
+                // Where friction has brought both to one state nothing grows any more.
+                if length > 0.0 {
+                    tangents.0[i] = way / (SHADOW * length);
+                    tangents.1[i] = gain / (SHADOW * length);
+                }
+            }
+        }
         Ok(())
     }
 }

@@ -160,3 +160,56 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
         Self { value: self.value.like(value), slope: [self.value.like(0.0); N] }
     }
 }
+
+/// A single number whose value steers an integrator: with derivatives, or without.
+pub trait Number: Real {
+    /// The value alone.
+    fn value(self) -> f64;
+    /// Another value; every derivative times `factor`.
+    #[must_use]
+    fn reset(self, value: f64, factor: f64) -> Self;
+    /// The constant `value`, without derivatives.
+    #[must_use]
+    fn constant(value: f64) -> Self;
+}
+
+impl Number for f64 {
+    fn value(self) -> f64 {
+        self
+    }
+
+    fn reset(self, value: f64, _: f64) -> Self {
+        value
+    }
+
+    fn constant(value: f64) -> Self {
+        value
+    }
+}
+
+impl<const N: usize> Number for Tangent<f64, N> {
+    fn value(self) -> f64 {
+        self.value
+    }
+
+    fn reset(self, value: f64, factor: f64) -> Self {
+        Self { value, slope: self.slope.map(|slope| slope * factor) }
+    }
+
+    fn constant(value: f64) -> Self {
+        Self { value, slope: [0.0; N] }
+    }
+}
+
+impl<const N: usize> Tangent<f64, N> {
+    /// The variable `value` whose derivative in direction `column` is 1; a constant where there is
+    /// no such direction.
+    #[must_use]
+    pub fn seeded(value: f64, column: usize) -> Self {
+        let mut slope = [0.0; N];
+        if let Some(entry) = slope.get_mut(column) {
+            *entry = 1.0;
+        }
+        Self { value, slope }
+    }
+}

@@ -104,6 +104,27 @@ impl BasinMap {
         count as f64 / self.labels.label.len().max(1) as f64
     }
 
+    /// Sets at rest are known beforehand; those that no start reaches are left out.
+    fn drop_unreached_rests(&mut self) {
+        let reached = |i: usize, a: &Attractor| !a.is_held() || self.share(i as i16 + 1) > 0.0;
+        let kept: Vec<bool> =
+            self.attractors.iter().enumerate().map(|(i, a)| reached(i, a)).collect();
+        let mut moved = vec![0_i16; kept.len()];
+        let mut next = 0;
+        for (to, kept) in moved.iter_mut().zip(&kept) {
+            next += i16::from(*kept);
+            *to = next;
+        }
+        for label in self.labels.label.iter_mut().filter(|l| **l > 0) {
+            *label = moved[*label as usize - 1];
+        }
+        let mut old = kept.iter();
+        self.attractors.retain(|_| old.next() == Some(&true));
+        for attractor in &mut self.attractors {
+            attractor.twin = attractor.twin.map(|t| (moved[t] - 1) as usize);
+        }
+    }
+
     /// Mean number of periods integrated for a start.
     #[must_use]
     pub fn mean_periods(&self) -> f64 {
@@ -183,6 +204,7 @@ pub fn basins(
         map.bound = periods;
     }
     map.attractors = catalogue.attractors;
+    map.drop_unreached_rests();
     map.fractions = (0..map.attractors.len()).map(|i| map.share(i as i16 + 1)).collect();
     Ok(map)
 }

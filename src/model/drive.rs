@@ -1,5 +1,7 @@
 //! What moves the pivot.
 
+use std::f64::consts::TAU;
+
 use crate::error::Error;
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -33,7 +35,8 @@ impl HarmonicDrive {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(Error::Range { name: "omega", value: omega, allowed: "a number above 0" });
         }
-        Ok(Self { p, omega, phase })
+        // Whole turns off: added to a large phase the time would be lost in rounding.
+        Ok(Self { p, omega, phase: if phase.abs() > TAU { phase % TAU } else { phase } })
     }
 }
 

@@ -171,6 +171,12 @@ impl Pendulum {
             || self.effects.iter().any(|e| e.is(&[Action::Velocity, Action::Kinked]) || e.rubs())
     }
 
+    /// How fast the motion loses its speed, at speed 1: `gamma + theta_r` and what effects add.
+    #[must_use]
+    pub fn damping_rate(&self) -> f64 {
+        0.5 * (self.acceleration(0.0, 0.0, -1.0) - self.acceleration(0.0, 0.0, 1.0))
+    }
+
     /// Which way through the kernel it takes.
     #[must_use]
     pub fn route(&self) -> Route {

@@ -4,7 +4,8 @@ use nalgebra::{Complex, Matrix2};
 
 /// The eigenvalues of the derivative of `P^n`, the larger first.
 ///
-/// Their product is `exp(-gamma n T)` whatever the orbit: damping alone shrinks phase area.
+/// Their product is `exp(-gamma n T)` whatever the orbit, since damping alone shrinks phase area; with
+/// friction times the ratios of the accelerations after and before each turn, and 0 after a stick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Multipliers(pub [Complex<f64>; 2]);
 

@@ -11,7 +11,7 @@ use crate::integrate::accuracy::{distance, wrapped};
 
 /// Largest `|P^n(x) - x|` of an orbit that counts as found.
 pub const RESIDUAL: f64 = 1e-12;
-/// Largest relative deviation of a period's shrinking of area from `exp(-gamma T)`.
+/// Largest relative deviation of a period's shrinking of area from the exact product.
 pub const PRODUCT: f64 = 1e-9;
 const ITERATIONS: usize = 16;
 /// By this iteration the gap must have fallen tenfold, or the start was too far.
@@ -71,7 +71,7 @@ impl PeriodicOrbit {
 ///
 /// `None` if it does not converge to a residual below [`RESIDUAL`], wanders further than `reach`,
 /// or if phase area does not
-/// shrink by `exp(-gamma T)` in each period, which makes the multipliers' product `exp(-gamma n T)`.
+/// shrink by the product that the damping and the turns give it.
 #[must_use]
 pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<PeriodicOrbit> {
     let point = polish(map, [wrapped(start[0]), start[1]], n, reach)?;
@@ -123,12 +123,14 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<State
 fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> {
     let mut points = Vec::with_capacity(n);
     let mut derivatives = Vec::with_capacity(n);
+    let mut products = Vec::with_capacity(n);
     let mut way = 0.0;
     let mut state = first;
     for _ in 0..n {
         points.push(state);
         let image = map.once(state);
         derivatives.push(image.derivative);
+        products.push(image.product);
         // Not the turns taken off alone: a point at pi may come back at -pi.
         way += image.turns as f64 * TAU + image.state[0] - state[0];
         state = image.state;
@@ -138,17 +140,20 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
     let lowest = lowest(&points);
     points.rotate_left(lowest);
     derivatives.rotate_left(lowest);
+    products.rotate_left(lowest);
     let monodromy: Vec<Matrix2<f64>> = (0..n)
         .map(|start| (0..n).fold(Matrix2::identity(), |m, k| derivatives[(start + k) % n] * m))
         .collect();
-    let exact = (-map.pendulum.gamma * n as f64 * map.pendulum.period()).exp();
-    let multipliers = multipliers(&monodromy[0], exact);
-    let each = (-map.pendulum.gamma * map.pendulum.period()).exp();
+    // Where no law gives it, the product is the determinant, and nothing is checked.
+    let product: Option<f64> = products.iter().copied().product();
+    let multipliers = multipliers(&monodromy[0], product.unwrap_or(monodromy[0].determinant()));
     // Relative to the products whose difference a determinant is: under strong damping these are
     // all that rounding leaves.
-    let area_shrinks = derivatives.iter().all(|m| {
+    let area_shrinks = derivatives.iter().zip(&products).all(|(m, product)| {
         let (ad, bc) = (m[(0, 0)] * m[(1, 1)], m[(0, 1)] * m[(1, 0)]);
-        (ad - bc - each).abs() <= PRODUCT * (ad.abs() + bc.abs() + each)
+        product.is_none_or(|each| {
+            (ad - bc - each).abs() <= PRODUCT * (ad.abs() + bc.abs() + each.abs())
+        })
     });
     (area_shrinks && residual < 10.0 * RESIDUAL).then_some(PeriodicOrbit {
         n,

@@ -1,12 +1,16 @@
 //! The stroboscopic map of one trajectory, precise and with its derivative.
 
+use std::f64::consts::{FRAC_1_PI, PI};
+
 use nalgebra::{Matrix2, Vector2};
 
 use crate::integrate::accuracy::wrapped;
+use crate::integrate::flow::Flow;
 use crate::integrate::tangent::Tangent;
 use crate::integrate::{Moving, Schedule, State};
 use crate::lanes::sine::{Fine, wrap};
 use crate::model::Pendulum;
+use crate::model::pendulum::Route;
 
 /// A step short enough for errors near 1e-15 a period: the method's error falls as the eighth
 /// power, and is 1e-9 after five periods at 0.095.
@@ -17,7 +21,15 @@ const STEP: f64 = 0.025;
 pub struct PoincareMap {
     /// The model.
     pub pendulum: Pendulum,
-    schedule: Schedule,
+    way: Way,
+}
+
+/// Equal steps where gravity, drive, torque and viscous damping are all; else the integrator for any
+/// model.
+#[derive(Clone, Debug)]
+enum Way {
+    Plain(Schedule),
+    Any(Box<Flow>),
 }
 
 /// An image of the map with its derivative.
@@ -29,33 +41,59 @@ pub struct Image {
     pub turns: i64,
     /// Derivative of the state by the first state.
     pub derivative: Matrix2<f64>,
+    /// Its determinant without rounding errors, where it is known: `exp(-gamma T)` times the ratios
+    /// of the accelerations at the turns, 0 after a stick.
+    pub product: Option<f64>,
 }
 
 impl PoincareMap {
     /// The map of `pendulum` at `tau = 0 mod T`.
     #[must_use]
     pub fn new(pendulum: &Pendulum) -> Self {
-        let pull = pendulum.greatest_pull().sqrt();
-        let steps = (pendulum.period() * pull / STEP).ceil() as usize;
-        Self { pendulum: pendulum.clone(), schedule: Schedule::period(pendulum, steps.max(32)) }
+        let plain = pendulum.route() == Route::Smooth && !pendulum.has_extra_torque();
+        let way = if plain {
+            let pull = pendulum.greatest_pull().sqrt();
+            let steps = (pendulum.period() * pull / STEP).ceil() as usize;
+            Way::Plain(Schedule::period(pendulum, steps.max(32)))
+        } else {
+            Way::Any(Box::new(Flow::new(pendulum)))
+        };
+        Self { pendulum: pendulum.clone(), way }
     }
 
     /// One period on.
     #[must_use]
     pub fn once(&self, state: State) -> Image {
-        flow(&self.schedule, state)
+        let flow_of = match &self.way {
+            Way::Plain(schedule) => {
+                let shrinking = (-self.pendulum.gamma * self.pendulum.period()).exp();
+                return Image { product: Some(shrinking), ..flow(schedule, state) };
+            }
+            Way::Any(flow_of) => flow_of,
+        };
+        let arrival = flow_of.carry(state, 0.0, self.pendulum.period());
+        let [[a, b], [c, d]] = arrival.derivative;
+        let (half_turns, turns) = wrap(arrival.state[0] * FRAC_1_PI);
+        Image {
+            state: [half_turns * PI, arrival.state[1]],
+            turns: turns as i64,
+            derivative: Matrix2::new(a, b, c, d),
+            product: arrival.product,
+        }
     }
 
     /// `periods` periods on, with the derivative of the whole.
     #[must_use]
     pub fn iterate(&self, state: State, periods: usize) -> Image {
-        let mut image = Image { state, turns: 0, derivative: Matrix2::identity() };
+        let mut image =
+            Image { state, turns: 0, derivative: Matrix2::identity(), product: Some(1.0) };
         for _ in 0..periods {
             let next = self.once(image.state);
             image = Image {
                 state: next.state,
                 turns: image.turns + next.turns,
                 derivative: next.derivative * image.derivative,
+                product: next.product.zip(image.product).map(|(a, b)| a * b),
             };
         }
         image
@@ -76,7 +114,7 @@ pub fn flow(schedule: &Schedule, state: State) -> Image {
     let theta = moving.theta();
     let (half_turns, turns) = wrap(moving.half_turns.value);
     Image {
-        state: [half_turns * std::f64::consts::PI, velocity.value],
+        state: [half_turns * PI, velocity.value],
         turns: turns as i64,
         derivative: Matrix2::new(
             theta.slope[0],
@@ -84,6 +122,7 @@ pub fn flow(schedule: &Schedule, state: State) -> Image {
             velocity.slope[0],
             velocity.slope[1],
         ),
+        product: None,
     }
 }
 

@@ -1,13 +1,23 @@
 //! Running states without drive: closed on the angle section, with a period of their own.
 
-use super::poincare::{Image, flow};
-use crate::integrate::{Schedule, State};
-use crate::model::Pendulum;
 use std::f64::consts::TAU;
+
+use nalgebra::Matrix2;
+
+use crate::integrate::State;
+use crate::integrate::general::{Own, Running};
+use crate::integrate::tangent::Tangent;
+use crate::model::pendulum::Route;
+use crate::model::{Equation, Pendulum};
+
+/// A number with its derivatives by the first angle and velocity.
+type Number = Tangent<f64, 2>;
 
 const STEP: f64 = 0.02;
 const MOST_STEPS: usize = 200_000;
 const RESIDUAL: f64 = 1e-12;
+/// No search begins at a higher velocity than this and a little.
+const FASTEST: f64 = 200.0;
 
 /// A rotation of the undriven pendulum: the velocity repeats after one turn.
 #[derive(Clone, Debug)]
@@ -16,8 +26,8 @@ pub struct Rotation {
     pub velocity: f64,
     /// Time of one turn.
     pub period: f64,
-    /// The one multiplier that is not trivial: derivative of the section map,
-    /// `exp(-gamma period)`.
+    /// The one multiplier that is not trivial: derivative of the section map, `exp(-gamma period)`
+    /// where nothing else depends on the velocity.
     pub multiplier: f64,
     /// Its sense: 1 or -1.
     pub sense: i64,
@@ -32,45 +42,56 @@ struct Turn {
     slope: f64,
 }
 
+/// A state a step of `length` later, turning in the sense `sense`, and the derivative.
+fn carry(
+    equation: &Equation<Number>,
+    sense: f64,
+    state: State,
+    length: f64,
+) -> (State, Matrix2<f64>) {
+    let number = |value: f64, slope: [f64; 2]| Number { value, slope };
+    let mut running =
+        Running { theta: number(state[0], [1.0, 0.0]), velocity: number(state[1], [0.0, 1.0]) };
+    let clock = Own { begin: number(0.0, [0.0; 2]), length: number(length, [0.0; 2]) };
+    running.step(equation, &clock, number(sense, [0.0; 2]));
+    let Running { theta, velocity } = running;
+    let [a, b, c, d] = [theta.slope[0], theta.slope[1], velocity.slope[0], velocity.slope[1]];
+    ([theta.value, velocity.value], Matrix2::new(a, b, c, d))
+}
+
 /// From `theta = 0` with `velocity` once round; `None` if the pendulum turns back first.
 fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Option<Turn> {
     let sense = velocity.signum();
     let goal = sense * TAU;
     // A tenth of a rad at the most, however fast.
     let length = STEP.min(0.1 / velocity.abs());
-    let step = Schedule::new(pendulum, 0.0, length, 1);
-    let (mut angle, mut time) = (0.0, 0.0);
-    let mut image =
-        Image { state: [0.0, velocity], turns: 0, derivative: nalgebra::Matrix2::identity() };
+    let equation = pendulum.equation().map(Number { value: 0.0, slope: [0.0; 2] });
+    let (mut state, mut derivative, mut time) = ([0.0, velocity], Matrix2::identity(), 0.0);
     for _ in 0..MOST_STEPS {
-        visit([angle, image.state[1]]);
-        let next = flow(&step, [angle, image.state[1]]);
-        let derivative = next.derivative * image.derivative;
-        let next_angle = next.state[0] + TAU * next.turns as f64;
-        if next.state[1] * sense <= 0.0 {
+        visit(state);
+        let (next, by) = carry(&equation, sense, state, length);
+        if next[1] * sense <= 0.0 {
             return None;
         }
-        if next_angle * sense >= TAU {
+        if next[0] * sense >= TAU {
             // The remainder of the step, by Newton's method on its length.
-            let mut rest = length * (goal - angle) / (next_angle - angle);
-            let mut end = next;
+            let mut rest = length * (goal - state[0]) / (next[0] - state[0]);
+            let (mut end, mut by) = (next, by);
             for _ in 0..20 {
-                end = flow(&Schedule::new(pendulum, 0.0, rest, 1), [angle, image.state[1]]);
-                let miss = end.state[0] + TAU * end.turns as f64 - goal;
-                rest -= miss / end.state[1];
+                (end, by) = carry(&equation, sense, state, rest);
+                let miss = end[0] - goal;
+                rest -= miss / end[1];
                 if miss.abs() < 1e-15 * TAU {
                     break;
                 }
             }
-            let whole = end.derivative * image.derivative;
-            let acceleration = pendulum.acceleration(0.0, goal, end.state[1]);
+            let whole = by * derivative;
+            let acceleration = pendulum.acceleration(0.0, goal, end[1]);
             // On the section the time of arrival moves with the state.
-            let slope = whole[(1, 1)] - acceleration / end.state[1] * whole[(0, 1)];
-            return Some(Turn { time: time + rest, velocity: end.state[1], slope });
+            let slope = whole[(1, 1)] - acceleration / end[1] * whole[(0, 1)];
+            return Some(Turn { time: time + rest, velocity: end[1], slope });
         }
-        image = Image { state: next.state, turns: 0, derivative };
-        angle = next_angle;
-        time += length;
+        (state, derivative, time) = (next, by * derivative, time + length);
     }
     None
 }
@@ -85,7 +106,8 @@ pub fn running_states(pendulum: &Pendulum) -> Vec<Rotation> {
         return Vec::new();
     }
     let sense = pendulum.torque.signum();
-    let mut velocity = sense * (2.5 + 2.0 * pendulum.torque.abs() / pendulum.gamma);
+    let fastest = 2.0 * pendulum.torque.abs() / pendulum.gamma;
+    let mut velocity = sense * (2.5 + fastest.min(FASTEST));
     for _ in 0..20_000 {
         let Some(end) = turn(pendulum, velocity, |_| {}) else { return Vec::new() };
         let gap = end.velocity - velocity;
@@ -103,7 +125,11 @@ pub fn running_states(pendulum: &Pendulum) -> Vec<Rotation> {
     let Some(end) = turn(pendulum, velocity, |state| curve.push(state)) else {
         return Vec::new();
     };
-    let exact = (-pendulum.gamma * end.time).exp();
+    // Known without rounding where nothing else depends on the velocity.
+    let exact = match pendulum.route() {
+        Route::General => end.slope,
+        _ => (-pendulum.gamma * end.time).exp(),
+    };
     let closed = (end.velocity - velocity).abs() < RESIDUAL * velocity.abs().max(1.0);
     if !closed || (end.slope / exact - 1.0).abs() > 1e-6 {
         return Vec::new();

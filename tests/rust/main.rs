@@ -23,6 +23,7 @@ mod order;
 mod properties;
 mod sine;
 mod special;
+mod stick_slip;
 mod support;
 mod tangent;
 mod threads;

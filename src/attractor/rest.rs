@@ -1,0 +1,47 @@
+//! Under friction, rest is a set: the angles at which the load never exceeds the friction.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use crate::model::{Equation, Pendulum};
+
+/// Angles at which a set is looked for where it has no closed form.
+const ANGLES: usize = 720;
+/// An angle this near to 0 or pi is that.
+const NEAR: f64 = 1e-6;
+
+/// The angle in the middle of each set at rest, hanging and upside down: where the load at its
+/// greatest is least. Empty without friction.
+#[must_use]
+pub fn centres(pendulum: &Pendulum) -> Vec<f64> {
+    if !pendulum.has_friction() {
+        return Vec::new();
+    }
+    let equation = pendulum.equation();
+    [0.0, PI]
+        .into_iter()
+        .map(|middle| centre(&equation, middle))
+        .filter(|theta| equation.holds_for_ever(*theta))
+        .collect()
+}
+
+fn centre(equation: &Equation<f64>, middle: f64) -> f64 {
+    if equation.has_closed_release() {
+        // The load torque - (1 + p cos) sin th is least in magnitude near torque = sin th.
+        let theta = equation.torque.clamp(-1.0, 1.0).asin();
+        return if middle == 0.0 { theta } else { PI - theta };
+    }
+    let angle = |k: usize| middle - FRAC_PI_2 + PI * (k as f64 + 0.5) / ANGLES as f64;
+    let best = (0..ANGLES)
+        .map(angle)
+        .min_by(|a, b| equation.excess(*a).total_cmp(&equation.excess(*b)))
+        .unwrap_or(middle);
+    // Between the samples, by ternary search.
+    let width = PI / ANGLES as f64;
+    let (mut low, mut high) = (best - width, best + width);
+    for _ in 0..60 {
+        let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+        if equation.excess(a) < equation.excess(b) { high = b } else { low = a }
+    }
+    let theta = 0.5 * (low + high);
+    if (theta - middle).abs() < NEAR { middle } else { theta }
+}

@@ -1,0 +1,161 @@
+//! What a single trajectory obeys, and how precisely it is followed.
+
+use std::f64::consts::PI;
+
+use super::tangent::{Number, Tangent};
+use crate::model::effects::Action;
+use crate::model::{Equation, Pendulum};
+
+/// The longest step over `tolerance^(1/8) / rate`, where `rate` is the greatest frequency of small
+/// motions or of the drive: about what the error of a linear oscillator allows. Without it a state
+/// at rest would be crossed in steps too long for its derivatives.
+const LONGEST_STEP: f64 = 9.0;
+/// The smallest error of a step that rounding allows to be estimated.
+pub const FINEST: f64 = 1e-15;
+/// Angles, and times of a drive's period, at which the rate is looked for.
+const LOOKS: [usize; 2] = [32, 8];
+
+/// The equation of motion over numbers of some kind, and the error allowed to a step.
+#[derive(Clone, Debug)]
+pub struct Course<N> {
+    equation: Equation<N>,
+    /// The same with plain numbers, for what has no derivative: when a stuck pendulum is released.
+    plain: Equation<f64>,
+    watches: bool,
+    sticks: bool,
+    harmonic: bool,
+    period: Option<f64>,
+    look: f64,
+    longest: f64,
+    tolerance: f64,
+}
+
+impl<N: Number> Course<N> {
+    /// Of `pendulum`, with an error of about `tolerance` a step in angle and velocity; `number`
+    /// makes a number of each parameter as [`Equation::lift`] does.
+    ///
+    /// Where `ages`, time in the laboratory goes on; otherwise it is held, as in a map. The
+    /// tolerance is held above [`FINEST`].
+    #[must_use]
+    pub fn new(
+        pendulum: &Pendulum,
+        ages: bool,
+        tolerance: f64,
+        number: impl FnMut(usize, f64) -> N,
+    ) -> Self {
+        let mut equation = Equation::lift(pendulum, number);
+        equation.ages = ages;
+        let mut plain = pendulum.equation();
+        plain.ages = ages;
+        let changes = ages && pendulum.drifts();
+        let unforced = pendulum.effects.iter().all(|e| e.is(&[Action::Reading]));
+        let tolerance = tolerance.max(FINEST);
+        let rate = greatest_rate(pendulum).max(if pendulum.is_autonomous() {
+            0.0
+        } else {
+            pendulum.motion().omega
+        });
+        Self {
+            equation,
+            plain,
+            watches: pendulum.has_events(),
+            sticks: pendulum.has_friction(),
+            harmonic: unforced,
+            period: (!changes).then(|| pendulum.period()),
+            look: pendulum.period(),
+            longest: LONGEST_STEP * tolerance.powf(0.125) / rate,
+            tolerance,
+        }
+    }
+
+    /// The same with every turn found, also where nothing changes there: derivatives by the
+    /// strength of a friction that is 0 need them.
+    #[must_use]
+    pub fn watched(mut self) -> Self {
+        self.watches = true;
+        self
+    }
+
+    /// The acceleration at time `tau`, moving in the sense `sense` (1 or -1).
+    #[inline]
+    pub fn acceleration(&self, tau: f64, theta: N, velocity: N, sense: f64) -> N {
+        let forcing = self.equation.forcing(N::constant(tau));
+        let at = self.equation.point(&forcing, theta, velocity, N::constant(sense));
+        self.equation.acceleration(&forcing, &at)
+    }
+
+    /// By how much the load at rest exceeds what holds the pendulum against moving in the sense
+    /// `sense`; it stays at rest while this is not positive for either sense.
+    #[must_use]
+    pub fn excess(&self, tau: f64, theta: f64, sense: f64) -> f64 {
+        let forcing = self.plain.forcing(tau);
+        let at = self.plain.point(&forcing, theta, 0.0, sense);
+        sense * self.plain.load(&forcing, &at) - self.plain.friction(&at)
+    }
+
+    /// The equation with plain numbers.
+    #[must_use]
+    pub fn plain(&self) -> &Equation<f64> {
+        &self.plain
+    }
+
+    /// Whether the equation changes where the velocity passes zero, or turns are wanted anyhow.
+    #[must_use]
+    pub fn watches(&self) -> bool {
+        self.watches
+    }
+
+    /// Whether friction can hold the pendulum.
+    #[must_use]
+    pub fn sticks(&self) -> bool {
+        self.sticks
+    }
+
+    /// Whether nothing acts on a pendulum at rest but gravity, the harmonic drive, a constant torque
+    /// and constant friction: then its release has a closed form.
+    #[must_use]
+    pub fn is_harmonic(&self) -> bool {
+        self.harmonic
+    }
+
+    /// The time after which the equation repeats; `None` if it does not.
+    #[must_use]
+    pub fn period(&self) -> Option<f64> {
+        self.period
+    }
+
+    /// The time scale of what acts on a pendulum at rest.
+    #[must_use]
+    pub fn time_scale(&self) -> f64 {
+        self.look
+    }
+
+    /// The longest step.
+    #[must_use]
+    pub fn longest_step(&self) -> f64 {
+        self.longest
+    }
+
+    /// The error allowed to a step.
+    #[must_use]
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+}
+
+/// The greatest frequency of small motions about any angle at any time, at least 1.
+fn greatest_rate(pendulum: &Pendulum) -> f64 {
+    let equation = Equation::lift(pendulum, |_, value| Tangent::<f64, 1> { value, slope: [0.0] });
+    let mut stiffness = 1_f64;
+    for k in 0..LOOKS[1] {
+        let tau = pendulum.period() * k as f64 / LOOKS[1] as f64;
+        let forcing = equation.forcing(Tangent::constant(tau));
+        for i in 0..LOOKS[0] {
+            let theta = PI * (2.0 * i as f64 / LOOKS[0] as f64 - 1.0);
+            let (zero, one) = (Tangent::constant(0.0), Tangent::constant(1.0));
+            let at = equation.point(&forcing, Tangent::seeded(theta, 0), zero, one);
+            stiffness = stiffness.max(equation.acceleration(&forcing, &at).slope[0].abs());
+        }
+    }
+    stiffness.sqrt()
+}

@@ -1,0 +1,296 @@
+//! One trajectory: steps of the right length, turns, sticks and releases.
+//!
+//! Between events the sense of the motion is held, so the equation is analytic. At a velocity 0 the
+//! pendulum goes on in the sense in which the load exceeds the friction, or sticks until it does.
+//! Derivatives stay right: at a turn the velocity's are multiplied by the ratio of the accelerations
+//! after and before it, at a stick they vanish, at a release nothing jumps (saltation; di Bernardo,
+//! Budd, Champneys & Kowalczyk (2008), Piecewise-smooth Dynamical Systems, section 2.5).
+
+use super::course::Course;
+use super::dense::Leap;
+use super::stick::{Release, release};
+use super::tangent::Number;
+use super::turning;
+
+/// A step is at most so much longer than the one before it, and at least so much shorter.
+const CHANGE: [f64; 2] = [1.0 / 3.0, 6.0];
+/// The part of the step that the error would allow.
+const SAFETY: f64 = 0.9;
+/// The first step over the longest one.
+const FIRST_STEP: f64 = 0.5;
+/// Steps shorter than this part of the time leave no trace in it.
+const SHORTEST: f64 = 1e-15;
+/// Turns closer than this, so often in a row, are a state on the edge that rounding decides.
+const CROWDED: (f64, u32) = (1e-10, 20);
+/// The rest given to such a state; it doubles each time.
+const PAUSE: f64 = 1e-9;
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// The velocity passed zero.
+    Turn,
+    /// The velocity became zero, and friction holds.
+    Stick,
+    /// The load overcame the friction.
+    Release,
+    /// It never will.
+    StuckForEver,
+}
+
+impl EventKind {
+    /// The words for it.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Turn => "turn",
+            Self::Stick => "stick",
+            Self::Release => "release",
+            Self::StuckForEver => "stuck for ever",
+        }
+    }
+}
+
+/// What happened, when and where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// When.
+    pub tau: f64,
+    /// What.
+    pub kind: EventKind,
+    /// At which angle, rad, not wrapped.
+    pub theta: f64,
+}
+
+/// A piece of a trajectory.
+#[derive(Debug)]
+pub enum Piece<N> {
+    /// Moving, in one step.
+    Leap(Box<Leap<N>>),
+    /// At rest between two times.
+    Rest(f64, f64),
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Mode<N> {
+    /// In this sense, with this acceleration now.
+    Moving(f64, N),
+    /// Until this release.
+    Stuck(Release),
+    /// Out of the range of numbers.
+    Lost,
+}
+
+/// A trajectory under way.
+#[derive(Debug)]
+pub struct Flight<'a, N> {
+    course: &'a Course<N>,
+    /// The time reached.
+    pub tau: f64,
+    /// Angle, not wrapped, and velocity.
+    pub state: [N; 2],
+    /// Turns, sticks and releases so far.
+    pub events: Vec<Event>,
+    /// The product of the ratios of accelerations at the turns, 0 after a stick.
+    pub ratio: f64,
+    /// Steps so far.
+    pub steps: usize,
+    until: f64,
+    mode: Mode<N>,
+    step: f64,
+    crowd: (f64, u32),
+    pause: f64,
+}
+
+impl<'a, N: Number> Flight<'a, N> {
+    /// From `state` at time `tau` until `until`.
+    #[must_use]
+    pub fn new(course: &'a Course<N>, tau: f64, state: [N; 2], until: f64) -> Self {
+        let step = FIRST_STEP * course.longest_step();
+        let crowd = (f64::NEG_INFINITY, 0);
+        let (mode, events) = (Mode::Lost, Vec::new());
+        let mut flight = Self {
+            course,
+            tau,
+            state,
+            events,
+            ratio: 1.0,
+            steps: 0,
+            until,
+            mode,
+            step,
+            crowd,
+            pause: PAUSE,
+        };
+        let velocity = state[1].value();
+        if velocity != 0.0 {
+            flight.set_out(1_f64.copysign(velocity));
+        } else if course.sticks() {
+            match release(course, tau, state[0].value(), until) {
+                Release::Now(sense) => flight.set_out(sense),
+                wait => flight.settle(wait),
+            }
+        } else {
+            let pull = course.acceleration(tau, state[0], state[1], 1.0);
+            flight.set_out(1_f64.copysign(pull.value()));
+        }
+        flight
+    }
+
+    /// Whether it is at rest under friction.
+    #[must_use]
+    pub fn is_stuck(&self) -> bool {
+        matches!(self.mode, Mode::Stuck(_))
+    }
+
+    /// Whether it will never move again.
+    #[must_use]
+    pub fn is_stuck_for_ever(&self) -> bool {
+        matches!(self.mode, Mode::Stuck(Release::Never))
+    }
+
+    /// One piece on; `None` at the end, and where the state leaves the range of numbers, which
+    /// [`Flight::is_lost`] tells.
+    pub fn advance(&mut self) -> Option<Piece<N>> {
+        if self.tau >= self.until {
+            return None;
+        }
+        match self.mode {
+            Mode::Lost => None,
+            Mode::Stuck(wait) => Some(self.rest(wait)),
+            Mode::Moving(sense, first) => self.leap(sense, first),
+        }
+    }
+
+    /// To the end, calling `visit` for each piece.
+    pub fn finish(&mut self, mut visit: impl FnMut(&mut Piece<N>)) {
+        while let Some(mut piece) = self.advance() {
+            visit(&mut piece);
+        }
+    }
+
+    /// Whether the state left the range of numbers.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        matches!(self.mode, Mode::Lost)
+    }
+
+    fn rest(&mut self, wait: Release) -> Piece<N> {
+        let from = self.tau;
+        match wait {
+            Release::At(time, sense) if time < self.until => {
+                self.tau = time;
+                self.note(EventKind::Release);
+                self.set_out(sense);
+            }
+            _ => self.tau = self.until,
+        }
+        Piece::Rest(from, self.tau)
+    }
+
+    fn leap(&mut self, sense: f64, first: N) -> Option<Piece<N>> {
+        let mut growth = CHANGE[1];
+        let mut leap = loop {
+            let rest = self.until - self.tau;
+            // No crumb is left for the step after this one.
+            let length = if self.step > 0.99 * rest { rest } else { self.step };
+            let leap = Leap::new(self.course, self.tau, self.state, first, sense, length);
+            self.steps += 1;
+            let error = leap.error(self.course.tolerance());
+            if error.is_nan() || length < SHORTEST * self.tau.abs() {
+                if length < SHORTEST * self.tau.abs().max(1.0) {
+                    self.mode = Mode::Lost;
+                    self.state = self.state.map(|x| x.reset(f64::NAN, 1.0));
+                    return None;
+                }
+                self.step = CHANGE[0] * length;
+                continue;
+            }
+            let factor = (SAFETY * error.powf(-0.125)).clamp(CHANGE[0], growth);
+            let next = (factor * length).min(self.course.longest_step());
+            if error <= 1.0 {
+                // A step that the end cut short says little about the next one.
+                self.step = if length < self.step { self.step.max(next) } else { next };
+                break leap;
+            }
+            (self.step, growth) = (next.min(0.99 * length), 1.0);
+        };
+        if self.course.watches()
+            && let Some(turned) = turning::first(self.course, &mut leap)
+        {
+            leap = turned;
+            self.arrive(&leap);
+            self.turn(sense, leap.last().value());
+        } else {
+            self.arrive(&leap);
+            self.mode = Mode::Moving(sense, leap.last());
+        }
+        Some(Piece::Leap(Box::new(leap)))
+    }
+
+    fn arrive(&mut self, leap: &Leap<N>) {
+        let end = leap.tau + leap.length;
+        self.tau = if (end - self.until).abs() < SHORTEST * end.abs() { self.until } else { end };
+        self.state = leap.end;
+    }
+
+    /// At a velocity 0, reached in the sense `sense` with the acceleration `before`.
+    fn turn(&mut self, sense: f64, before: f64) {
+        let theta = self.state[0].value();
+        let goes_on = if self.course.sticks() {
+            release(self.course, self.tau, theta, self.until)
+        } else {
+            Release::Now(-sense)
+        };
+        let goes_on = self.uncrowded(goes_on);
+        let Release::Now(next) = goes_on else {
+            self.settle(goes_on);
+            return;
+        };
+        self.state[1] = self.state[1].reset(0.0, 1.0);
+        if next * sense > 0.0 {
+            // Within rounding of touching zero.
+            self.set_out(next);
+            return;
+        }
+        self.note(EventKind::Turn);
+        let after = self.course.acceleration(self.tau, self.state[0], self.state[1], next).value();
+        let ratio = if self.course.sticks() { after / before } else { 1.0 };
+        self.ratio *= ratio;
+        self.state[1] = self.state[1].reset(0.0, ratio);
+        self.set_out(next);
+    }
+
+    /// `wait`, but a pause where turns crowd.
+    fn uncrowded(&mut self, wait: Release) -> Release {
+        let (last, count) = self.crowd;
+        let close = self.tau - last < CROWDED.0;
+        self.crowd = (self.tau, if close { count + 1 } else { 0 });
+        match wait {
+            Release::Now(sense) if self.crowd.1 > CROWDED.1 => {
+                self.pause *= 2.0;
+                Release::At(self.tau + self.pause, sense)
+            }
+            other => other,
+        }
+    }
+
+    fn set_out(&mut self, sense: f64) {
+        let first = self.course.acceleration(self.tau, self.state[0], self.state[1], sense);
+        self.mode = Mode::Moving(sense, first);
+    }
+
+    fn settle(&mut self, wait: Release) {
+        self.state[1] = self.state[1].reset(0.0, 0.0);
+        self.ratio = 0.0;
+        self.mode = Mode::Stuck(wait);
+        self.note(EventKind::Stick);
+        if wait == Release::Never {
+            self.note(EventKind::StuckForEver);
+        }
+    }
+
+    fn note(&mut self, kind: EventKind) {
+        self.events.push(Event { tau: self.tau, kind, theta: self.state[0].value() });
+    }
+}

@@ -1,0 +1,152 @@
+//! Rest under friction: whether it lasts, and when it ends.
+//!
+//! At rest the load must exceed the friction in one sense or the other. Under the harmonic drive,
+//! with `S = sin th`, the excess in the sense `s` is
+//! `s (torque - S) - s S p cos(omega tau + phase) - theta_r`, so the release has a closed form.
+//! Otherwise the excess is sampled, and looked at closely wherever it has a maximum.
+
+use std::f64::consts::{PI, TAU};
+
+use super::course::Course;
+use super::tangent::Number;
+
+/// An excess that does not pass this counts as none: rounding makes as much, and what moves in the
+/// meantime is far smaller still.
+const ROUNDING: f64 = 1e-13;
+/// Phases closer to a release than this, rad, are at it: those on the other side have an excess of
+/// less than [`ROUNDING`].
+const SAME_PHASE: f64 = 4e-7;
+/// Samples of the excess in a period.
+const SAMPLES: usize = 96;
+/// Halvings of a bracket: its width falls below the last place of the time.
+const HALVINGS: usize = 60;
+/// Steps of the golden section.
+const SECTIONS: usize = 45;
+
+/// When a pendulum at rest moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Release {
+    /// At once, in this sense.
+    Now(f64),
+    /// At that time, in that sense.
+    At(f64, f64),
+    /// Not before the time asked for.
+    Later,
+    /// Never.
+    Never,
+}
+
+/// When a pendulum that is at rest at `theta` at time `tau` moves; looked for until `until` where
+/// the equation does not repeat.
+pub fn release<N: Number>(course: &Course<N>, tau: f64, theta: f64, until: f64) -> Release {
+    let (excess, sense) = greatest(course, tau, theta);
+    if excess > ROUNDING {
+        return Release::Now(sense);
+    }
+    if course.is_harmonic() {
+        return harmonic(course, tau, theta);
+    }
+    let end = course.period().map_or(until, |period| tau + 1.1 * period);
+    match sampled(course, tau, theta, end) {
+        Some((time, sense)) => Release::At(time, sense),
+        None if course.period().is_some() => Release::Never,
+        None => Release::Later,
+    }
+}
+
+/// The greater excess of both senses, and its sense.
+fn greatest<N: Number>(course: &Course<N>, tau: f64, theta: f64) -> (f64, f64) {
+    let [forth, back] = [1.0, -1.0].map(|sense| course.excess(tau, theta, sense));
+    if forth >= back { (forth, 1.0) } else { (back, -1.0) }
+}
+
+/// The closed form: the excess in the sense `s` is `swing cos(angle) - limit`, where `swing >= 0`.
+fn harmonic<N: Number>(course: &Course<N>, tau: f64, theta: f64) -> Release {
+    let equation = course.plain();
+    let motion = &equation.motion;
+    let still = crate::model::equation::Forcing { vertical: 1.0, lateral: 0.0, lab: 0.0 };
+    let at = equation.point(&still, theta, 0.0, 1.0);
+    let (constant, swing) = (equation.load(&still, &at), -at.sine * motion.p);
+    let mut first = None::<(f64, f64)>;
+    for sense in [1.0, -1.0] {
+        let limit = equation.friction(&at) - sense * constant;
+        let size = swing.abs();
+        if size - limit <= ROUNDING {
+            continue;
+        }
+        // Where it is positive lies within `half` on either side of the phase 0.
+        let half = (limit / size).clamp(-1.0, 1.0).acos();
+        let turn = if sense * swing < 0.0 { PI } else { 0.0 };
+        let mut wait = (-half - (motion.omega * tau + motion.phase + turn)).rem_euclid(TAU);
+        if wait > TAU - SAME_PHASE {
+            wait = 0.0;
+        }
+        let time = tau + wait / motion.omega;
+        if first.is_none_or(|(earlier, _)| time < earlier) {
+            first = Some((time, sense));
+        }
+    }
+    first.map_or(Release::Never, |(time, sense)| Release::At(time, sense))
+}
+
+/// The first time up to `end` at which the excess becomes positive, and the sense.
+fn sampled<N: Number>(course: &Course<N>, tau: f64, theta: f64, end: f64) -> Option<(f64, f64)> {
+    let interval = course.time_scale() / SAMPLES as f64;
+    let count = ((end - tau) / interval).ceil().max(1.0) as usize;
+    let time = |k: usize| tau + (k as f64 * interval).min(end - tau);
+    // The last two samples.
+    let mut before = [f64::NEG_INFINITY, greatest(course, tau, theta).0];
+    for k in 1..=count {
+        let now = greatest(course, time(k), theta).0;
+        let mut positive = (now > ROUNDING).then(|| time(k));
+        if before[1] >= before[0] && before[1] >= now {
+            // A maximum lies about the sample before: it may be positive on its own.
+            let (peak, height) = highest(course, theta, time(k.saturating_sub(2)), time(k));
+            if height > ROUNDING {
+                positive = Some(peak);
+            }
+        }
+        if let Some(inside) = positive {
+            let sense = greatest(course, inside, theta).1;
+            return Some((entry(course, theta, time(k.saturating_sub(2)), inside, sense), sense));
+        }
+        before = [before[1], now];
+    }
+    None
+}
+
+/// The greatest excess between two times, by the golden section.
+fn highest<N: Number>(course: &Course<N>, theta: f64, from: f64, to: f64) -> (f64, f64) {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let value = |tau: f64| greatest(course, tau, theta).0;
+    let (mut low, mut high) = (from, to);
+    let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+    let mut values = inner.map(value);
+    for _ in 0..SECTIONS {
+        if values[0] > values[1] {
+            high = inner[1];
+            inner = [high - GOLDEN * (high - low), inner[0]];
+            values = [value(inner[0]), values[0]];
+        } else {
+            low = inner[0];
+            inner = [inner[1], low + GOLDEN * (high - low)];
+            values = [values[1], value(inner[1])];
+        }
+    }
+    if values[0] > values[1] { (inner[0], values[0]) } else { (inner[1], values[1]) }
+}
+
+/// Where the excess in the sense `sense` becomes positive, between a time at which it is not and one
+/// at which it is.
+fn entry<N: Number>(course: &Course<N>, theta: f64, from: f64, to: f64, sense: f64) -> f64 {
+    let (mut low, mut high) = (from, to);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if course.excess(middle, theta, sense) > 0.0 {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
