@@ -9,6 +9,7 @@ import numpy as np
 from pendmap import _core
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +31,11 @@ _LAYERS: Final = {
 def cells(raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...]) -> dict[str, Any]:
     """Return the variables with one value a start, over ``dims`` of ``shape``."""
     finite_time = _LAYERS[raw["plane"]] == "finite_time"
-    when = f"after {raw['layer_periods']} periods" if finite_time else "until settled"
+    when = "until settled"
+    if finite_time:
+        when = f"after {counted(raw['layer_periods'], 'period')}"
+    elif not (raw["settle"] >= 0).any():
+        when = f"after {counted(raw['bound'], 'period')}"
     label = {
         "long_name": "attractor",
         "comment": "number of the attractor; 0 undecided within the bound, -1 failed or diverged",
@@ -116,7 +121,7 @@ def complete(
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    dataset.attrs["summary"] = summarise(dataset)
+    dataset.attrs["summary"] = summarise(dataset, bound_was_chosen=choices["max_periods"] is None)
     return dataset
 
 

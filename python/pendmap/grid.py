@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pendmap import checks
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Axis", "Grid"]
-
-MOST_CELLS = 100_000
+__all__ = ["Axis", "Grid", "starts"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +24,7 @@ class Axis:
     Raises
     ------
     InputError
-        If the bounds are not finite and in order, or the count is not 1 to 100000.
+        If the bounds are not finite and in order, or the count is no whole number from 1 to 100000.
     """
 
     low: float
@@ -33,12 +32,14 @@ class Axis:
     count: int
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+        for name in ("low", "high"):
+            object.__setattr__(self, name, checks.number(name, getattr(self, name)))
+        if not 0 < self.high - self.low < math.inf:
             raise InputError(
-                f"bounds {self.low:g}:{self.high:g}: allowed are two finite bounds, the lower first"
+                f"bounds {self.low:g}:{self.high:g}: allowed are two finite bounds, the lower "
+                "first, and a finite distance"
             )
-        if not 1 <= self.count <= MOST_CELLS:
-            raise InputError(f"{self.count} cells: allowed are 1 to {MOST_CELLS}")
+        object.__setattr__(self, "count", checks.whole("count", self.count, 1, checks.MOST_CELLS))
 
     @property
     def centres(self) -> NDArray[np.float64]:
@@ -49,12 +50,12 @@ class Axis:
     @property
     def bounds(self) -> dict[str, float]:
         """The outer edges, as attributes of a coordinate."""
-        return {"low": float(self.low), "high": float(self.high)}
+        return {"low": self.low, "high": self.high}
 
     @property
     def as_tuple(self) -> tuple[float, float, int]:
         """``(low, high, count)``."""
-        return (float(self.low), float(self.high), int(self.count))
+        return (self.low, self.high, self.count)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,13 +65,26 @@ class Grid:
     Parameters
     ----------
     theta : Axis
-        Angle, rad.
+        Angle, rad; ``(low, high, count)`` does as well.
     velocity : Axis
-        Velocity ``d theta / d tau``.
+        Velocity ``d theta / d tau``; likewise.
+
+    Raises
+    ------
+    InputError
+        If one is no axis.
     """
 
     theta: Axis = Axis(-math.pi, math.pi, 1000)
     velocity: Axis = Axis(-3.0, 3.0, 1000)
+
+    def __post_init__(self) -> None:
+        for name in ("theta", "velocity"):
+            axis = getattr(self, name)
+            if isinstance(axis, tuple | list) and len(axis) == 3:  # noqa: PLR2004
+                object.__setattr__(self, name, Axis(*axis))
+            else:
+                checks.of_type(name, axis, Axis, "Axis(-3, 3, 100)")
 
     @classmethod
     def square(cls, count: int) -> Grid:
@@ -81,3 +95,36 @@ class Grid:
     def cells(self) -> int:
         """Number of cells."""
         return self.theta.count * self.velocity.count
+
+
+def starts(
+    theta: ArrayLike, velocity: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return angles and velocities of a list of starts as two arrays, shape (N,).
+
+    Raises
+    ------
+    InputError
+        If they are no numbers, not of one dimension, not as many, or not finite.
+    """
+    arrays = []
+    for name, given in (("theta", theta), ("velocity", velocity)):
+        try:
+            array: NDArray[np.float64] = np.ascontiguousarray(given, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(
+                f"{name} is {checks.shown(given)}: allowed is an array (N,) of numbers"
+            ) from None
+        if np.ndim(given) != 1:
+            raise InputError(f"{name} has the shape {np.shape(given)}: allowed is (N,)")
+        if not np.isfinite(array).all():
+            raise InputError(
+                f"{name} holds a value that is not finite: allowed are finite starts only"
+            )
+        arrays.append(array)
+    angles, speeds = arrays
+    if angles.size != speeds.size:
+        raise InputError(
+            f"theta has {angles.size} values and velocity has {speeds.size}: they must be as many"
+        )
+    return angles, speeds

@@ -5,20 +5,18 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import xarray as xr
 
-from pendmap import _core
+from pendmap import _core, checks
 from pendmap.basin_dataset import cells, complete
 from pendmap.errors import InputError
-from pendmap.grid import Grid
+from pendmap.grid import Grid, starts
+from pendmap.model import Pendulum
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
-
-    from pendmap.model import Pendulum
+    from numpy.typing import ArrayLike
 
     Progress = Callable[[int, int], object]
 
@@ -90,6 +88,11 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     basins_of : the same for a list of starts.
     """
     grid = Grid() if grid is None else grid
+    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    checks.of_type(
+        "grid", grid, Grid, "Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
+    )
+    checks.call("progress", progress)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
     began = time.perf_counter()
     axes = grid.theta.as_tuple, grid.velocity.as_tuple
@@ -150,10 +153,9 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     InputError
         If the lengths differ, a start is not finite, or a value is outside its range.
     """
-    angles: NDArray[np.float64] = np.ascontiguousarray(theta, dtype=np.float64)
-    speeds: NDArray[np.float64] = np.ascontiguousarray(velocity, dtype=np.float64)
-    if angles.ndim != 1 or speeds.ndim != 1:
-        raise InputError("theta and velocity: allowed are arrays of one dimension")
+    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    checks.call("progress", progress)
+    angles, speeds = starts(theta, velocity)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
     began = time.perf_counter()
     raw = _call(_core.basins_list, pendulum.parameters, angles, speeds, choices, progress)
@@ -177,22 +179,18 @@ def _choices(  # noqa: PLR0913
     *,
     check: bool,
 ) -> _core._Choices:
-    for name, value in (
-        ("max_periods", max_periods),
-        ("layer_periods", layer_periods),
-        ("threads", threads),
-    ):
-        if value is not None and not 1 <= value < 2**31:
-            raise InputError(f"{name} is {value}: allowed is 1 or more")
-    if not 0 <= seed < 2**63:
-        raise InputError(f"seed is {seed}: allowed is 0 or more")
+    def periods(name: str, value: int | None) -> int | None:
+        return None if value is None else checks.whole(name, value, 1, checks.MOST_PERIODS)
+
     return {
-        "tol": float(tol),
-        "max_periods": max_periods,
-        "layer_periods": layer_periods,
-        "threads": 0 if threads is None else threads,
-        "seed": seed,
-        "check": check,
+        "tol": checks.number("tol", tol),
+        "max_periods": periods("max_periods", max_periods),
+        "layer_periods": periods("layer_periods", layer_periods),
+        "threads": 0
+        if threads is None
+        else checks.whole("threads", threads, 1, checks.MOST_THREADS),
+        "seed": checks.whole("seed", seed, 0, checks.MOST_SEED),
+        "check": checks.flag("check", check),
     }
 
 

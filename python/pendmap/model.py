@@ -7,6 +7,7 @@ import math
 import tomllib
 from typing import TYPE_CHECKING, Final
 
+from pendmap import checks
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ class Pendulum:
 
     ``th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque`` with ``tau = w0 t``,
     ``w0 = sqrt(g / l)``; ``th = 0`` hangs down.
+
+    Any real number will do for a parameter, numpy's too; a float is kept.
 
     Parameters
     ----------
@@ -53,12 +56,8 @@ class Pendulum:
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise InputError(f"{field.name} is {value!r}: allowed is a number")
-            object.__setattr__(self, field.name, float(value))
-            if not math.isfinite(value):
-                raise InputError(f"{field.name} is {value}: allowed is any finite number")
+            value = checks.number(field.name, getattr(self, field.name))
+            object.__setattr__(self, field.name, value)
         if self.gamma < 0:
             raise InputError(f"gamma is {self.gamma:g}: allowed is 0 or more")
         if self.omega <= 0:

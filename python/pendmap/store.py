@@ -42,16 +42,26 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If the suffix is not known, or .zarr is asked for and zarr is not installed.
+        If it is not a result of pendmap, the suffix is not known, or .zarr is asked for and zarr is
+        not installed.
     OSError
         If the file cannot be written.
     """
     target = Path(path)
+    if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
+        raise InputError(
+            f"{target}: what shall be saved is not a result of pendmap: allowed are the datasets "
+            "that basins, basins_of and simulate return"
+        )
     if target.suffix.lower() == ".zarr":
         return _save_zarr(dataset, target)
     with whole_file(target, SUFFIXES) as part:
         dataset.to_netcdf(part, engine="netcdf4", encoding=_encoding(dataset))
     return target
+
+
+def _is_result(dataset: xr.Dataset) -> bool:
+    return {"format_version", "kind"} <= set(dataset.attrs)
 
 
 def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
@@ -110,9 +120,9 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
             dataset = xr.load_dataset(source, engine="netcdf4")
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
-    version = dataset.attrs.get("format_version")
-    if version is None or "kind" not in dataset.attrs:
+    if not _is_result(dataset):
         raise InputError(f"{source}: is not a result of pendmap")
+    version = dataset.attrs["format_version"]
     if int(version) > FORMAT_VERSION:
         known = f"this pendmap reads format {FORMAT_VERSION}"
         raise InputError(f"{source}: has format {version}, {known}")

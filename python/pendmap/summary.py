@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pendmap.words import counted
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -12,13 +14,15 @@ __all__ = ["summarise"]
 _NEARLY_CHANCE = 0.15
 
 
-def summarise(dataset: xr.Dataset) -> str:
+def summarise(dataset: xr.Dataset, *, bound_was_chosen: bool) -> str:
     """Return the findings of a basin map, a sentence a line.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
+    bound_was_chosen : bool
+        Whether the bound on periods is pendmap's own choice, not the caller's.
     """
     plane = dataset.attrs["plane"]
     if plane == "conservative":
@@ -30,22 +34,31 @@ def summarise(dataset: xr.Dataset) -> str:
     for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
         share = dataset.attrs[key]
         if share > 0 and plane != "conservative":
-            bound = f" within {dataset.attrs['max_periods']} periods" if key == "undecided" else ""
+            bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     a = dataset.attrs
     lines.append(
-        f"{a['cells']} starts, {a['mean_periods']:.1f} periods each on average, "
-        f"{a['steps_per_period']} steps a period, error reached {a['reached_error']:.1e}, "
-        f"{a['seconds']:.2f} s on {a['threads']} threads ({a['simd']})."
+        f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
+        f"{counted(a['steps_per_period'], 'step')} a period, "
+        f"error reached {a['reached_error']:.1e}, "
+        f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')} ({a['simd']})."
     )
     return "\n".join(lines)
+
+
+def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
+    """Say after how many periods a start is undecided, and what can be done about it."""
+    text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
+    if chosen and any(str(kind).endswith("chaos") for kind in dataset["kind"].values):
+        text += " (beside chaos ten times the longest settling seen, at least 200)"
+    return f"{text}; --max-periods raises this bound"
 
 
 def _conservative(dataset: xr.Dataset) -> str:
     return (
         "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
         "and the finite-time exponent after "
-        f"{dataset.attrs['layer_periods']} periods are shown instead."
+        f"{counted(dataset.attrs['layer_periods'], 'period')} are shown instead."
     )
 
 
@@ -58,7 +71,7 @@ def _only_chaos(dataset: xr.Dataset) -> str:
         "per unit of tau; nothing captured a sampled trajectory within "
         f"{a['chaos_bound']} periods.\n"
         "Labels tell nothing here: net turns and the finite-time exponent after "
-        f"{a['layer_periods']} periods are shown instead."
+        f"{counted(a['layer_periods'], 'period')} are shown instead."
     )
 
 
@@ -89,6 +102,8 @@ def _settling(dataset: xr.Dataset) -> list[str]:
 
 def _texture(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
+    if not (dataset["label"] > 0).any():
+        return []  # nothing is decided: agreement of the undecided says nothing
     lines = []
     if "theta" in dataset.dims and a["cells"] > 1:
         agree, chance = a["neighbours_agree"], a["neighbours_chance"]

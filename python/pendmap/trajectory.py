@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from pendmap import _core
+from pendmap import _core, checks
 from pendmap.errors import InputError
+from pendmap.grid import starts
+from pendmap.model import Pendulum
 from pendmap.store import FORMAT_VERSION
 
 if TYPE_CHECKING:
@@ -17,12 +19,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.model import Pendulum
-
 __all__ = ["advance", "simulate"]
 
 _SAMPLES = 64
 _MOST_SAMPLES = 2_000_000
+_ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
 
 
 def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -47,13 +48,17 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         Last time, in units of ``1 / w0``; above 0.
     tol : float
         The step is halved until that changes the state after 5 periods (or at the end, if that is
-        sooner) by no more than this; 1e-13 to 1e-2. What was reached is in ``reached_error``, the
-        difference at the end in ``end_error``.
+        sooner) by no more than this, or until rounding or the smallest step allowed forbid more;
+        then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
+        ``reached_error``, the difference at the end in ``end_error``.
     samples : int, optional
         Samples a period; 64 by default, fewer where that would be more than two million in all.
     lyapunov : bool
-        Whether to estimate the largest Lyapunov exponent along the trajectory, with a standard
-        error from the spread of 20 batches, the first tenth left out.
+        Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
+        standard error from the spread of 20 batches, the first tenth left out (``exponent_from``
+        and ``exponent_to`` say from which tau to which). It is the exponent of an attractor only if
+        the trajectory was on it all that time: a chaotic transient has a positive one, wherever it
+        ends. :func:`pendmap.basins` gives those of the attractors.
 
     Returns
     -------
@@ -66,20 +71,21 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     InputError
         If a value is not finite or outside its range.
     """
-    if not (math.isfinite(until) and until > 0):
+    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    theta, velocity = checks.number("theta", theta), checks.number("velocity", velocity)
+    until, tol = checks.number("until", until), checks.number("tol", tol)
+    lyapunov = checks.flag("lyapunov", lyapunov)
+    if until <= 0:
         raise InputError(f"until is {until:g}: allowed is a time above 0")
     periods = until / pendulum.period
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
-    if not 1 <= samples <= 10_000:  # noqa: PLR2004
-        raise InputError(f"samples is {samples}: allowed are 1 to 10000 a period")
+    samples = checks.whole("samples", samples, 1, checks.MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
         raise InputError(f"until is {until:g}: {periods:.3g} periods do not fit into memory")
     try:
-        start = (float(theta), float(velocity))
-        raw = _core.simulate(
-            pendulum.parameters, start, float(until), float(tol), samples, lyapunov
-        )
+        start = (theta, velocity)
+        raw = _core.simulate(pendulum.parameters, start, until, tol, samples, lyapunov)
     except ValueError as error:
         raise InputError(str(error)) from None
     angle = raw["theta"][::samples]
@@ -97,7 +103,6 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "period": ("period", np.arange(wrapped.size)),
         },
     )
-    exponent = raw["exponent"]
     turns = round((float(raw["theta"][-1]) - theta) / math.tau)
     dataset.attrs = {
         "kind": "trajectory",
@@ -107,20 +112,36 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "omega": pendulum.omega,
         "phase": pendulum.phase,
         "torque": pendulum.torque,
-        "theta0": float(theta),
-        "velocity0": float(velocity),
-        "until": float(until),
-        "tol": float(tol),
+        "theta0": theta,
+        "velocity0": velocity,
+        "until": until,
+        "tol": tol,
         "reached_error": raw["reached_error"],
         "end_error": raw["end_error"],
         "steps_per_period": raw["steps_per_period"],
         "turns": turns,
-        **({} if exponent is None else {"exponent": exponent[0], "exponent_stderr": exponent[1]}),
+        **_exponent(raw),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
     dataset.attrs["summary"] = _summary(dataset)
     return dataset
+
+
+def _exponent(raw: dict[str, Any]) -> dict[str, float]:
+    """The exponent with its standard error, and from when to when it was measured."""
+    if raw["exponent"] is None:
+        return {}
+    time = raw["time"]
+    first = int(_ALIGNMENT * time.size)
+    size = max(1, (time.size - first) // _BATCHES)
+    last = first + (time.size - first) // size * size - 1
+    return {
+        "exponent": raw["exponent"][0],
+        "exponent_stderr": raw["exponent"][1],
+        "exponent_from": float(time[max(first - 1, 0)]),
+        "exponent_to": float(time[last]),
+    }
 
 
 def _summary(dataset: xr.Dataset) -> str:
@@ -136,13 +157,22 @@ def _summary(dataset: xr.Dataset) -> str:
             f"by {a['end_error']:.1e} at the end ({a['steps_per_period']} steps a period)."
         ),
     ]
+    if not a["reached_error"] <= a["tol"]:
+        lines.append(
+            f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding, or the smallest step allowed, "
+            f"leaves {a['reached_error']:.1e}."
+        )
     if a["end_error"] > max(1e-3, a["tol"]):
         lines.append(
             "The end is not predictable at this length: read the motion, not its last state."
         )
     if "exponent" in a:
         value, error = a["exponent"], a["exponent_stderr"]
-        lines.append(f"Largest Lyapunov exponent {value:.5f} +- {error:.5f} per unit of tau.")
+        lines.append(
+            f"Largest Lyapunov exponent of this stretch, tau = {a['exponent_from']:.6g} to "
+            f"{a['exponent_to']:.6g}: {value:.5f} +- {error:.5f} per unit of tau. Transients are "
+            "included; basins gives the exponents of the attractors."
+        )
     return "\n".join(lines)
 
 
@@ -188,21 +218,21 @@ def advance(  # noqa: PLR0913
     InputError
         If the lengths differ, a start is not finite, or a value is outside its range.
     """
-    angles = np.ascontiguousarray(theta, dtype=np.float64)
-    speeds = np.ascontiguousarray(velocity, dtype=np.float64)
-    if angles.ndim != 1 or angles.shape != speeds.shape:
-        raise InputError("theta and velocity: allowed are two arrays (N,) of one length")
-    if not (np.isfinite(angles).all() and np.isfinite(speeds).all()):
-        raise InputError("theta and velocity: allowed are finite starts only")
-    if periods < 0:
-        raise InputError(f"periods is {periods}: allowed is 0 or more")
+    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    checks.call("progress", progress)
+    angles, speeds = starts(theta, velocity)
+    periods = checks.whole("periods", periods, 0, checks.MOST_PERIODS)
+    workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
+    tol = checks.number("tol", tol)
+    if steps_per_period is not None:
+        steps_per_period = checks.whole("steps_per_period", steps_per_period, 1, _MOST_SAMPLES)
     try:
         if steps_per_period is None:
             step = max(1, angles.size // 400)
             sample = angles[::step].copy(), speeds[::step].copy()
             steps_per_period, _ = _core.choose_steps(pendulum.parameters, *sample, tol)
         return _core.advance(
-            pendulum.parameters, angles, speeds, periods, steps_per_period, threads or 0, progress
+            pendulum.parameters, angles, speeds, periods, steps_per_period, workers, progress
         )
     except ValueError as error:
         raise InputError(str(error)) from None

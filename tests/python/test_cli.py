@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import signal
 import subprocess
 import sys
@@ -90,6 +91,29 @@ def test_chaos_has_nulls_and_no_nan(pendmap_command: Run) -> None:
         assert chaos[key] is None
 
 
+def test_what_nothing_settles_on_has_no_settling_time(pendmap_command: Run) -> None:
+    run = pendmap_command("basins", "--max-periods", 1, "--grid", 9, "--json")
+    result = json.loads(run.stdout)
+    assert result["mean_settle"] is None
+    assert result["longest_settle"] is None
+    run = pendmap_command("basins", "--p", 0.6, "--grid", 9, "--json")
+    assert json.loads(run.stdout)["longest_settle"] > 0
+
+
+def test_figures_of_far_windows_take_no_longer(pendmap_command: Run, tmp_path: Path) -> None:
+    words = ("--theta=1e300:2e300:10", "--velocity=-1:1:10", "--plot", "o.png")
+    run = pendmap_command("basins", *words)
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "o.png").exists()
+
+
+@pytest.mark.parametrize("name", ["basins", "simulate"])
+def test_help_says_what_is_written(pendmap_command: Run, name: str) -> None:
+    said = " ".join(pendmap_command(name, "--help").stdout.split())
+    assert "--json alone writes no file" in said
+    assert f"--view writes the recording it opens: {name}.rrd" in said
+
+
 def test_without_a_named_output_three_files_are_written(
     pendmap_command: Run, tmp_path: Path
 ) -> None:
@@ -125,6 +149,8 @@ def test_simulate(pendmap_command: Run, tmp_path: Path) -> None:
     assert {"t", "theta", "velocity", "stuck", "exponent", "stderr"} <= set(result)
     expected = pendmap.simulate(pendmap.Pendulum(), math.pi / 2, 0, 30)
     assert result["theta"] == float(expected.theta[-1])
+    assert result["tol_reached"] is True
+    assert 0 < result["exponent_from"] < result["exponent_to"] <= 30
     run = pendmap_command("simulate", "--until", 30)
     assert run.returncode == 0, run.stderr
     names = sorted(p.name for p in tmp_path.iterdir())
@@ -145,8 +171,8 @@ def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path:
     ("words", "complaint"),
     [
         ("basins --p nan", "nan"),
-        ("basins --gamma=-1", "gamma is -1"),
-        ("basins --omega 0", "omega is 0"),
+        ("basins --gamma=-1", "Invalid value for '--gamma': -1: allowed is 0 or more"),
+        ("basins --omega 0", "Invalid value for '--omega': 0: allowed is a number above 0"),
         ("basins --grid 0", "0"),
         ("basins --theta 1:2", "A:B:N"),
         ("basins --theta 1:2:x", "A:B:N"),
@@ -154,7 +180,19 @@ def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path:
         ("basins --theta 0:1:0", "0 cells"),
         ("basins --theta 0:nan:5", "finite"),
         ("basins --grid 5 --theta 0:1:5", "--grid"),
-        ("basins --tol 1e-30", "tol is"),
+        ("basins --tol 1e-30", "'--tol'"),
+        ("basins --max-periods 99999999999999", "from 1 to 2147483647"),
+        ("basins --layer-periods 99999999999999", "from 1 to 2147483647"),
+        ("basins --seed -1", "from 0 to 9223372036854775807"),
+        ("simulate --samples 10001", "from 1 to 10000"),
+        ("basins --theta=-1e308:1e308:9", "finite distance"),
+        ("basins --view", "--view: there is no display"),
+        ("basins --grid 20000 --view --json", "--view: there is no display"),
+        ("simulate --view", "--view: there is no display"),
+        ("basins --plot .", "'--plot'"),
+        ("plot .", "'.': is a folder"),
+        ("plot /", "'/': is a folder"),
+        ("plot ''", "'.': is a folder"),
         ("basins --pp 1", "--pp"),
         ("basins --out x.docx", ".docx"),
         ("basins --plot x.nc", ".png"),
@@ -175,7 +213,7 @@ def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path:
 def test_bad_input_gets_one_line_and_leaves_nothing(
     pendmap_command: Run, tmp_path: Path, words: str, complaint: str
 ) -> None:
-    run = pendmap_command(*words.split())
+    run = pendmap_command(*shlex.split(words))
     assert run.returncode == 2
     assert run.stdout == ""
     assert len(run.stderr.strip().splitlines()) == 1

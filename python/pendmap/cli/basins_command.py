@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED
 from pendmap.cli.options import (
     Outputs,
     model_options,
@@ -14,7 +15,7 @@ from pendmap.cli.options import (
     progress_options,
 )
 from pendmap.cli.show import progress_bar, show
-from pendmap.cli.types import AXIS, NUMBER, AxisText
+from pendmap.cli.types import AXIS, NUMBER, AxisText, Whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,23 +29,26 @@ _DEFAULT = 1000
 @model_options
 @click.option("--theta", type=AXIS, help="Initial angles, rad.  [default: -pi:pi:1000]")
 @click.option("--velocity", type=AXIS, help="Initial velocities.  [default: -3:3:1000]")
-@click.option("--grid", type=click.IntRange(min=1), help="Cells on each side of the window.")
+@click.option("--grid", type=Whole(1, MOST_CELLS), help="Cells on each side of the window.")
 @click.option("--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]")
 @click.option(
-    "--max-periods", type=click.IntRange(min=1), help="Bound after which a start is undecided."
+    "--max-periods",
+    type=Whole(1, MOST_PERIODS),
+    help="Bound after which a start is undecided.  [default: 4000; less beside chaos]",
 )
 @click.option(
-    "--layer-periods", type=click.IntRange(min=1), help="Periods of the finite-time layers."
+    "--layer-periods", type=Whole(1, MOST_PERIODS), help="Periods of the finite-time layers."
 )
 @click.option(
-    "--seed", type=click.IntRange(min=0), default=0, help="Shifts the samples.  [default: 0]"
+    "--seed", type=Whole(0, MOST_SEED), default=0, help="Shifts the samples.  [default: 0]"
 )
 @progress_options
 @output_options
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Map the basins of attraction over initial angle and velocity.
 
-    Writes basins.nc, basins.png and basins.rrd if no output is named.
+    Writes basins.nc, basins.png and basins.rrd if no output is named. --json alone writes no file.
+    --view writes the recording it opens: basins.rrd, or what --rerun names.
     """
     pendulum = pendulum_from(given)
     outputs = Outputs.take(given, "basins")
@@ -85,8 +89,6 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "labels_sampled",
         "unreliable_half_step",
         "unreliable_mirror",
-        "mean_settle",
-        "longest_settle",
         "neighbours_agree",
         "neighbours_chance",
         "chaos_bound",
@@ -101,9 +103,12 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "pendmap_version",
         "format_version",
     ]
+    settled = a["longest_settle"] >= 0
     return {
         "attractors": [_attractor(dataset, k) for k in range(dataset.sizes["attractor"])],
         **{name: a.get(name) for name in names},
+        "mean_settle": a["mean_settle"] if settled else None,
+        "longest_settle": a["longest_settle"] if settled else None,
         "summary": a["summary"].split("\n"),
     }
 

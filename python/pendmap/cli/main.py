@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import signal
 import sys
+from typing import Any
 
 import click
 
@@ -25,6 +27,10 @@ _COMMANDS = {
 }
 
 
+_NAMED = re.compile(r"(?P<name>\w+) is (?P<rest>[^:]+: .*)", re.DOTALL)
+"""How everything below names what it refuses: ``gamma is -1: allowed is 0 or more``."""
+
+
 class _Commands(click.Group):
     """Commands that are imported when they are called: ``--help`` imports none of them."""
 
@@ -37,6 +43,19 @@ class _Commands(click.Group):
         module = importlib.import_module(f"pendmap.cli.{cmd_name}_command")
         loaded: click.Command = module.command
         return loaded
+
+    def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 (what the command returns)
+        """Run the command; what it refuses is named as it was typed, by its option."""
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            called = self.get_command(ctx, ctx.invoked_subcommand or "")
+            options = {p.name: p.opts[0] for p in called.params} if called else {}
+            named = _NAMED.fullmatch(str(error))
+            if named is None or named["name"] not in options:
+                raise
+            option = options[named["name"]]
+            raise click.UsageError(f"Invalid value for '{option}': {named['rest']}") from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         with formatter.section("Commands"):

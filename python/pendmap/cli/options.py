@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.types import NUMBER, OutputFile
+from pendmap.checks import MOST_THREADS
+from pendmap.cli.types import NUMBER, OutputFile, Whole
 from pendmap.model import PRESETS, Pendulum
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def pendulum_from(given: dict[str, Any]) -> Pendulum:
 def progress_options(function: Command) -> Command:
     """Add threads, seed and quiet."""
     threads = click.option(
-        "--threads", type=click.IntRange(min=1), help="Threads.  [default: one a processor]"
+        "--threads", type=Whole(1, MOST_THREADS), help="Threads.  [default: one a processor]"
     )
     quiet = click.option("--quiet", is_flag=True, help="No progress, no summary.")
     return threads(quiet(function))
@@ -74,8 +75,10 @@ def progress_options(function: Command) -> Command:
 def output_options(function: Command) -> Command:
     """Add --json, --out, --plot, --rerun and --view."""
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout."),
-        click.option("--view", is_flag=True, help="Open the recording in the viewer."),
+        click.option(
+            "--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files."
+        ),
+        click.option("--view", is_flag=True, help="Write the recording and open the viewer on it."),
         click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd."),
         click.option(
             "--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf."
@@ -84,6 +87,16 @@ def output_options(function: Command) -> Command:
     ):
         function = option(function)
     return function
+
+
+def _can_view() -> None:
+    """Refuse --view before anything is computed where no window can open."""
+    from pendmap import viewer
+
+    try:
+        viewer.check_display()
+    except viewer.ViewerError as error:
+        raise click.UsageError(f"--view: {error}") from error
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,6 +126,8 @@ class Outputs:
         if outputs.view and outputs.rerun is None:
             rrd = OutputFile([".rrd"]).convert(f"{name}.rrd", None, None)
             outputs = dataclasses.replace(outputs, rerun=rrd)
+        if outputs.view:
+            _can_view()
         return outputs
 
     @property

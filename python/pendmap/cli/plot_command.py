@@ -39,6 +39,8 @@ def command(  # noqa: PLR0913 (the options above)
 ) -> None:
     """Draw a result again, in another size, colours or layer, without computing."""
     inches = _size(size)
+    if not file.name:
+        raise click.UsageError(f"{str(file)!r}: is a folder: allowed is a result, .nc or .zarr")
     target = out or OutputFile([".png"]).convert(file.with_suffix(".png"), None, None)
 
     from pendmap import figures

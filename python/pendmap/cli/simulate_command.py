@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.checks import MOST_SAMPLES
 from pendmap.cli.options import (
     Outputs,
     model_options,
@@ -13,7 +14,7 @@ from pendmap.cli.options import (
     pendulum_from,
 )
 from pendmap.cli.show import show
-from pendmap.cli.types import NUMBER
+from pendmap.cli.types import NUMBER, Whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,14 +28,15 @@ __all__ = ["command"]
 @click.option("--velocity", type=NUMBER, default=0.0, help="Velocity at tau = 0.  [default: 0]")
 @click.option("--until", type=NUMBER, default=100.0, help="Last time, in 1/w0.  [default: 100]")
 @click.option("--tol", type=NUMBER, default=1e-9, help="Error after 5 periods.  [default: 1e-9]")
-@click.option("--samples", type=click.IntRange(min=1), help="Samples a period.  [default: 64]")
-@click.option("--lyapunov", is_flag=True, help="Also the largest Lyapunov exponent.")
+@click.option("--samples", type=Whole(1, MOST_SAMPLES), help="Samples a period.  [default: 64]")
+@click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
 @click.option("--quiet", is_flag=True, help="No summary.")
 @output_options
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Integrate one trajectory: time history, phase plane, Poincaré section.
 
-    Writes simulate.nc, simulate.png and simulate.rrd if no output is named.
+    Writes simulate.nc, simulate.png and simulate.rrd if no output is named. --json alone writes no
+    file. --view writes the recording it opens: simulate.rrd, or what --rerun names.
     """
     pendulum = pendulum_from(given)
     outputs = Outputs.take(given, "simulate")
@@ -55,9 +57,12 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         # A constant torque and viscous damping never hold a pendulum fast.
         "stuck": False,
         "turns": a["turns"],
+        "tol": a["tol"],
+        "tol_reached": bool(a["reached_error"] <= a["tol"]),
         "reached_error": a["reached_error"],
         "end_error": a["end_error"],
     }
     if "exponent" in a:
         result |= {"exponent": a["exponent"], "stderr": a["exponent_stderr"]}
+        result |= {name: a[name] for name in ("exponent_from", "exponent_to")}
     return result

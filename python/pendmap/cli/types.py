@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from pendmap.checks import MOST_CELLS, shown
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["AXIS", "NUMBER", "AxisText", "OutputFile"]
+__all__ = ["AXIS", "NUMBER", "AxisText", "OutputFile", "Whole"]
 
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
@@ -42,6 +44,28 @@ class _Number(click.ParamType[float]):
         return number
 
 
+class Whole(click.ParamType[int]):
+    """A whole number between two bounds, both included."""
+
+    name = "integer"
+
+    def __init__(self, least: int, most: int) -> None:
+        self.least, self.most = least, most
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
+        """Refuse what is no whole number, or outside the bounds."""
+        try:
+            number = int(str(value))
+        except ValueError:
+            number = self.least - 1
+        if not self.least <= number <= self.most:
+            allowed = f"allowed is a whole number from {self.least} to {self.most}"
+            self.fail(f"{shown(value)}: {allowed}", param, ctx)
+        return number
+
+
 class AxisText(NamedTuple):
     """``A:B:N`` as typed."""
 
@@ -68,8 +92,8 @@ class _Axis(click.ParamType[AxisText]):
             self.fail(f"{value!r}: {wanted}", param, ctx)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
-        if count < 1:
-            self.fail(f"{value!r}: {count} cells, allowed is 1 or more", param, ctx)
+        if not 1 <= count <= MOST_CELLS:
+            self.fail(f"{value!r}: {count} cells, allowed are 1 to {MOST_CELLS}", param, ctx)
         return AxisText(low, high, count)
 
 
@@ -86,6 +110,8 @@ class OutputFile(click.ParamType[Path]):
     ) -> Path:
         """Refuse what cannot be written."""
         path = Path(str(value))
+        if not path.name:
+            self.fail(f"{str(value)!r}: is a folder, or no file's name", param, ctx)
         if path.suffix.lower() not in self.suffixes:
             allowed = ", ".join(self.suffixes)
             self.fail(f"{str(path)!r}: suffix {path.suffix!r}, allowed are {allowed}", param, ctx)

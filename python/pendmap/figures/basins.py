@@ -33,12 +33,13 @@ CELLS = 1200
 
 Extent = tuple[float, float, float, float]
 
-TICKS = 4
-"""Ticks that a logarithmic colour bar has at least, where its range allows."""
-
 SMALL = 0.64
 """Size of the panel of unreliable labels, relative to those that lead."""
 
+LETTER = 0.082
+"""Inches of a letter of a bold title."""
+
+_SECTION = "its attractor, once a period"
 _COLOUR_MAPS = {"settle": "viridis", "turns": "RdBu_r", "exponent": "magma"}
 
 
@@ -64,20 +65,29 @@ def figure(
     aside = layering.finite_time(dataset) and layer is None and bool(chaos)
     if "labels" not in shown and not layering.finite_time(dataset):
         listed = [e for e in listed if e.id < 1 or e.chaotic]
+    panels = [_panel(dataset, k, shown) for k in range(len(shown))]
+    beside = style.widest(*velocity)
+    note = ""
+    if aside:
+        panels.append(Panel(SMALL, title=f"({'abcd'[len(shown)]}) {_SECTION}"))
+        beside = max(beside, style.widest(*_section_range(chaos)))
+        note = layering.exponents(dataset)
+    elif panels[-1].share < 1:
+        note = layering.warning(dataset)
     sheet = Sheet(
-        [_panel(dataset, one, shown) for one in shown] + [Panel(SMALL)] * aside,
+        panels,
         ratio=min(max((velocity[1] - velocity[0]) / (theta[1] - theta[0]), 0.3), 1.3),
         title=_title(dataset, shown),
         subtitle=_subtitle(dataset),
         handles=[_handle(entry) for entry in listed],
         texts=[_text(dataset, entry, shown) for entry in listed],
+        labels=(beside, style.widest(*theta, angle=True)),
+        note=note,
         size=size,
         dpi=dpi,
     )
     limit = max(CELLS, sheet.pixels)
-    for k, (one, axes, bar) in enumerate(zip(shown, sheet.axes, sheet.bars, strict=False)):
-        mark = f"({'abcd'[k]}) " if len(shown) > 1 else ""
-        axes.set_title(mark + layering.what(dataset, one))
+    for one, axes, bar in zip(shown, sheet.axes, sheet.bars, strict=False):
         if one == "labels":
             colours = legend.colours(dataset)
             _image(axes, colours[plane.thinned(dataset["label"], limit) + 1], extent)
@@ -88,14 +98,27 @@ def figure(
     if "labels" in shown and not layering.reliable(dataset):
         _warn(sheet, sheet.axes[shown.index("labels")], dataset)
     if aside:
-        _section(sheet, chaos, "abcd"[len(shown)])
-        sheet.note(sheet.axes[-1], [(layering.exponents(dataset), style.QUIET, "normal")])
+        _section(sheet.axes[-1], chaos)
+        sheet.note(sheet.axes[-1], [(note, style.QUIET, "normal")])
     return sheet.figure
 
 
-def _panel(dataset: xr.Dataset, layer: str, shown: tuple[str, ...]) -> Panel:
-    small = layer == "labels" and len(shown) > 1 and not layering.reliable(dataset)
-    return Panel(SMALL if small else 1.0, bar=layer != "labels")
+def _panel(dataset: xr.Dataset, k: int, shown: tuple[str, ...]) -> Panel:
+    """Return what the sheet must know of the k-th layer that is shown."""
+    title = _panel_title(dataset, k, shown)
+    if shown[k] != "labels":
+        return Panel(bar=layering.unit(dataset, shown[k]), title=title)
+    if layering.reliable(dataset):
+        return Panel(title=title)
+    if len(shown) > 1:
+        return Panel(SMALL, title=title)
+    # The warning is its title, on two lines at most.
+    return Panel(least=LETTER * (len(layering.warning(dataset)) / 2 + 8))
+
+
+def _panel_title(dataset: xr.Dataset, k: int, shown: tuple[str, ...]) -> str:
+    mark = f"({'abcd'[k]}) " if len(shown) > 1 else ""
+    return mark + layering.what(dataset, shown[k])
 
 
 def _leading(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -187,7 +210,7 @@ def _scale(
     if layer == "settle":
         low, high = float(values.min()), float(values.max())
         high = max(high, low + 1.0)
-        return LogNorm(low, high), "neither", _log_ticks(low, high)
+        return LogNorm(low, high), "neither", style.log_ticks(low, high)
     if layer == "turns":
         size = np.abs(values)
         top = max(1.0, float(np.ceil(np.quantile(size, 0.98))))
@@ -200,17 +223,6 @@ def _scale(
     below, above = bool(values.min() < low), bool(values.max() > high)
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}
     return Normalize(low, high), extend.get((below, above), "neither"), None
-
-
-def _log_ticks(low: float, high: float) -> list[float]:
-    """Return ticks 1, 2, 5, 10, ... between the ends; more of them where these are close."""
-    for steps in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
-        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-        ticks = [m * 10.0**k for k in powers for m in steps]
-        inside = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
-        if len(inside) >= TICKS:
-            return inside
-    return sorted({round(x) for x in np.linspace(low, high, 5)})
 
 
 def _marker(entry: legend.Entry) -> str:
@@ -245,16 +257,17 @@ def _attractors(axes: Axes, listed: list[legend.Entry], extent: Extent) -> None:
             axes.plot(at[:, 0], at[:, 1], clip_on=False, zorder=5, **_drawn(entry, size))
 
 
-def _section(sheet: Sheet, chaos: list[legend.Entry], mark: str) -> None:
-    """Draw the stroboscopic points of chaotic attractors on the last panel, a plane of its own."""
-    axes = sheet.axes[-1]
-    every = np.concatenate([entry.points for entry in chaos])
-    pad = 0.05 * max(float(np.ptp(every[:, 1])), 1e-3)
+def _section(axes: Axes, chaos: list[legend.Entry]) -> None:
+    """Draw the stroboscopic points of chaotic attractors on a plane of their own."""
     for entry in chaos:
         _dots(axes, entry.points, entry.colour)
-    low, high = every[:, 1].min() - pad, every[:, 1].max() + pad
-    style.phase_plane(axes, (-math.pi, math.pi), (low, high))
-    axes.set_title(f"({mark}) its attractor, once a period")
+    style.phase_plane(axes, (-math.pi, math.pi), _section_range(chaos))
+
+
+def _section_range(chaos: list[legend.Entry]) -> tuple[float, float]:
+    speeds = np.concatenate([entry.points[:, 1] for entry in chaos])
+    pad = 0.05 * max(float(np.ptp(speeds)), 1e-3)
+    return float(speeds.min()) - pad, float(speeds.max()) + pad
 
 
 def _dots(axes: Axes, at: npt.NDArray[np.float64], colour: str) -> None:
@@ -273,7 +286,7 @@ def _warn(sheet: Sheet, axes: Axes, dataset: xr.Dataset) -> None:
     """Mark the labels as unreliable: next to their small panel, or as the title of a large one."""
     text = layering.warning(dataset)
     if len(sheet.axes) == 1:
-        width = int(sheet.inches(axes)[0] / 0.082)
+        width = int(sheet.inches(axes)[0] / LETTER)
         axes.set_title(textwrap.fill(text, max(12, width)), color=style.ALARM, weight="bold")
         return
     sheet.note(

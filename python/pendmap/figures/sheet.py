@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
 
 from pendmap.errors import InputError
+from pendmap.figures import style
 from pendmap.figures.style import QUIET, RC
 
 if TYPE_CHECKING:
@@ -29,14 +28,30 @@ ROW, LEGEND_PAD = 0.19, 0.14
 WIDTH = 4.1
 FLAT = 0.55  # height over width under which panels stand below one another
 LEAST = 0.5  # inches a panel needs
+FEWEST, BOLD = 12, 0.081  # characters of a note's line at least, inches of a bold one
+LINE = RC["font.size"] * 1.5 / 72
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel: its size relative to the leading ones, and whether a colour bar follows."""
+    """One panel.
+
+    Attributes
+    ----------
+    share : float
+        Its size relative to the leading ones.
+    bar : str
+        Name of the colour bar beside it; empty where there is none.
+    title : str
+        What stands above it, on two lines where one is too long.
+    least : float
+        Width that it needs, in inches.
+    """
 
     share: float = 1.0
-    bar: bool = False
+    bar: str = ""
+    title: str = ""
+    least: float = LEAST
 
 
 class Sheet:
@@ -50,6 +65,10 @@ class Sheet:
         Height of a panel over its width.
     handles, texts
         The legend below the panels: an artist or a tuple of artists, and a line of text, each.
+    labels : (float, float)
+        Inches that the longest tick labels need beside and below a panel.
+    note : str
+        What :meth:`note` will write first; empty where nothing.
     size : (float, float) or None
         Width and height in inches; None: as large as the panels need.
     dpi : float
@@ -61,7 +80,7 @@ class Sheet:
         If ``size`` leaves no room for the panels.
     """
 
-    def __init__(  # noqa: PLR0913 (panels, words and size)
+    def __init__(  # noqa: PLR0913, PLR0915 (panels, words and size; all places at once)
         self,
         panels: Sequence[Panel],
         *,
@@ -70,51 +89,85 @@ class Sheet:
         subtitle: str,
         handles: Sequence[Any] = (),
         texts: Sequence[str] = (),
+        labels: tuple[float, float] = (0.0, 0.0),
+        note: str = "",
         size: tuple[float, float] | None = None,
         dpi: float = 200.0,
     ) -> None:
         self.stacked = stacked = ratio < FLAT
+        self.left = left = max(LEFT, labels[0] + 0.44)
+        gap, right = max(GAP, labels[0] + 0.36), max(RIGHT, labels[1] / 2 + 0.05)
         shares = [panel.share for panel in panels]
         bars = [BAR if panel.bar else 0.0 for panel in panels]
-        aside = LEFT + RIGHT + (max(bars) if stacked else sum(bars) + GAP * (len(panels) - 1))
+        aside = left + right + (max(bars) if stacked else sum(bars) + gap * (len(panels) - 1))
         across = max(shares) if stacked else sum(shares)
+        # Narrowest: a title ends before the labels of a bar, or the next one, or the edge.
+        after = [max(bars) + right] * len(panels)
+        if not stacked:
+            after = [gap] * (len(panels) - 1) + [right]
+        after = [BAR_PAD + BAR_WIDTH if p.bar else b for p, b in zip(panels, after, strict=True)]
+        narrow = [max(LEAST, panel.least) / panel.share for panel in panels]
+        for panel, behind in zip(panels, after, strict=True):
+            room = _long(_folded(panel.title)) + 0.12 - behind
+            narrow.append(room / (across if stacked else panel.share))
+        if note:
+            column = FEWEST * BOLD + 0.05
+            narrow.append(
+                (column + 0.25 - after[-1]) / (1.0 - min(shares))
+                if stacked
+                else (column - right) / min(shares)
+            )
+        words = [style.inches(title, 12, bold=True), style.inches(subtitle, RC["font.size"])]
+        least_width = max(aside + across * max(narrow), left + max([*words, _widest(texts)]) + 0.1)
         base = 7.0 if stacked else 5.2 if len(panels) == 1 else WIDTH
-        width = size[0] if size else aside + across * base
-        columns = _columns(texts, width - LEFT)
+        width = max(size[0], least_width) if size else aside + across * base
+        columns = _columns(texts, width - left)
         rows = -(-len(texts) // columns)
         below = BOTTOM + (LEGEND_PAD + ROW * rows if rows else 0.0)
         down = sum(shares) if stacked else max(shares)
         between = STACK_GAP * (len(panels) - 1) if stacked else 0.0
         wide = (width - aside) / across
+        # Lowest: names of colour bars do not reach the titles, the note not the legend.
+        low = [LEAST / min(shares)]
+        low += [style.inches(p.bar, RC["font.size"]) / p.share for p in panels]
+        if note:
+            small = wide * min(shares)
+            lines = len(_wrapped(note, wide - small - 0.25 if stacked else small, bold=True))
+            low.append(
+                LINE * lines / min(shares)
+                if stacked
+                else (LINE * lines - BOTTOM + 0.15) / (1.0 - min(shares))
+            )
+        least_height = TOP + below + between + max(low) * down
         high = (size[1] - TOP - below - between) / down if size else wide * ratio
-        if not (math.isfinite(wide) and math.isfinite(high) and min(wide, high) >= LEAST):
-            least_width = aside + LEAST * across
-            least_height = TOP + below + between + LEAST * down
+        if size and not (size[0] >= least_width and size[1] >= least_height):
             raise InputError(
-                f"size {size} leaves no room for the panels;"
-                f" it must be at least {least_width:.1f} x {least_height:.1f} inches"
+                f"size {size} leaves no room for the panels; it must be at least"
+                f" {_up(least_width):.1f} x {_up(least_height):.1f} inches"
             )
         height = TOP + high * down + between + below
         self._room = ((wide * (1 - min(shares)), high), (wide, high * (1 - min(shares)) + BOTTOM))
-        self.figure = headed((width, height), dpi, title, subtitle)
+        self.figure = headed((width, height), dpi, title, subtitle, left=left)
         self.axes: list[Axes] = []
         self.bars: list[Axes | None] = []
-        x, y = LEFT, height - TOP
-        for panel in panels:
+        x, y = left, height - TOP
+        for panel, behind in zip(panels, after, strict=True):
             w, h = wide * panel.share, high * panel.share
             self.axes.append(place(self.figure, x, y - h, w, h))
+            fits = _long(panel.title) + 0.12 <= (wide * across if stacked else w) + behind
+            self.axes[-1].set_title(panel.title if fits else _folded(panel.title))
             beside = (x + w + BAR_PAD, y - h, BAR_WIDTH, h)
             self.bars.append(place(self.figure, *beside) if panel.bar else None)
             if stacked:
                 y -= h + STACK_GAP
             else:
-                x += w + GAP + (BAR if panel.bar else 0.0)
+                x += w + gap + (BAR if panel.bar else 0.0)
         if rows:
             self.figure.legend(
                 list(handles),
                 list(texts),
                 loc="upper left",
-                bbox_to_anchor=(LEFT / width, (below - BOTTOM) / height),
+                bbox_to_anchor=(left / width, (below - BOTTOM) / height),
                 ncols=columns,
                 borderpad=0.0,
                 borderaxespad=0.0,
@@ -148,13 +201,10 @@ class Sheet:
         beside, beneath = self._room
         width = beside[0] - 0.25 if self.stacked else self.inches(axes)[0]
         room = self.inches(axes)[1] if self.stacked else beneath[1] - BOTTOM
-        line = RC["font.size"] * 1.5 / 72
         used = 0.0
         for k, (text, colour, weight) in enumerate(parts):
-            lines = textwrap.wrap(
-                text, max(12, int(width / (0.081 if weight == "bold" else 0.067)))
-            )
-            if k and used + line * len(lines) > room:
+            lines = _wrapped(text, width, bold=weight == "bold")
+            if k and used + LINE * len(lines) > room:
                 break
             axes.annotate(
                 "\n".join(lines),
@@ -167,15 +217,17 @@ class Sheet:
                 weight=weight,
                 linespacing=1.25,
             )
-            used += line * len(lines) + 0.05
+            used += LINE * len(lines) + 0.05
 
 
-def headed(size: tuple[float, float], dpi: float, title: str, subtitle: str) -> Figure:
+def headed(
+    size: tuple[float, float], dpi: float, title: str, subtitle: str, *, left: float = LEFT
+) -> Figure:
     """Return an empty figure of ``size`` inches with its title and subtitle."""
     width, height = size
     figure = Figure(figsize=size, dpi=dpi)
     FigureCanvasAgg(figure)
-    left = LEFT / width
+    left /= width
     figure.text(left, 1 - 0.27 / height, title, fontsize=12, weight="bold", va="center")
     figure.text(left, 1 - 0.50 / height, subtitle, color=QUIET, va="center")
     return figure
@@ -187,16 +239,37 @@ def place(figure: Figure, x: float, y: float, width: float, height: float) -> Ax
     return figure.add_axes((x / whole[0], y / whole[1], width / whole[0], height / whole[1]))
 
 
+def _long(title: str) -> float:
+    """Return how wide the longest line of a panel's title is, in inches."""
+    return max(style.inches(line, RC["axes.titlesize"]) for line in title.split("\n"))
+
+
+def _folded(title: str) -> str:
+    """Return a panel's title on two lines of nearly equal length."""
+    blanks = [k for k, letter in enumerate(title) if letter == " "]
+    if not blanks:
+        return title
+    k = min(blanks, key=lambda k: max(k, len(title) - k))
+    return f"{title[:k]}\n{title[k + 1 :]}"
+
+
+def _widest(texts: Sequence[str]) -> float:
+    """Return how wide the legend's longest line is with its handle, in inches."""
+    return max((style.inches(text, RC["legend.fontsize"]) + 0.55 for text in texts), default=0.0)
+
+
+def _wrapped(text: str, width: float, *, bold: bool) -> list[str]:
+    return textwrap.wrap(text, max(FEWEST, int(width / (BOLD if bold else 0.067))))
+
+
+def _up(inches: float) -> float:
+    return math.ceil(inches * 10 - 1e-9) / 10
+
+
 def _columns(texts: Sequence[str], room: float) -> int:
     """Return how many columns the legend's lines allow in ``room`` inches."""
     if not texts:
         return 1
-    font = FontProperties(family=RC["font.sans-serif"])
-    inches = [
-        TextPath((0, 0), t, size=RC["legend.fontsize"], prop=font).get_extents().width
-        for t in texts
-    ]
-    widest = max(inches) / 72 + 0.55
-    fit = max(1, int(room // widest))
+    fit = max(1, int(room // _widest(texts)))
     rows = -(-len(texts) // min(fit, len(texts)))
     return -(-len(texts) // rows)

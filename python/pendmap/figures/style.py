@@ -6,6 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import NullLocator
 
 from pendmap.errors import InputError
@@ -25,8 +28,12 @@ __all__ = [
     "check_size",
     "colour_bar",
     "colour_map",
+    "inches",
+    "log_ticks",
     "phase_plane",
     "resolution",
+    "scale",
+    "widest",
     "write",
 ]
 
@@ -67,6 +74,9 @@ VELOCITY = "d\N{GREEK SMALL LETTER THETA}/d\N{GREEK SMALL LETTER TAU}"
 MOST, PIXELS = 100.0, 20000
 """Inches and pixels that a side of a figure may have."""
 
+TICKS = 4
+"""Ticks that a logarithmic colour bar has at least, where its range allows."""
+
 DPI = (20, 1200)
 """Pixels per inch that may be chosen."""
 
@@ -75,14 +85,60 @@ def phase_plane(axes: Axes, theta: tuple[float, float], velocity: tuple[float, f
     """Give axes the limits, ticks and names of the phase plane."""
     axes.set_xlim(*theta)
     axes.set_ylim(*velocity)
-    width = axes.get_window_extent().width / axes.figure.dpi
-    ticks = plane.angle_ticks(*theta)
-    every = math.ceil(len(ticks) * 0.42 / max(width, 0.1))
+    scale(axes, "x", theta, THETA, angle=True)
+    scale(axes, "y", velocity, VELOCITY)
+
+
+def scale(
+    axes: Axes, which: str, limits: tuple[float, float], name: str, *, angle: bool = False
+) -> None:
+    """Give one side of a panel a handful of ticks, none into another, and its name.
+
+    Parameters
+    ----------
+    axes : Axes
+        The panel.
+    which : str
+        ``"x"`` or ``"y"``.
+    limits : (float, float)
+        Its ends.
+    name : str
+        Symbol and unit, a blank between them; what the labels leave out is subtracted there.
+    angle : bool
+        Whether multiples of pi are wanted.
+    """
+    low, high = limits
+    shift, ticks = plane.short_ticks(low, high, angle=angle)
+    box = axes.get_window_extent()
+    room = (box.width if which == "x" else box.height) / axes.figure.dpi
+    size = max(inches(text) for _, text in ticks) + 0.14 if which == "x" else 0.17
+    apart = room * (ticks[1][0] - ticks[0][0]) / (high - low) if len(ticks) > 1 else room
+    every = math.ceil(size / max(apart, 1e-3))
     zero = next((k for k, tick in enumerate(ticks) if tick[1] == "0"), 0)
     ticks = ticks[zero % every :: every]
-    axes.set_xticks([x for x, _ in ticks], [text for _, text in ticks])
-    axes.set_xlabel(THETA)
-    axes.set_ylabel(VELOCITY, labelpad=2)
+    places, labels = [shift + at for at, _ in ticks], [text for _, text in ticks]
+    name = plane.shifted(name, shift)
+    if which == "x":
+        axes.set_xticks(places, labels)
+        axes.set_xlabel(name)
+    else:
+        axes.set_yticks(places, labels)
+        axes.set_ylabel(name, labelpad=2)
+
+
+def widest(low: float, high: float, *, angle: bool = False) -> float:
+    """Return the width of the longest label that an axis has, in inches."""
+    return max(inches(text) for _, text in plane.short_ticks(low, high, angle=angle)[1])
+
+
+def inches(text: str, size: float | None = None, *, bold: bool = False) -> float:
+    """Return the width of a line of text in inches, in the size of ticks where none is given."""
+    if not text.strip():
+        return 0.0
+    weight = "bold" if bold else "normal"
+    font = FontProperties(family=RC["font.sans-serif"], weight=weight)
+    path = TextPath((0, 0), text, size=size or RC["xtick.labelsize"], prop=font)
+    return float(path.get_extents().width) / 72
 
 
 def colour_bar(
@@ -98,6 +154,17 @@ def colour_bar(
     bar.ax.yaxis.set_minor_locator(NullLocator())
     bar.outline.set_linewidth(0.7)
     bar.set_label(text, labelpad=4)
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return ticks 1, 2, 5, 10, ... between the ends; more of them where these are close."""
+    for steps in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
+        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        ticks = [m * 10.0**k for k in powers for m in steps]
+        inside = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
+        if len(inside) >= TICKS:
+            return inside
+    return sorted({round(x) for x in np.linspace(low, high, 5)})
 
 
 def colour_map(name: str) -> Colormap:

@@ -91,13 +91,9 @@ def _history(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     low, high = axes.get_ylim()
     if high - low < FLAT:
         axes.set_ylim(low - FLAT, high + FLAT)
-    ticks = plane.angle_ticks(*axes.get_ylim())
-    axes.set_yticks([y for y, _ in ticks], [text for _, text in ticks])
+    style.scale(axes, "y", axes.get_ylim(), style.THETA, angle=True)
     if time[-1] > time[0]:
-        ticks = plane.plain_ticks(time[0], time[-1])
-        axes.set_xticks([x for x, _ in ticks], [text for _, text in ticks])
-    axes.set_xlabel("\N{GREEK SMALL LETTER TAU}")
-    axes.set_ylabel(style.THETA)
+        style.scale(axes, "x", (float(time[0]), float(time[-1])), "\N{GREEK SMALL LETTER TAU}")
     axes.set_title(mark + "time history")
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +23,7 @@ __all__ = [
     "parameters",
     "refuse_lists",
     "reliable",
+    "settles",
     "unit",
     "warning",
     "what",
@@ -65,6 +67,11 @@ def refuse_lists(dataset: xr.Dataset) -> None:
     """
     if dataset.attrs.get("kind") == "basins" and "theta" not in dataset.dims:
         raise InputError("a list of starts is no map: only basins on a grid can be drawn")
+
+
+def settles(dataset: xr.Dataset) -> bool:
+    """Whether any start settles on an attractor."""
+    return int(dataset["settle_periods"].max()) >= 0
 
 
 def warning(dataset: xr.Dataset) -> str:
@@ -121,7 +128,7 @@ def layers(dataset: xr.Dataset) -> tuple[str, ...]:
     else:
         order = ("settle", "turns", "labels", "exponent")
     present = [layer for layer in order if VARIABLES[layer] in dataset]
-    if "settle" in present and int(dataset["settle_periods"].max()) < 0:
+    if "settle" in present and not settles(dataset):
         present.remove("settle")
     return tuple(present)
 
@@ -143,13 +150,17 @@ def named(dataset: xr.Dataset, layer: str) -> str:
 
 def what(dataset: xr.Dataset, layer: str) -> str:
     """Return what a layer shows, in words, for a title."""
-    periods = dataset.attrs.get("layer_periods", "N")
-    turns = f"after {periods} periods" if finite_time(dataset) else "until settled"
+    periods = counted(int(dataset.attrs.get("layer_periods", 0)), "period")
+    turns = "until settled"
+    if finite_time(dataset):
+        turns = f"after {periods}"
+    elif not settles(dataset):
+        turns = f"after {counted(int(dataset.attrs['max_periods']), 'period')}"
     return {
         "labels": "basins of attraction",
         "settle": "settle time",
         "turns": f"net turns {turns}",
-        "exponent": f"finite-time exponent over {periods} periods",
+        "exponent": f"finite-time exponent over {periods}",
     }[layer]
 
 

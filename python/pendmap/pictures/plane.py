@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,16 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["angle_ticks", "broken_at_wrap", "cell_edges", "copies", "plain_ticks", "thinned"]
+__all__ = [
+    "angle_ticks",
+    "broken_at_wrap",
+    "cell_edges",
+    "copies",
+    "plain_ticks",
+    "shifted",
+    "short_ticks",
+    "thinned",
+]
 
 Floats = npt.NDArray[np.float64]
 Ticks = list[tuple[float, str]]
@@ -19,6 +29,15 @@ TWO_PI = 2.0 * math.pi
 
 FEWEST, MOST = 2.0, 6.5
 """Steps between ticks that a range of angles may have."""
+
+FURTHEST = 1000
+"""Multiples of pi beyond which angles are labelled with plain numbers."""
+
+NARROW = 1e-4
+"""Width of a window, relative to its distance from 0, under which its ticks have an offset."""
+
+MOST_COPIES = 100
+"""Copies of a point, 2 pi apart, that are told apart in a window."""
 
 
 def cell_edges(axis: xr.DataArray) -> tuple[float, float]:
@@ -45,7 +64,12 @@ def thinned(array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
 
 
 def copies(points: Floats, low: float, high: float) -> Floats:
-    """Return the points, shape (m, 2), and their copies 2 pi k further that are in [low, high]."""
+    """Return the points, shape (m, 2), and their copies 2 pi k further that are in [low, high].
+
+    None are returned where there would be more than a hundred of each.
+    """
+    if high - low > MOST_COPIES * TWO_PI:
+        return np.empty((0, 2))
     slack = 1e-9 * max(1.0, abs(low), abs(high))
     first = math.floor((low - math.pi) / TWO_PI)
     last = math.ceil((high + math.pi) / TWO_PI)
@@ -55,7 +79,9 @@ def copies(points: Floats, low: float, high: float) -> Floats:
 
 
 def angle_ticks(low: float, high: float) -> Ticks:
-    """Return places and labels of ticks at multiples of pi; plain numbers in a small window."""
+    """Return a handful of ticks at multiples of pi; plain numbers in a small or far window."""
+    if max(abs(low), abs(high)) > FURTHEST * math.pi:
+        return plain_ticks(low, high)
     for quarters in (2**k for k in range(12)):
         step = quarters * math.pi / 4
         if FEWEST <= (high - low) / step <= MOST:
@@ -67,12 +93,30 @@ def angle_ticks(low: float, high: float) -> Ticks:
 def plain_ticks(low: float, high: float) -> Ticks:
     """Return about five round places between ``low`` and ``high`` with their labels."""
     raw = (high - low) / 6
+    size = max(abs(low), abs(high))
+    if not (size * 1e-15 < raw < math.inf) or raw < sys.float_info.min:
+        return [(low, _written(low, 17))]  # narrower than numbers can tell apart
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(m * power for m in (1, 2, 2.5, 5, 10) if m * power >= raw * 0.999)
     first, last = _between(low, high, step)
-    return [
-        (k * step, f"{k * step:.6g}".replace("-", "\N{MINUS SIGN}")) for k in range(first, last + 1)
-    ]
+    digits = min(17, max(6, 3 + math.floor(math.log10(size / step))))
+    return [(k * step, _written(k * step, digits)) for k in range(first, last + 1)]
+
+
+def short_ticks(low: float, high: float, *, angle: bool) -> tuple[float, Ticks]:
+    """Return what is subtracted from an axis, usually 0, and the ticks of the difference."""
+    shift = _offset(low, high)
+    make = angle_ticks if angle and not shift else plain_ticks
+    return shift, make(low - shift, high - shift)
+
+
+def shifted(name: str, shift: float) -> str:
+    """Return an axis's name, symbol and unit with a blank between, with what is subtracted."""
+    if not shift:
+        return name
+    symbol, _, unit = name.partition(" ")
+    sign = "\N{MINUS SIGN}" if shift > 0 else "+"
+    return f"{symbol} {sign} {abs(shift):.15g} {unit}".strip()
 
 
 def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
@@ -100,6 +144,22 @@ def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
     gap = np.full_like(edge, np.nan)
     extra = np.stack([edge, crossing, gap, gap, -edge, crossing], axis=1).reshape(-1, 2)
     return np.insert(curve, np.repeat(at + 1, 3), extra, axis=0)
+
+
+def _offset(low: float, high: float) -> float:
+    """Return a round number near a window that is narrow for its distance from 0; else 0.
+
+    Ticks of such a window are short as differences from it, and too long as they are.
+    """
+    width = high - low
+    if not 0.0 < width < NARROW * max(abs(low), abs(high)):
+        return 0.0
+    unit = 10.0 ** math.ceil(math.log10(width))
+    return unit * round(low / unit)
+
+
+def _written(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _between(low: float, high: float, step: float) -> tuple[int, int]:

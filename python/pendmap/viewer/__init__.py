@@ -17,6 +17,7 @@ from pendmap.viewer.window import (
     NotARecordingError,
     RecordingNotFoundError,
     ViewerError,
+    check_display,
     open_viewer,
 )
 
@@ -31,6 +32,7 @@ __all__ = [
     "NotARecordingError",
     "RecordingNotFoundError",
     "ViewerError",
+    "check_display",
     "open_viewer",
     "record",
 ]

@@ -154,20 +154,24 @@ class Frame:
         lines: list[list[list[float]]] = [[[0, 0], [w, 0], [w, h], [0, h], [0, 0]]]
         places: list[list[float]] = []
         labels: list[str] = []
-        for value, label in plane.angle_ticks(*self.x):
-            at = w * (value - self.x[0]) / (self.x[1] - self.x[0])
+        (across, along), (up, rising) = (
+            plane.short_ticks(*self.x, angle=True),
+            plane.short_ticks(*self.y, angle=False),
+        )
+        for value, label in along:
+            at = w * (across + value - self.x[0]) / (self.x[1] - self.x[0])
             lines.append([[at, h], [at, h + 12]])
             places.append([at, h + 20])
             labels.append(label)
-        for value, label in plane.plain_ticks(*self.y):
-            at = h * (self.y[1] - value) / (self.y[1] - self.y[0])
+        for value, label in rising:
+            at = h * (self.y[1] - up - value) / (self.y[1] - self.y[0])
             lines.append([[-12, at], [0, at]])
             places.append([-55, at - 22])
             labels.append(label)
         places += [[w / 2, h + 75], [-135, h / 2 - 22]]
         labels += [
-            "\N{GREEK SMALL LETTER THETA} (rad)",
-            "d\N{GREEK SMALL LETTER THETA}/d\N{GREEK SMALL LETTER TAU}",
+            plane.shifted("\N{GREEK SMALL LETTER THETA} (rad)", across),
+            plane.shifted("d\N{GREEK SMALL LETTER THETA}/d\N{GREEK SMALL LETTER TAU}", up),
         ]
         thin = rr.Radius.ui_points(0.75)
         stream.log(

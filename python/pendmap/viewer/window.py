@@ -19,6 +19,7 @@ __all__ = [
     "NotARecordingError",
     "RecordingNotFoundError",
     "ViewerError",
+    "check_display",
     "open_viewer",
 ]
 
@@ -28,6 +29,8 @@ MAGIC = b"RRF2"
 PATIENCE = 2.0
 """Seconds in which a viewer that cannot start is expected to say so."""
 
+
+_NO_DISPLAY = "there is no display (DISPLAY is not set)"
 
 _RUNNING: list[subprocess.Popen[bytes]] = []  # viewers left running, lest they count as forgotten
 
@@ -73,7 +76,8 @@ def open_viewer(path: str | os.PathLike[str]) -> int:
         If the viewer is not installed or ends at once; the message carries what it said.
     """
     file = _checked(Path(path))
-    _check_display(file)
+    if not _display():
+        raise NoDisplayError(_elsewhere(file, _NO_DISPLAY))
     command = [str(_program()), "--bind", "127.0.0.1", "--port", str(_free_port()), str(file)]
     with tempfile.TemporaryFile() as said:
         viewer = subprocess.Popen(  # noqa: S603 (our own viewer, a file that was checked)
@@ -104,11 +108,28 @@ def _checked(file: Path) -> Path:
     return file.resolve()
 
 
-def _check_display(file: Path) -> None:
-    if not sys.platform.startswith("linux"):
-        return
-    if not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")):
-        raise NoDisplayError(_elsewhere(file, "there is no display (DISPLAY is not set)"))
+def check_display() -> None:
+    """Refuse to go on where no window can be opened.
+
+    Raises
+    ------
+    NoDisplayError
+        If there is no display.
+    ViewerError
+        If the viewer is not installed.
+    """
+    if not _display():
+        raise NoDisplayError(
+            f"{_NO_DISPLAY}; leave it out, copy the .rrd to a computer with a screen"
+            " and open it there with 'pendmap view'"
+        )
+    _program()
+
+
+def _display() -> bool:
+    """Whether there seems to be a display; that it answers is seen when the viewer starts."""
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
+    return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names)
 
 
 def _elsewhere(file: Path, why: str) -> str:

@@ -1,0 +1,144 @@
+"""What Python callers hand over: refused by name, or taken as it was meant."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import pendmap
+from pendmap import Axis, Grid, InputError, Pendulum
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.mark.parametrize("p", [np.float32(0.5), np.int64(1), np.array(0.5), Fraction(1, 2), 1])
+def test_any_real_number_is_a_parameter(p: Any) -> None:  # noqa: ANN401
+    pendulum = Pendulum(p=p)
+    assert type(pendulum.p) is float
+    assert pendulum.p == p
+
+
+@pytest.mark.parametrize(
+    "p", [10**400, 10**5000, 1j, np.True_, None, [1.0], "1" * 500], ids=lambda p: type(p).__name__
+)
+def test_what_is_no_parameter_is_refused_on_one_short_line(p: Any) -> None:  # noqa: ANN401
+    with pytest.raises(InputError, match=r"p is .*: allowed is ") as error:
+        Pendulum(p=p)
+    assert len(str(error.value)) < 150
+
+
+@pytest.mark.parametrize(
+    "axis", [(0, 1, 2.5), (0, 1, True), (0, 1, "5"), ("0", 1, 5), (-1e308, 1e308, 5)]
+)
+def test_axes_that_are_none_are_refused(axis: tuple[Any, Any, Any]) -> None:
+    with pytest.raises(InputError, match="allowed"):
+        Axis(*axis)
+
+
+def test_axes_may_be_tuples_and_counts_numpys() -> None:
+    grid = Grid((0, 1, 5), (np.float32(0), 1, np.int32(5)))  # type: ignore[arg-type]
+    assert grid == Grid(Axis(0, 1, 5), Axis(0, 1, 5))
+    assert type(grid.velocity.count) is int
+    with pytest.raises(InputError, match=r"velocity is 5: allowed is an Axis"):
+        Grid(Axis(0, 1, 5), 5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ({"grid": 100}, r"grid is 100: allowed is a Grid, like Grid\.square\(100\)"),
+        ({"pendulum": 0.6}, "pendulum is 0.6: allowed is a Pendulum"),
+        ({"threads": 1.5}, "threads is 1.5: allowed is a whole number from 1 to 256"),
+        ({"threads": 1000}, "threads is 1000: allowed is a whole number from 1 to 256"),
+        ({"progress": 3}, "progress is 3: allowed is a function"),
+        ({"tol": "a"}, "tol is 'a': allowed is a number"),
+        ({"max_periods": 10**14}, "max_periods is 1.*: allowed is a whole number from 1 to 2147"),
+        ({"layer_periods": 0}, "layer_periods is 0"),
+        ({"seed": 0.5}, "seed is 0.5"),
+        ({"check": "no"}, "check is 'no': allowed is True or False"),
+    ],
+)
+def test_basins_names_what_it_refuses(words: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        pendmap.basins(**({"pendulum": Pendulum(), "grid": Grid.square(5)} | words))
+
+
+def test_basins_takes_whole_numbers_of_numpy() -> None:
+    numbers = {name: np.int64(2) for name in ("max_periods", "threads", "seed")}
+    result = pendmap.basins(Pendulum(), Grid.square(np.int16(4)), **numbers)  # type: ignore[arg-type]
+    assert result.attrs["max_periods"] == result.attrs["threads"] == result.attrs["seed"] == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ({"theta": "pi"}, "theta is 'pi': allowed is a number"),
+        ({"until": None}, "until is None"),
+        ({"samples": 2.5}, "samples is 2.5"),
+        ({"lyapunov": 1}, "lyapunov is 1"),
+    ],
+)
+def test_simulate_names_what_it_refuses(words: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        pendmap.simulate(
+            **({"pendulum": Pendulum(), "theta": 1, "velocity": 0, "until": 9} | words)
+        )
+
+
+@pytest.mark.parametrize("function", [pendmap.basins_of, pendmap.advance])
+@pytest.mark.parametrize("theta", ["pi", ["a", "b"], 1.0, [[1.0, 2.0]], [math.nan, 1.0], [1.0]])
+def test_lists_of_starts_are_refused(function: Any, theta: Any) -> None:  # noqa: ANN401
+    rest = (1,) if function is pendmap.advance else ()
+    with pytest.raises(InputError, match="theta"):
+        function(Pendulum(), theta, [0.0, 0.0], *rest)
+
+
+def test_only_results_are_saved(tmp_path: Path) -> None:
+    for other in (xr.Dataset({"a": 1}), {"a": 1}):
+        with pytest.raises(InputError, match="not a result of pendmap"):
+            pendmap.save(other, tmp_path / "f.nc")  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
+# What the summaries say
+
+
+def test_an_exponent_is_that_of_its_stretch() -> None:
+    pendulum = Pendulum(p=1.7)
+    run = pendmap.simulate(pendulum, math.pi / 2, 0, 200, lyapunov=True)
+    assert run.attrs["exponent_from"] == pytest.approx(20, abs=0.2)
+    assert 190 < run.attrs["exponent_to"] <= 200
+    for words in ("of this stretch, tau = 19.9295 to 199.589", "Transients are included"):
+        assert words in run.attrs["summary"]
+
+
+def test_a_tolerance_that_was_missed_is_said_to_be() -> None:
+    missed = pendmap.simulate(Pendulum(), 1e9, 0, 10, tol=1e-6)
+    assert missed.attrs["reached_error"] > 1e-6
+    assert "THE TOLERANCE 1e-06 WAS NOT REACHED" in missed.attrs["summary"]
+    assert "TOLERANCE" not in pendmap.simulate(Pendulum(), 1, 0, 10).attrs["summary"]
+
+
+def test_a_map_on_which_nothing_is_decided_says_no_more_than_that() -> None:
+    result = pendmap.basins(Pendulum(), Grid.square(8), max_periods=1)
+    summary = result.attrs["summary"]
+    assert "100 % of the starts undecided within 1 period; --max-periods raises" in summary
+    for words in ("agree", "sampled labels", "1 periods"):
+        assert words not in summary
+    one = pendmap.basins(Pendulum(), Grid(Axis(0.5, 0.6, 1), Axis(0, 1, 1)), threads=1)
+    assert "\n1 start, " in one.attrs["summary"]
+    assert "on 1 thread (" in one.attrs["summary"]
+
+
+def test_a_bound_that_was_shortened_beside_chaos_is_explained() -> None:
+    pendulum = Pendulum(omega=0.87)
+    result = pendmap.basins(pendulum, Grid.square(30), check=False)
+    assert result.attrs["max_periods"] < 4000
+    assert result.attrs["undecided"] > 0
+    assert "beside chaos ten times the longest settling" in result.attrs["summary"]

@@ -1,0 +1,106 @@
+"""Figures at the sizes and windows that a user may ask for: ticks, titles, least sizes."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from typing import Any
+
+import pytest
+from matplotlib import rc_context
+from matplotlib.text import Text
+
+import pendmap
+import synthetic
+from pendmap import InputError
+from pendmap.figures import basins, style
+from pendmap.pictures import layers, plane
+
+UNRELIABLE: dict[str, Any] = {"labels_reliable": 0, "unreliable": 0.207}
+MAPS = {
+    "usual": synthetic.painted(),
+    "unreliable": synthetic.painted(**UNRELIABLE),
+    "torque": synthetic.painted(velocity=(-10.0, 10.0), p=0.0, torque=0.5),
+    "thin": synthetic.painted(theta=(0.0, 1e-12), velocity=(-1.0, 1.0), **UNRELIABLE),
+    "far": synthetic.painted(theta=(1e6, 1e6 + 1.0), velocity=(-1.0, 1.0)),
+    "huge": synthetic.painted(theta=(1e300, 2e300), velocity=(-1.0, 1.0)),
+    "flat": synthetic.painted(theta=(-10.0, 10.0), velocity=(-2.0, 2.0), **UNRELIABLE),
+    "chaos": synthetic.chaotic(cells=16, periods=3),
+}
+HUGE = (1.0, 1.0)
+
+
+def figure_of(dataset: Any, size: tuple[float, float] | None = None) -> Any:  # noqa: ANN401
+    with rc_context(style.RC):
+        figure = basins.figure(dataset, layer=None, size=size, dpi=100.0, colormap=None)
+        figure.canvas.draw()
+    return figure
+
+
+def least_size(dataset: Any) -> tuple[float, float]:  # noqa: ANN401
+    with pytest.raises(InputError, match="at least") as error:
+        figure_of(dataset, HUGE)
+    width, height = re.findall(r"([\d.]+) x ([\d.]+) inches", str(error.value))[0]
+    return float(width), float(height)
+
+
+@pytest.mark.parametrize("least", [False, True], ids=["own size", "least size"])
+@pytest.mark.parametrize("name", MAPS)
+def test_every_word_has_its_place(name: str, *, least: bool) -> None:
+    figure = figure_of(MAPS[name], least_size(MAPS[name]) if least else None)
+    whole = figure.bbox
+    panels = [axes.get_window_extent() for axes in figure.axes]
+    boxes = []
+    for text in figure.findobj(Text):
+        if not text.get_visible() or not text.get_text().strip():
+            continue
+        box = text.get_window_extent()
+        assert whole.x0 <= box.x0, text.get_text()
+        assert box.x1 <= whole.x1, text.get_text()
+        assert whole.y0 <= box.y0, text.get_text()
+        assert box.y1 <= whole.y1, text.get_text()
+        boxes += [(text.get_text(), box)]
+        assert not any(meet(box, panel) for panel in panels), text.get_text()
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        assert not meet(a, b), (one, other)
+
+
+def meet(one: Any, other: Any) -> bool:  # noqa: ANN401
+    wide = min(one.x1, other.x1) - max(one.x0, other.x0)
+    high = min(one.y1, other.y1) - max(one.y0, other.y0)
+    return bool(wide > 1 and high > 1)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [
+        (0.0, 1e-12),
+        (1e300, 2e300),
+        (-1e307, 1e307),
+        (1e6, 1e6 + 1),
+        (1e17, 1e17 + 64),
+        (0.0, 1e-322),
+        (-3e5, 3e5),
+        (-math.pi, math.pi),
+    ],
+)
+def test_there_is_a_handful_of_ticks_whatever_the_window(low: float, high: float) -> None:
+    shift, ticks = plane.short_ticks(low, high, angle=True)
+    assert 1 <= len(ticks) <= 8
+    assert len({label for _, label in ticks}) == len(ticks)
+    assert all(len(label) <= 8 for _, label in ticks)
+    slack = 1e-6 * (high - low)
+    assert all(low - slack <= shift + at <= high + slack for at, _ in ticks)
+
+
+def test_copies_are_left_out_where_nobody_could_tell_them_apart() -> None:
+    points = synthetic.USUAL[1].points
+    assert len(plane.copies(points, -10 * math.pi, 10 * math.pi)) == 10
+    assert len(plane.copies(points, 1e300, 2e300)) == 0
+
+
+def test_what_nothing_settles_on_is_not_titled_so() -> None:
+    result = pendmap.basins(pendmap.Pendulum(), pendmap.Grid.square(8), max_periods=1)
+    assert layers.what(result, "turns") == "net turns after 1 period"
+    assert result.net_turns.attrs["long_name"] == "net turns after 1 period"
