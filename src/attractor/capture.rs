@@ -35,7 +35,7 @@ impl Rests {
 }
 
 /// At the edge of a set at rest a pendulum creeps into it, ever more slowly, and never arrives: held
-/// at two periods' ends running, nearer at the second, and within this part of the friction of being
+/// in two periods running, nearer in the second, and within this part of the friction of being
 /// held for ever, it counts as at rest. Held states form a line, on which their map is monotone.
 const CREEPING: f64 = 0.05;
 
@@ -199,7 +199,7 @@ impl<'a> Watch<'a> {
             }
             if self.job.strobe.friction {
                 for lane in 0..width {
-                    if self.block.kick[lane] == 0.0 && self.at_rest(lane) {
+                    if !self.block.held_at[lane].is_nan() && self.at_rest(lane) {
                         occupied -= usize::from(!self.refill(lane));
                     }
                 }
@@ -273,7 +273,7 @@ impl<'a> Watch<'a> {
     /// been handed over.
     #[inline(never)]
     fn at_rest(&mut self, lane: usize) -> bool {
-        let theta = self.theta(lane);
+        let theta = self.block.held_at[lane] * PI;
         let (Some(mut tenant), Some(rest)) = (self.tenants[lane], self.job.traps.rests.of(theta))
         else {
             return false;
@@ -285,7 +285,7 @@ impl<'a> Watch<'a> {
             clock + 1 == self.clock && excess < before && excess < CREEPING * limit
         });
         if excess <= 0.0 || creeps {
-            let end = (theta, 0.0, self.block.turns[lane], self.clock);
+            let end = (self.theta(lane), self.velocity(lane), self.block.turns[lane], self.clock);
             self.hand_over(tenant, Fate::Captured(rest), end);
             return true;
         }

@@ -41,6 +41,9 @@ pub struct Block {
     pub kick: Vec<f64>,
     /// Whole turns taken off.
     pub turns: Vec<f64>,
+    /// Angles over pi at which friction has held a trajectory during the last period; NaN where it
+    /// has not.
+    pub held_at: Vec<f64>,
     held: Vec<Held>,
     queue: Vec<Ticket>,
 }
@@ -54,6 +57,7 @@ impl Block {
             half_turns: zeros.clone(),
             kick: zeros.clone(),
             turns: zeros,
+            held_at: vec![f64::NAN; width],
             held: Vec::new(),
             queue: Vec::new(),
         }
@@ -226,6 +230,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
     fn begin(&self, block: &mut Block) {
         block.held.clear();
         block.queue.clear();
+        block.held_at.fill(f64::NAN);
         for lane in 0..block.kick.len() {
             if block.kick[lane] != 0.0 {
                 continue;
@@ -236,6 +241,9 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 // Let go at once.
                 Standstill::Moves(sense) => Held { lane, half_turns, until: 0.0, sense },
             };
+            if held.until > 0.0 {
+                block.held_at[lane] = half_turns;
+            }
             block.held.push(held);
         }
     }
@@ -428,6 +436,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                     let half_turns = theta * FRAC_1_PI;
                     block.half_turns[lane] = half_turns;
                     block.kick[lane] = 0.0;
+                    block.held_at[lane] = half_turns;
                     block.held.push(Held { lane, half_turns, until, sense });
                 }
             }

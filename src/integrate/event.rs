@@ -57,7 +57,7 @@ pub enum Progress {
         /// Velocity.
         velocity: f64,
     },
-    /// It has stopped and is held.
+    /// It has stopped and is held beyond the step's end.
     Held {
         /// Angle, rad.
         theta: f64,

@@ -1,12 +1,13 @@
 //! Coulomb friction in lanes: turns, sticks and releases, against reference values.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::distance;
-use pendmap::model::Pendulum;
+use pendmap::integrate::flow::Flow;
+use pendmap::integrate::{State, Strobe};
+use pendmap::model::{Effect, Kind, Pendulum};
 
-use crate::support::{driven, path, paths, spread};
+use crate::support::{advanced, basins_on_plane, bits, columns, driven, path, paths, spread};
 use crate::truths::{list, number, truths};
 
 fn rubbing(gamma: f64, p: f64, omega: f64, theta_r: f64) -> Pendulum {
@@ -30,23 +31,121 @@ fn sticks_and_slips_under_drive_end_where_they_should() {
     }
 }
 
+/// Starts that cover the plane, and the same after five periods by the reference integrator.
+fn references(pendulum: &Pendulum, count: usize) -> (Vec<State>, Vec<State>) {
+    let starts = spread(count, PI, 3.0);
+    let flow = Flow::new(pendulum);
+    let ends = starts.iter().map(|s| flow.carry(*s, 0.0, 5.0 * pendulum.period()).state).collect();
+    (starts, ends)
+}
+
 #[test]
-fn timing() {
-    for (gamma, p, omega, theta_r) in [(0.02, 1.0, 2.0, 0.05), (0.1, 1.5, 0.87, 0.2)] {
-        for th in [0.0, theta_r] {
-            let pendulum = rubbing(gamma, p, omega, th);
-            let steps = if omega > 1.0 { 33 } else { 70 };
-            let strobe = Strobe::new(&pendulum, steps, path());
-            let states = spread(15360, 3.14, 3.0);
-            let mut theta: Vec<f64> = states.iter().map(|s| s[0]).collect();
-            let mut velocity: Vec<f64> = states.iter().map(|s| s[1]).collect();
-            let mut turns = vec![0.0; states.len()];
-            let begin = std::time::Instant::now();
-            strobe.advance(&mut theta, &mut velocity, &mut turns, 20).expect("lengths");
-            let ns = begin.elapsed().as_nanos() as f64 / 15360.0 / 20.0;
-            let stuck = velocity.iter().filter(|v| **v == 0.0).count();
-            let bad = velocity.iter().filter(|v| !v.is_finite()).count();
-            eprintln!("{gamma} {p} {omega} {th}: {ns:.1} ns, stuck {stuck} bad {bad}");
+fn lanes_agree_with_the_reference_integrator() {
+    let cases = [(0.02, 1.0, 2.0, 0.05, 60), (0.1, 1.5, 0.87, 0.2, 130)];
+    for (gamma, p, omega, theta_r, steps) in cases {
+        let pendulum = rubbing(gamma, p, omega, theta_r);
+        let (starts, ends) = references(&pendulum, 1000);
+        let strobe = Strobe::new(&pendulum, steps, path());
+        let mut errors: Vec<f64> = advanced(&strobe, &starts, 5)
+            .iter()
+            .zip(&ends)
+            .map(|(found, truth)| distance(*found, *truth))
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        let (median, high) = (errors[500], errors[990]);
+        let stuck = ends.iter().filter(|s| s[1] == 0.0).count();
+        assert!(median < 1e-9, "{pendulum:?}: median {median:e}");
+        assert!(high < 1e-6, "{pendulum:?}: 99th percentile {high:e}");
+        assert!(stuck > 0, "{pendulum:?}: nothing stuck");
+    }
+}
+
+#[test]
+fn one_at_a_time_gives_the_same_bits() {
+    let drag = Effect::new(Kind::QuadraticDrag, &[0.05]).expect("in range");
+    let ripple = Effect::new(Kind::BearingHarmonic, &[0.1, 3.0, 0.4]).expect("in range");
+    let base = rubbing(0.05, 1.3, 1.4, 0.1);
+    let models = [
+        base.clone(),
+        base.clone().with_effect(drag).expect("once"),
+        base.with_effect(ripple).expect("once"),
+    ];
+    for path in paths() {
+        for pendulum in &models {
+            let strobe = Strobe::new(pendulum, 40, path);
+            let states = spread(200, PI, 3.0);
+            let run = |singly: bool| {
+                let (mut theta, mut velocity) = columns(&states);
+                let mut turns = vec![0.0; states.len()];
+                let (a, b, c) = (&mut theta[..], &mut velocity[..], &mut turns[..]);
+                if singly {
+                    strobe.advance_singly(a, b, c, 4).expect("equal lengths");
+                } else {
+                    strobe.advance(a, b, c, 4).expect("equal lengths");
+                }
+                [bits(&theta), bits(&velocity), bits(&turns)]
+            };
+            assert_eq!(run(false), run(true), "{path}, {pendulum:?}");
         }
     }
+}
+
+#[test]
+fn every_route_agrees_with_the_reference_integrator() {
+    let effect = |kind: Kind, values: &[f64]| Effect::new(kind, values).expect("in range");
+    let drag = effect(Kind::QuadraticDrag, &[0.08]);
+    let ripple = effect(Kind::BearingHarmonic, &[0.15, 4.0, 0.4]);
+    let smooth = driven(0.1, 0.6, 2.0);
+    let rough = rubbing(0.1, 0.6, 2.0, 0.04);
+    let with = |base: &Pendulum, effects: &[Effect]| {
+        effects.iter().fold(base.clone(), |p, e| p.with_effect(*e).expect("once"))
+    };
+    for pendulum in [
+        with(&smooth, &[ripple]),
+        with(&smooth, &[drag]),
+        with(&smooth, &[drag, ripple]),
+        with(&rough, &[ripple]),
+        with(&rough, &[drag]),
+        with(&rough, &[drag, ripple]),
+    ] {
+        let (starts, ends) = references(&pendulum, 200);
+        let strobe = Strobe::new(&pendulum, 100, path());
+        for ((found, truth), start) in advanced(&strobe, &starts, 5).iter().zip(&ends).zip(&starts)
+        {
+            let error = distance(*found, *truth);
+            assert!(error < 1e-9, "{pendulum:?} from {start:?}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn orbits_with_friction_are_those_of_the_reference() {
+    for (kind, n, w) in [("rotation", 1, 1), ("oscillation", 2, 0)] {
+        for truth in list(&truths()["coulomb_forced"][kind]) {
+            let get = |key: &str| number(&truth[key]);
+            let pendulum = rubbing(get("gamma"), get("p"), get("omega"), get("theta_r"));
+            let map = basins_on_plane(&pendulum, 60);
+            let known = [get("theta"), get("v")];
+            let error = map
+                .attractors
+                .iter()
+                .filter(|a| (a.n, a.w) == (Some(n), Some(w)))
+                .flat_map(|a| &a.points)
+                .map(|p| distance(*p, known))
+                .fold(f64::INFINITY, f64::min);
+            assert!(error < 1e-9, "{kind} at {truth}: {error:e}");
+            assert_eq!(map.share(0) + map.share(-1), 0.0, "{kind} at {truth}");
+        }
+    }
+}
+
+#[test]
+fn what_creeps_at_the_edge_is_at_rest() {
+    // Here every start ends at rest, the slowest by creeping.
+    let map = basins_on_plane(&rubbing(0.1, 1.5, 0.87, 0.2), 60);
+    let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
+    assert!(names.contains(&"rest"), "{names:?}");
+    assert_eq!(map.share(0), 0.0);
+    let rest = names.iter().position(|n| *n == "rest").expect("there");
+    assert!(map.attractors[rest].multipliers.is_empty());
 }
