@@ -6,6 +6,7 @@
 //! - [`tangent`]: numbers with derivatives, for the variational equations
 //! - [`course`], [`dense`], [`turning`], [`stick`], [`flight`]: one trajectory of any model, adaptive,
 //!   with exact turns, sticks and releases
+//! - [`sample`], [`sensitivity`]: the same at chosen times, with derivatives by parameters and start
 //! - [`flow`]: the stroboscopic map by it, with its derivative
 //! - [`stroboscopic`]: many trajectories, one forcing period at a time
 //! - [`accuracy`]: how many steps a tolerance asks for
@@ -17,7 +18,9 @@ pub mod dense;
 pub mod dop853;
 pub mod flight;
 pub mod flow;
+pub mod sample;
 pub mod schedule;
+pub mod sensitivity;
 pub mod step;
 pub mod stick;
 pub mod stroboscopic;
