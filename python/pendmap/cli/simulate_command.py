@@ -52,12 +52,11 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "t": a["until"],
         "theta": float(dataset["theta"].values[-1]),
         "velocity": float(dataset["velocity"].values[-1]),
-        # A constant torque and viscous damping never hold a pendulum fast.
-        "stuck": False,
+        "stuck": bool(a["stuck"]),
         "turns": a["turns"],
         "reached_error": a["reached_error"],
         "end_error": a["end_error"],
     }
-    if "exponent" in a:
-        result |= {"exponent": a["exponent"], "stderr": a["exponent_stderr"]}
+    if a["lyapunov"]:
+        result |= {"exponent": a.get("exponent"), "stderr": a.get("exponent_stderr")}
     return result
