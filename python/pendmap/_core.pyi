@@ -18,7 +18,7 @@ __all__ = [
 
 __version__: str
 
-_Parameters: TypeAlias = tuple[float, float, float, float, float]
+_Parameters: TypeAlias = tuple[float, float, float, float, float, float]
 _Axis: TypeAlias = tuple[float, float, int]
 _Floats: TypeAlias = NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int, int], object]

@@ -91,6 +91,7 @@ def complete(
         "omega": pendulum.omega,
         "phase": pendulum.phase,
         "torque": pendulum.torque,
+        "theta_r": pendulum.theta_r,
         "section": "tau = 0 mod T, T = 2 pi / omega (2 pi without drive), at the drive's phase",
         "tol": choices["tol"],
         "reached_error": raw["reached_error"],

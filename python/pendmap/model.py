@@ -20,8 +20,9 @@ __all__ = ["PRESETS", "Pendulum"]
 class Pendulum:
     """The parametrically excited pendulum, without dimensions.
 
-    ``th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque`` with ``tau = w0 t``,
-    ``w0 = sqrt(g / l)``; ``th = 0`` hangs down.
+    ``th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque - theta_r sign(th')`` with
+    ``tau = w0 t``, ``w0 = sqrt(g / l)``; ``th = 0`` hangs down. At rest it stays there while the
+    load, ``torque`` less the term with ``sin th``, is no greater than ``theta_r``.
 
     Any real number will do for a parameter, numpy's too; a float is kept.
 
@@ -37,6 +38,8 @@ class Pendulum:
         Phase of the drive at ``tau = 0``, rad.
     torque : float
         Constant torque over ``m l**2 w0**2``.
+    theta_r : float
+        Coulomb friction ``Tr / w0**2``; 0 or more.
 
     Raises
     ------
@@ -45,7 +48,7 @@ class Pendulum:
 
     References
     ----------
-    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eq. 1.2.
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eqs. 1.2 and 2.1.
     """
 
     gamma: float = 0.1
@@ -53,13 +56,15 @@ class Pendulum:
     omega: float = 2.0
     phase: float = 0.0
     torque: float = 0.0
+    theta_r: float = 0.0
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = checks.number(field.name, getattr(self, field.name))
             object.__setattr__(self, field.name, value)
-        if self.gamma < 0:
-            raise InputError(f"gamma is {self.gamma:g}: allowed is 0 or more")
+        for name in ("gamma", "theta_r"):
+            if getattr(self, name) < 0:
+                raise InputError(f"{name} is {getattr(self, name):g}: allowed is 0 or more")
         if self.omega <= 0:
             raise InputError(f"omega is {self.omega:g}: allowed is a number above 0")
 
@@ -69,9 +74,9 @@ class Pendulum:
         return math.tau if self.p == 0 else math.tau / self.omega
 
     @property
-    def parameters(self) -> tuple[float, float, float, float, float]:
-        """All five, in the order of the class."""
-        return (self.gamma, self.p, self.omega, self.phase, self.torque)
+    def parameters(self) -> tuple[float, float, float, float, float, float]:
+        """All six, in the order of the class."""
+        return (self.gamma, self.p, self.omega, self.phase, self.torque, self.theta_r)
 
     @property
     def title(self) -> str:
@@ -79,7 +84,8 @@ class Pendulum:
         shown = [("γ", self.gamma), ("p", self.p)]
         if self.p != 0:
             shown.append(("ω", self.omega))
-        shown += [(n, v) for n, v in (("φ", self.phase), ("torque", self.torque)) if v != 0]
+        others = (("φ", self.phase), ("torque", self.torque), ("θr", self.theta_r))
+        shown += [(name, value) for name, value in others if value != 0]
         return ", ".join(f"{name} = {value:g}" for name, value in shown)
 
     @classmethod
@@ -113,7 +119,7 @@ class Pendulum:
         if table.get("p", 0) != 0 and "omega" not in table:
             raise InputError(f"{path}: p without omega: a drive needs a frequency above 0")
         try:
-            return cls(**({"gamma": 0, "p": 0, "omega": 1, "phase": 0, "torque": 0} | table))
+            return cls(**({name: float(name == "omega") for name in names} | table))
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
 

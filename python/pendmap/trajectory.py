@@ -47,9 +47,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     until : float
         Last time, in units of ``1 / w0``; above 0.
     tol : float
-        The step is halved until that changes the state after 5 periods (or at the end, if that is
-        sooner) by no more than this, or until rounding or the smallest step allowed forbid more;
-        then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
+        The error of each step is tightened until a 16 times smaller one changes the state after 5
+        periods (or at the end, if that is sooner) by no more than this, or until rounding forbids
+        more; then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
         ``reached_error``, the difference at the end in ``end_error``.
     samples : int, optional
         Samples a period; 64 by default, fewer where that would be more than two million in all.
@@ -58,13 +58,15 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         standard error from the spread of 20 batches, the first tenth left out (``exponent_from``
         and ``exponent_to`` say from which tau to which). It is the exponent of an attractor only if
         the trajectory was on it all that time: a chaotic transient has a positive one, wherever it
-        ends. :func:`pendmap.basins` gives those of the attractors.
+        ends. :func:`pendmap.basins` gives those of the attractors. Sticking may leave none.
 
     Returns
     -------
     xarray.Dataset
         ``theta`` (not wrapped) and ``velocity`` over ``time``; ``section_theta`` (wrapped to
-        (-pi, pi]) and ``section_velocity`` over ``period``.
+        (-pi, pi]) and ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn,
+        stick, release, stuck for ever) and ``event_theta`` over ``event``, located to rounding. The
+        attribute ``stuck`` is 1 if friction holds the pendulum at the end.
 
     Raises
     ------
@@ -97,6 +99,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "section_theta": ("period", wrapped, {"units": "rad"}),
             "section_velocity": ("period", raw["velocity"][::samples], {"units": "1"}),
             "section_time": ("period", raw["time"][::samples], {"units": "tau"}),
+            "event_time": ("event", raw["event_time"], {"units": "1 / w0"}),
+            "event_kind": ("event", np.array(raw["event_kind"], dtype="U14")),
+            "event_theta": ("event", raw["event_theta"], {"units": "rad"}),
         },
         coords={
             "time": ("time", raw["time"], {"units": "1 / w0", "long_name": "tau"}),
@@ -112,6 +117,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "omega": pendulum.omega,
         "phase": pendulum.phase,
         "torque": pendulum.torque,
+        "theta_r": pendulum.theta_r,
         "theta0": theta,
         "velocity0": velocity,
         "until": until,
@@ -120,6 +126,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "end_error": raw["end_error"],
         "steps_per_period": raw["steps_per_period"],
         "turns": turns,
+        "stuck": int(raw["stuck"]),
+        "lyapunov": int(lyapunov),
         **_exponent(raw),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
@@ -153,8 +161,9 @@ def _summary(dataset: xr.Dataset) -> str:
             f"velocity = {velocity:.9g}."
         ),
         (
-            f"Halving the step changes the state by {a['reached_error']:.1e} after 5 periods and "
-            f"by {a['end_error']:.1e} at the end ({a['steps_per_period']} steps a period)."
+            f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
+            f"after 5 periods and by {a['end_error']:.1e} at the end ({a['steps_per_period']} steps "
+            "a period)."
         ),
     ]
     if not a["reached_error"] <= a["tol"]:
@@ -162,6 +171,10 @@ def _summary(dataset: xr.Dataset) -> str:
             f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding, or the smallest step allowed, "
             f"leaves {a['reached_error']:.1e}."
         )
+    if a["stuck"]:
+        kinds, times = dataset["event_kind"].values, dataset["event_time"].values
+        ever = " for ever" if kinds[-1] == "stuck for ever" else ""
+        lines.append(f"Friction holds it since tau = {times[-1]:.9g}{ever}.")
     if a["end_error"] > max(1e-3, a["tol"]):
         lines.append(
             "The end is not predictable at this length: read the motion, not its last state."

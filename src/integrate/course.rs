@@ -1,9 +1,11 @@
 //! What a single trajectory obeys, and how precisely it is followed.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::tangent::{Number, Tangent};
 use crate::model::effects::Action;
+use crate::model::recorded::Recorded;
 use crate::model::{Equation, Pendulum};
 
 /// The longest step over `tolerance^(1/8) / rate`, where `rate` is the greatest frequency of small
@@ -21,6 +23,7 @@ pub struct Course<N> {
     equation: Equation<N>,
     /// The same with plain numbers, for what has no derivative: when a stuck pendulum is released.
     plain: Equation<f64>,
+    recorded: Option<Arc<Recorded>>,
     watches: bool,
     sticks: bool,
     harmonic: bool,
@@ -58,6 +61,7 @@ impl<N: Number> Course<N> {
         Self {
             equation,
             plain,
+            recorded: None,
             watches: pendulum.has_events(),
             sticks: pendulum.has_friction(),
             harmonic: unforced,
@@ -66,6 +70,18 @@ impl<N: Number> Course<N> {
             longest: LONGEST_STEP * tolerance.powf(0.125) / rate,
             tolerance,
         }
+    }
+
+    /// The same with the recorded motion of the pivot besides the drive.
+    #[must_use]
+    pub fn driven_by(mut self, recorded: Arc<Recorded>) -> Self {
+        self.equation = self.equation.with_lateral();
+        self.plain = self.plain.with_lateral();
+        self.harmonic = false;
+        self.period = None;
+        self.look = self.look.min(8.0 * recorded.spacing());
+        self.recorded = Some(recorded);
+        self
     }
 
     /// The same with every turn found, also where nothing changes there: derivatives by the
@@ -79,7 +95,12 @@ impl<N: Number> Course<N> {
     /// The acceleration at time `tau`, moving in the sense `sense` (1 or -1).
     #[inline]
     pub fn acceleration(&self, tau: f64, theta: N, velocity: N, sense: f64) -> N {
-        let forcing = self.equation.forcing(N::constant(tau));
+        let mut forcing = self.equation.forcing(N::constant(tau));
+        if let Some(recorded) = &self.recorded {
+            let [up, side] = recorded.acceleration(tau);
+            forcing.vertical = forcing.vertical + N::constant(up);
+            forcing.lateral = forcing.lateral + N::constant(side);
+        }
         let at = self.equation.point(&forcing, theta, velocity, N::constant(sense));
         self.equation.acceleration(&forcing, &at)
     }
@@ -88,7 +109,12 @@ impl<N: Number> Course<N> {
     /// `sense`; it stays at rest while this is not positive for either sense.
     #[must_use]
     pub fn excess(&self, tau: f64, theta: f64, sense: f64) -> f64 {
-        let forcing = self.plain.forcing(tau);
+        let mut forcing = self.plain.forcing(tau);
+        if let Some(recorded) = &self.recorded {
+            let [up, side] = recorded.acceleration(tau);
+            forcing.vertical += up;
+            forcing.lateral += side;
+        }
         let at = self.plain.point(&forcing, theta, 0.0, sense);
         sense * self.plain.load(&forcing, &at) - self.plain.friction(&at)
     }

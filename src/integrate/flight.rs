@@ -175,6 +175,15 @@ impl<'a, N: Number> Flight<'a, N> {
         matches!(self.mode, Mode::Lost)
     }
 
+    /// Multiplies the derivatives, which is allowed where they are by the start alone.
+    pub fn scale_derivatives(&mut self, factor: f64) {
+        let scaled = |x: N| x.reset(x.value(), factor);
+        self.state = self.state.map(scaled);
+        if let Mode::Moving(sense, first) = self.mode {
+            self.mode = Mode::Moving(sense, scaled(first));
+        }
+    }
+
     fn rest(&mut self, wait: Release) -> Piece<N> {
         let from = self.tau;
         match wait {

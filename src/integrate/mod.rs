@@ -8,6 +8,7 @@
 //! - [`block`]: a block of trajectories, one forcing period; [`event`]: turns, sticks, releases
 //! - [`course`], [`dense`], [`turning`], [`stick`], [`flight`]: one trajectory of any model, adaptive,
 //!   with exact turns, sticks and releases
+//! - [`sample`], [`sensitivity`]: the same at chosen times, with derivatives by parameters and start
 //! - [`flow`]: the stroboscopic map by it, with its derivative
 //! - [`stroboscopic`]: many trajectories, one forcing period at a time
 //! - [`accuracy`]: how many steps a tolerance asks for
@@ -22,7 +23,9 @@ pub mod event;
 pub mod flight;
 pub mod flow;
 pub mod general;
+pub mod sample;
 pub mod schedule;
+pub mod sensitivity;
 pub mod step;
 pub mod stick;
 pub mod stroboscopic;

@@ -1,20 +1,21 @@
 //! One trajectory, sampled at equal times.
 
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accuracy::{PERIODS, TOLERANCES};
-use super::schedule::Schedule;
-use super::step::Moving;
+use super::course::{Course, FINEST};
+use super::flight::{Event, Flight};
+use super::sample::{Sampled, sample};
 use super::stroboscopic::State;
-use super::tangent::Tangent;
+use super::tangent::{Number, Tangent};
 use crate::error::Error;
-use crate::lanes::sine::Fine;
 use crate::model::Pendulum;
 
-/// Longest step, in units of 1/sqrt(1 + |p|).
-const LONGEST_STEP: f64 = 0.25;
-/// Steps between two samples at the most.
-const MOST_SUBSTEPS: usize = 4096;
+/// The first error of a step tried, over the tolerance.
+const FIRST_TRY: f64 = 0.1;
+/// By how much a step's error is tightened to see what that changes.
+const TIGHTENING: f64 = 16.0;
 /// Errors below this may be those of rounding, amplified by the motion.
 const ROUNDING: f64 = 1e-7;
 /// Batches whose spread gives the standard error of an exponent.
@@ -31,14 +32,20 @@ pub struct Trajectory {
     pub theta: Vec<f64>,
     /// Velocities.
     pub velocity: Vec<f64>,
-    /// Distance that halving the step makes after five periods, or at the end if that is sooner.
+    /// Distance that a 16 times smaller error of each step makes after five periods, or at the end
+    /// if that is sooner.
     pub reached_error: f64,
     /// The same at the end.
     pub end_error: f64,
-    /// Steps a period.
+    /// Steps a period, on average.
     pub steps: usize,
-    /// Largest Lyapunov exponent per unit of tau and its standard error, where asked for.
+    /// Largest Lyapunov exponent per unit of tau and its standard error, where asked for; none where
+    /// the tangent vanishes, as it may when the pendulum sticks.
     pub exponent: Option<(f64, f64)>,
+    /// Whether friction holds the pendulum at the end.
+    pub stuck: bool,
+    /// Turns, sticks and releases.
+    pub events: Vec<Event>,
 }
 
 /// What to compute.
@@ -56,8 +63,8 @@ pub struct Request {
     pub lyapunov: bool,
 }
 
-/// Integrates with a step that is halved until `tol` is met or rounding forbids more; the result
-/// says what was reached.
+/// Integrates with steps that are tightened until `tol` is met or rounding forbids more; the result
+/// says what was reached. Time in the laboratory goes on.
 ///
 /// # Errors
 /// [`Error::Range`] for a value that is not finite or outside its range, [`Error::Interrupted`] if
@@ -67,149 +74,145 @@ pub fn simulate(
     request: &Request,
     cancel: &AtomicBool,
 ) -> Result<Trajectory, Error> {
-    let finite = "any finite number";
-    for (name, value) in [("theta", request.start[0]), ("velocity", request.start[1])] {
+    check(request)?;
+    let (tolerance, reached_error) = choose(pendulum, request, cancel)?;
+    let interval = pendulum.period() / request.samples as f64;
+    let time = times(request.until, interval);
+    let coarse = Run::to(pendulum, request, &[request.until], TIGHTENING * tolerance, cancel)?;
+    let (run, growth) = if request.lyapunov {
+        Run::stretched(pendulum, request, &time, tolerance, cancel)?
+    } else {
+        (Run::to(pendulum, request, &time, tolerance, cancel)?, Vec::new())
+    };
+    let end = run.states[run.states.len() - 1];
+    let periods = request.until / pendulum.period();
+    Ok(Trajectory {
+        theta: run.states.iter().map(|state| state[0]).collect(),
+        velocity: run.states.iter().map(|state| state[1]).collect(),
+        reached_error,
+        end_error: distance(end, coarse.states[0]),
+        steps: (run.steps as f64 / periods).ceil() as usize,
+        exponent: batch_means(&growth, interval),
+        stuck: run.stuck,
+        events: run.events,
+        time,
+    })
+}
+
+fn check(request: &Request) -> Result<(), Error> {
+    let Request { start, until, tol, samples, .. } = *request;
+    for (name, value) in [("theta", start[0]), ("velocity", start[1])] {
         if !value.is_finite() {
-            return Err(Error::Range { name, value, allowed: finite });
+            return Err(Error::Range { name, value, allowed: "any finite number" });
         }
     }
-    if !(request.until.is_finite() && request.until > 0.0) {
-        return Err(Error::Range {
-            name: "until",
-            value: request.until,
-            allowed: "a time above 0",
-        });
+    if !(until.is_finite() && until > 0.0) {
+        return Err(Error::Range { name: "until", value: until, allowed: "a time above 0" });
     }
-    if !(TOLERANCES[0]..=TOLERANCES[1]).contains(&request.tol) {
-        return Err(Error::Range { name: "tol", value: request.tol, allowed: "1e-13 to 1e-2" });
+    if !(TOLERANCES[0]..=TOLERANCES[1]).contains(&tol) {
+        return Err(Error::Range { name: "tol", value: tol, allowed: "1e-13 to 1e-2" });
     }
-    if request.samples == 0 {
+    if samples == 0 {
         return Err(Error::Range { name: "samples", value: 0.0, allowed: "1 or more" });
     }
-    let interval = pendulum.period() / request.samples as f64;
-    let longest = LONGEST_STEP / pendulum.greatest_pull().sqrt();
-    let mut substeps = (interval / longest).ceil().max(1.0) as usize;
-    let mut coarse = Run::of(pendulum, request, substeps, cancel)?;
-    let mut before = f64::INFINITY;
+    Ok(())
+}
+
+/// The error of a step that meets the request's tolerance after five periods, and what tightening to
+/// it changed there.
+fn choose(
+    pendulum: &Pendulum,
+    request: &Request,
+    cancel: &AtomicBool,
+) -> Result<(f64, f64), Error> {
+    let until = request.until.min(PERIODS as f64 * pendulum.period());
+    let end = |tolerance: f64| {
+        Run::to(pendulum, request, &[until], tolerance, cancel).map(|run| run.states[0])
+    };
+    let mut tolerance = FIRST_TRY * request.tol;
+    let (mut coarse, mut before) = (end(tolerance)?, f64::INFINITY);
     loop {
-        let fine = Run::of(pendulum, request, 2 * substeps, cancel)?;
-        let last = fine.theta.len() - 1;
-        let distance = |i: usize| {
-            (fine.theta[i] - coarse.theta[i]).hypot(fine.velocity[i] - coarse.velocity[i])
-        };
-        let error = distance((PERIODS * request.samples).min(last));
-        let end_error = distance(last);
-        // Where halving no longer helps, rounding is all that is left, and more steps make more.
+        tolerance /= TIGHTENING;
+        let fine = end(tolerance)?;
+        let error = distance(fine, coarse);
+        // Where tightening no longer helps, rounding is all that is left.
         let rounding = error < ROUNDING && error > 0.25 * before;
-        if rounding || !error.is_finite() {
-            return Ok(coarse.finish(pendulum, request, substeps, error, end_error));
-        }
-        substeps *= 2;
-        if error <= request.tol || substeps >= MOST_SUBSTEPS {
-            return Ok(fine.finish(pendulum, request, substeps, error, end_error));
+        if error <= request.tol || rounding || !error.is_finite() || tolerance <= FINEST {
+            return Ok((tolerance, error));
         }
         (coarse, before) = (fine, error);
     }
 }
 
-#[derive(Default)]
-struct Run {
-    time: Vec<f64>,
-    theta: Vec<f64>,
-    velocity: Vec<f64>,
-    /// Logarithms of the tangent's growth, one a sample.
-    growth: Vec<f64>,
+/// The multiples of the interval up to `until`, and `until`.
+fn times(until: f64, interval: f64) -> Vec<f64> {
+    let whole = (until / interval * (1.0 + 1e-14)).floor() as usize;
+    let mut times: Vec<f64> = (0..=whole).map(|k| (k as f64 * interval).min(until)).collect();
+    if until - whole as f64 * interval > 1e-12 * until.max(interval) {
+        times.push(until);
+    }
+    times
 }
+
+fn distance(a: State, b: State) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+type Run = Sampled<f64>;
 
 impl Run {
-    fn of(
+    fn to(
         pendulum: &Pendulum,
         request: &Request,
-        substeps: usize,
+        times: &[f64],
+        tolerance: f64,
         cancel: &AtomicBool,
     ) -> Result<Self, Error> {
-        let period = pendulum.period();
-        let interval = period / request.samples as f64;
-        let whole = (request.until / interval * (1.0 + 1e-14)).floor() as usize;
-        let schedules: Vec<Schedule> = (0..request.samples.min(whole.max(1)))
-            .map(|k| Schedule::new(pendulum, k as f64 * interval, interval, substeps))
-            .collect();
-        let mut run = Self::default();
-        let mut state = request.start;
-        let mut tangent = [std::f64::consts::FRAC_1_SQRT_2; 2];
-        run.push(0.0, state, 0.0);
-        for k in 0..whole {
-            if cancel.load(Ordering::Relaxed) {
-                return Err(Error::Interrupted);
-            }
-            let schedule = &schedules[k % schedules.len()];
-            let growth = advance(schedule, &mut state, &mut tangent, request.lyapunov);
-            run.push((k + 1) as f64 * interval, state, growth);
-        }
-        let done = whole as f64 * interval;
-        let rest = request.until - done;
-        if rest > 1e-12 * request.until.max(interval) {
-            let phase = (whole % request.samples) as f64 * interval;
-            let steps = (substeps as f64 * rest / interval).ceil().max(1.0) as usize;
-            let schedule = Schedule::new(pendulum, phase, rest, steps);
-            let growth = advance(&schedule, &mut state, &mut tangent, request.lyapunov);
-            run.push(request.until, state, growth);
-        }
-        Ok(run)
+        let course = Course::new(pendulum, true, tolerance, |_, value| value).watched();
+        let going = |_: &mut Flight<'_, f64>, _: &mut [State]| !cancel.load(Ordering::Relaxed);
+        let run = sample(&course, 0.0, request.start, times, going);
+        if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
     }
 
-    fn push(&mut self, time: f64, state: State, growth: f64) {
-        self.time.push(time);
-        self.theta.push(state[0]);
-        self.velocity.push(state[1]);
-        self.growth.push(growth);
-    }
-
-    fn finish(
-        self,
+    /// The same with the growth of a tangent from sample to sample, as logarithms.
+    fn stretched(
         pendulum: &Pendulum,
         request: &Request,
-        substeps: usize,
-        reached_error: f64,
-        end_error: f64,
-    ) -> Trajectory {
-        let interval = pendulum.period() / request.samples as f64;
-        let exponent = request.lyapunov.then(|| batch_means(&self.growth, interval));
-        Trajectory {
-            time: self.time,
-            theta: self.theta,
-            velocity: self.velocity,
-            reached_error,
-            end_error,
-            steps: substeps * request.samples,
-            exponent,
+        times: &[f64],
+        tolerance: f64,
+        cancel: &AtomicBool,
+    ) -> Result<(Self, Vec<f64>), Error> {
+        let constant = |_, value| Tangent::<f64, 1>::constant(value);
+        let course = Course::new(pendulum, true, tolerance, constant).watched();
+        let start = request.start.map(|value| Tangent { value, slope: [FRAC_1_SQRT_2] });
+        let (mut lengths, mut scale) = (vec![0.0], 0.0);
+        let run = sample(&course, 0.0, start, times, |flight, new| {
+            lengths.extend(new.iter().map(|state| scale + length(state).ln()));
+            // Held near 1, so that it neither overflows nor vanishes.
+            let now = length(&flight.state);
+            if now > 0.0 && now.is_finite() {
+                scale += now.ln();
+                flight.scale_derivatives(1.0 / now);
+            }
+            !cancel.load(Ordering::Relaxed)
+        });
+        if cancel.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
         }
+        let growth = lengths.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let states = run.states.iter().map(|state| state.map(Number::value)).collect();
+        let Sampled { events, stuck, steps, .. } = run;
+        Ok((Self { states, events, stuck, steps }, growth))
     }
 }
 
-/// One schedule on; the logarithm of the tangent's growth, 0 where it is not wanted.
-fn advance(schedule: &Schedule, state: &mut State, tangent: &mut [f64; 2], grow: bool) -> f64 {
-    if !grow {
-        let mut moving = Moving::new(schedule, state[0], state[1]);
-        moving.run::<Fine>(schedule);
-        *state = [moving.theta(), moving.velocity(schedule)];
-        return 0.0;
-    }
-    let theta = Tangent { value: state[0], slope: [tangent[0]] };
-    let velocity = Tangent { value: state[1], slope: [tangent[1]] };
-    let mut moving = Moving::new(schedule, theta, velocity);
-    moving.run::<Fine>(schedule);
-    let velocity = moving.velocity(schedule);
-    let theta = moving.theta();
-    *state = [theta.value, velocity.value];
-    let grown = [theta.slope[0], velocity.slope[0]];
-    let length = grown[0].hypot(grown[1]);
-    *tangent = [grown[0] / length, grown[1] / length];
-    length.ln()
+fn length([theta, velocity]: &[Tangent<f64, 1>; 2]) -> f64 {
+    theta.slope[0].hypot(velocity.slope[0])
 }
 
-/// Mean growth rate after the alignment, and its standard error from the spread of batches.
-fn batch_means(growth: &[f64], interval: f64) -> (f64, f64) {
+/// Mean growth rate after the alignment, and its standard error from the spread of batches; none
+/// where the tangent was lost.
+fn batch_means(growth: &[f64], interval: f64) -> Option<(f64, f64)> {
     let used = &growth[(ALIGNMENT * growth.len() as f64) as usize..];
     let size = (used.len() / BATCHES).max(1);
     let means: Vec<f64> = used
@@ -219,5 +222,5 @@ fn batch_means(growth: &[f64], interval: f64) -> (f64, f64) {
     let count = means.len() as f64;
     let mean = means.iter().sum::<f64>() / count;
     let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    (mean, (variance / count).sqrt())
+    mean.is_finite().then(|| (mean, (variance / count).sqrt()))
 }

@@ -111,6 +111,14 @@ impl<R: Real> Equation<R> {
         Self { gamma, theta_r, torque, motion, lab_time, ages, torques, frictions, sideways, plain }
     }
 
+    /// The same with sideways accelerations taken into account even where no effect makes them: for
+    /// forcings that are changed before use.
+    #[must_use]
+    pub fn with_lateral(mut self) -> Self {
+        self.sideways = true;
+        self
+    }
+
     /// What the drive does at time `tau`.
     #[inline(always)]
     pub fn forcing(&self, tau: R) -> Forcing<R> {

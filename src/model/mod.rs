@@ -4,9 +4,12 @@ pub mod drive;
 pub mod effects;
 pub mod equation;
 pub mod pendulum;
+pub mod recorded;
 pub mod rest;
+mod spline;
 
 pub use drive::HarmonicDrive;
 pub use effects::{Effect, Kind};
 pub use equation::Equation;
 pub use pendulum::Pendulum;
+pub use recorded::Recorded;

@@ -75,5 +75,12 @@ pub fn trajectory<'py>(py: Python<'py>, run: Trajectory) -> PyResult<Bound<'py, 
     dict.set_item("end_error", run.end_error)?;
     dict.set_item("steps_per_period", run.steps)?;
     dict.set_item("exponent", run.exponent)?;
+    dict.set_item("stuck", run.stuck)?;
+    let events = &run.events;
+    let times: Vec<f64> = events.iter().map(|event| event.tau).collect();
+    let thetas: Vec<f64> = events.iter().map(|event| event.theta).collect();
+    dict.set_item("event_time", times.into_pyarray(py))?;
+    dict.set_item("event_theta", thetas.into_pyarray(py))?;
+    dict.set_item("event_kind", events.iter().map(|e| e.kind.words()).collect::<Vec<_>>())?;
     Ok(dict)
 }

@@ -26,12 +26,22 @@ impl From<Error> for PyErr {
     }
 }
 
-/// `(gamma, p, omega, phase, torque)` as Python hands it over.
-type Parameters = (f64, f64, f64, f64, f64);
+/// `(gamma, p, omega, phase, torque, theta_r)` as Python hands it over.
+type Parameters = (f64, f64, f64, f64, f64, f64);
 
 fn pendulum(parameters: Parameters) -> Result<Pendulum, Error> {
-    let (gamma, p, omega, phase, torque) = parameters;
-    Pendulum::new(gamma, p, omega, phase, torque)
+    let (gamma, p, omega, phase, torque, theta_r) = parameters;
+    Pendulum::new(gamma, p, omega, phase, torque)?.with_friction(theta_r)
+}
+
+/// The same for what runs in lanes, which know no friction yet.
+fn mappable(parameters: Parameters) -> Result<Pendulum, Error> {
+    let pendulum = pendulum(parameters)?;
+    if pendulum.has_friction() {
+        let allowed = "0 for maps and many starts at once";
+        return Err(Error::Range { name: "theta_r", value: pendulum.theta_r, allowed });
+    }
+    Ok(pendulum)
 }
 
 /// The instruction set that a call would use now.

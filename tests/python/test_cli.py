@@ -157,6 +157,18 @@ def test_simulate(pendmap_command: Run, tmp_path: Path) -> None:
     assert names == ["simulate.nc", "simulate.png", "simulate.rrd"]
 
 
+def test_simulate_says_what_friction_does(pendmap_command: Run) -> None:
+    words = ("simulate", "--p", 0, "--theta-r", 0.1, "--json", "--lyapunov")
+    result = json.loads(pendmap_command(*words).stdout)
+    assert result["stuck"] is True
+    assert result["velocity"] == 0
+    assert abs(math.sin(result["theta"])) <= 0.1
+    assert {"exponent", "stderr"} <= set(result)
+    run = pendmap_command("basins", "--theta-r", 0.1, "--grid", 10)
+    assert run.returncode == 2
+    assert "theta_r" in run.stderr
+
+
 def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path: Path) -> None:
     (tmp_path / "model.toml").write_text("[pendulum]\ngamma = 0.3\np = 0\n", encoding="utf-8")
     words = ("simulate", "--model", "model.toml", "--theta", 0.5, "--until", 9, "--json")

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
         ("phase", math.nan, "finite"),
         ("torque", "much", "a number"),
         ("torque", True, "a number"),
+        ("theta_r", -0.1, "0 or more"),
+        ("theta_r", math.inf, "finite"),
     ],
 )
 def test_parameters_outside_their_range_are_refused_by_name(

@@ -67,7 +67,7 @@ class _Commands(click.Group):
 def command() -> None:
     """Basin maps and attractors of parametrically excited pendulums.
 
-    th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque
+    th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque - theta_r sign(th')
     """
 
 

@@ -26,6 +26,7 @@ _MODEL = {
     "omega": "Frequency Omega/w0 of the drive.",
     "phase": "Phase of the drive at tau = 0, rad.",
     "torque": "Constant torque over m l^2 w0^2.",
+    "theta_r": "Coulomb friction Tr/w0^2.",
 }
 
 
@@ -45,7 +46,7 @@ def model_options(function: Command) -> Command:
     for name, text in reversed(_MODEL.items()):
         default = getattr(Pendulum(), name)
         function = click.option(
-            f"--{name}", type=NUMBER, default=None, help=f"{text}  [default: {default:g}]"
+            f"--{name.replace('_', '-')}", type=NUMBER, default=None, help=f"{text}  [default: {default:g}]"
         )(function)
     return function
 

@@ -54,15 +54,15 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "t": a["until"],
         "theta": float(dataset["theta"].values[-1]),
         "velocity": float(dataset["velocity"].values[-1]),
-        # A constant torque and viscous damping never hold a pendulum fast.
-        "stuck": False,
+        "stuck": bool(a["stuck"]),
         "turns": a["turns"],
         "tol": a["tol"],
         "tol_reached": bool(a["reached_error"] <= a["tol"]),
         "reached_error": a["reached_error"],
         "end_error": a["end_error"],
     }
-    if "exponent" in a:
-        result |= {"exponent": a["exponent"], "stderr": a["exponent_stderr"]}
-        result |= {name: a[name] for name in ("exponent_from", "exponent_to")}
+    if a["lyapunov"]:
+        names = {"exponent": "exponent", "stderr": "exponent_stderr"}
+        names |= {name: name for name in ("exponent_from", "exponent_to")}
+        result |= {key: a.get(name) for key, name in names.items()}
     return result

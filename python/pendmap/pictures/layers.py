@@ -44,6 +44,7 @@ _SYMBOLS = {
     "omega": "\N{GREEK SMALL LETTER OMEGA}",
     "phase": "phase",
     "torque": "torque",
+    "theta_r": "\N{GREEK SMALL LETTER THETA}r",
 }
 
 
@@ -179,7 +180,7 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
 def parameters(attrs: Mapping[Any, Any]) -> str:
     """Return the pendulum's parameters in one line.
 
-    Phase and torque stand there only where they are not 0, and without drive, p = 0, there is no
+    Phase, torque and friction stand there only where they are not 0, and without drive, p = 0, there is no
     frequency and no phase.
     """
     driven = float(attrs.get("p", 1.0)) != 0.0

@@ -1,0 +1,57 @@
+//! A trajectory at chosen times.
+
+use super::course::Course;
+use super::flight::{Event, Flight, Piece};
+use super::tangent::Number;
+
+/// States at chosen times, and what happened in between.
+#[derive(Clone, Debug)]
+pub struct Sampled<N> {
+    /// Angle, not wrapped, and velocity at each time; not numbers after the motion left their range.
+    pub states: Vec<[N; 2]>,
+    /// Turns, sticks and releases up to the last time.
+    pub events: Vec<Event>,
+    /// Whether friction holds the pendulum at the last time.
+    pub stuck: bool,
+    /// Steps taken.
+    pub steps: usize,
+}
+
+/// The states at `times`, which do not fall and are not before `tau`, of the trajectory that starts
+/// from `start` at time `tau`.
+///
+/// `between` is called after each step and may change the flight or, by returning `false`, end it.
+pub fn sample<N: Number>(
+    course: &Course<N>,
+    tau: f64,
+    start: [N; 2],
+    times: &[f64],
+    mut between: impl FnMut(&mut Flight<'_, N>, &mut [[N; 2]]) -> bool,
+) -> Sampled<N> {
+    let until = times.last().copied().unwrap_or(tau);
+    let mut flight = Flight::new(course, tau, start, until);
+    let mut states = Vec::with_capacity(times.len());
+    let at_start = times.iter().take_while(|time| **time <= tau).count();
+    states.extend(std::iter::repeat_n(flight.state, at_start));
+    while let Some(piece) = flight.advance() {
+        let done = states.len();
+        let due = times[done..].iter().take_while(|time| **time <= flight.tau).count();
+        if due > 0 {
+            let curve = match piece {
+                Piece::Leap(mut leap) => Some(leap.curve(course)),
+                Piece::Rest(..) => None,
+            };
+            for time in &times[done..done + due] {
+                let moving = curve.filter(|_| *time < flight.tau);
+                states.push(moving.map_or(flight.state, |curve| curve.at(*time)));
+            }
+        }
+        if !between(&mut flight, &mut states[done..]) {
+            break;
+        }
+    }
+    let lost = flight.state.map(|x| x.reset(f64::NAN, 1.0));
+    states.resize(times.len(), lost);
+    let stuck = flight.is_stuck();
+    Sampled { states, stuck, steps: flight.steps, events: flight.events }
+}
