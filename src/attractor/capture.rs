@@ -67,6 +67,8 @@ pub struct Outcome {
 
 /// Where starts come from: an index and a state, until there are none left.
 pub trait Source {
+    /// Number of starts, about.
+    fn count(&self) -> usize;
     /// The next start.
     fn next(&mut self) -> Option<(usize, State)>;
     /// Takes the outcome of start `index`.
@@ -95,6 +97,9 @@ pub fn outcomes(
 ) -> Option<Vec<Outcome>> {
     struct Slice<'a>(std::iter::Enumerate<std::slice::Iter<'a, State>>, Vec<Option<Outcome>>);
     impl Source for Slice<'_> {
+        fn count(&self) -> usize {
+            self.1.len()
+        }
         fn next(&mut self) -> Option<(usize, State)> {
             self.0.next().map(|(i, s)| (i, *s))
         }
@@ -151,7 +156,7 @@ struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     fn new(job: Capture<'a>) -> Self {
-        let width = job.strobe.block_width();
+        let width = job.strobe.block_width(job.source.count());
         let scale = job.strobe.schedule.kick;
         let scaled = job
             .traps

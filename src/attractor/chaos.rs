@@ -277,8 +277,9 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
 fn turns_over_the_top(strobe: &Strobe, members: &[&Walk]) -> (Kind, i64) {
     let ends: Vec<State> = members.iter().filter_map(|m| m.points.last().copied()).collect();
     let (theta, velocity): (Vec<f64>, Vec<f64>) = ends.iter().map(|s| (s[0], s[1])).unzip();
-    let followed = strobe.block_width().min(theta.len()).min(FOLLOWED);
-    let mut block = Block::new(strobe.block_width());
+    let width = strobe.block_width(FOLLOWED);
+    let followed = width.min(theta.len()).min(FOLLOWED);
+    let mut block = Block::new(width);
     block.fill(&theta[..followed], &velocity[..followed], strobe.schedule.kick);
     // The well between two upright positions; a passage over the top changes it by one.
     let well = |half_turns: f64| ((half_turns + 1.0) / 2.0).floor() as i64;

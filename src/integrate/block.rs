@@ -18,8 +18,8 @@ use crate::model::Equation;
 use crate::model::pendulum::Route;
 use crate::model::rest::Standstill;
 
-/// Trajectories of a block with events: enough for the queue to fill its lanes.
-const WITH_EVENTS: usize = 1536;
+/// Most trajectories of a block with events: enough for the queue of a step to fill its lanes.
+const WITH_EVENTS: usize = 6144;
 /// How much further than its first acceleration takes it a velocity may go within a step.
 const REACH: f64 = 1.25;
 
@@ -46,6 +46,8 @@ pub struct Block {
     pub held_at: Vec<f64>,
     held: Vec<Held>,
     queue: Vec<Ticket>,
+    /// What goes between lanes and queue.
+    scratch: Box<[[f64; MAX_WIDTH]; 6]>,
 }
 
 impl Block {
@@ -60,6 +62,7 @@ impl Block {
             held_at: vec![f64::NAN; width],
             held: Vec::new(),
             queue: Vec::new(),
+            scratch: Box::new([[0.0; MAX_WIDTH]; 6]),
         }
     }
 
@@ -87,14 +90,14 @@ impl Block {
 }
 
 impl Strobe {
-    /// Number of trajectories of a block: one bundle of lanes, or with events so many that those of a
-    /// step fill the lanes of their queue.
+    /// Number of trajectories of a block for `count` of them: one bundle of lanes, or with events so
+    /// many that those of a step fill the lanes of their queue.
     #[must_use]
-    pub fn block_width(&self) -> usize {
+    pub fn block_width(&self, count: usize) -> usize {
         let [wide, both] = dispatch::run(self.path, Widths);
         match (self.route, self.events, self.extra) {
             (Route::Smooth, false, false) => wide,
-            (_, true, _) => WITH_EVENTS.next_multiple_of(both),
+            (_, true, _) => count.clamp(1, WITH_EVENTS).next_multiple_of(both),
             _ => both,
         }
     }
@@ -265,7 +268,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
             after.kick.store(&mut block.kick[at..]);
             let flags = passages(before.kick * sense, after.kick * sense, ends, sense);
             if flags != 0 {
-                self.flagged(block, at, flags, [before.half_turns, before.kick], time);
+                self.flagged(block, at, flags, [before, after], ends, time);
             }
             at += L::WIDTH;
         }
@@ -292,7 +295,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
             if self.strobe.events {
                 let flags = passages(before.kick * sense, after.kick * sense, ends, sense);
                 if flags != 0 {
-                    self.flagged(block, at, flags, [before.half_turns, before.kick], time);
+                    self.flagged(block, at, flags, [before, after], ends, time);
                 }
             }
             at += Q::WIDTH;
@@ -316,17 +319,26 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 Running { theta: half_turns.scale(PI), velocity: kick.scale(1.0 / scale) };
             let before = lanes.velocity * sense;
             let first = lanes.step(&self.equation, &clock, sense);
-            lanes.theta.scale(FRAC_1_PI).store(&mut block.half_turns[at..]);
-            lanes.velocity.scale(scale).store(&mut block.kick[at..]);
+            let after = Moving {
+                half_turns: lanes.theta.scale(FRAC_1_PI),
+                kick: lanes.velocity.scale(scale),
+            };
+            after.half_turns.store(&mut block.half_turns[at..]);
+            after.kick.store(&mut block.kick[at..]);
             if self.strobe.events {
-                // The end's acceleration costs a stage: only where the begin's is against the motion
-                // and strong enough to stop it within the step.
+                // The end's acceleration costs a stage: it is asked for only where the begin's is against
+                // the motion and strong enough to stop it within the step.
                 let b0 = first * sense;
                 let reach = b0.scale_add(REACH * table.length, before);
                 let passed = (lanes.velocity * sense).signs();
-                let flags = passed | (b0.signs() & reach.signs());
+                let moving = !(before - before.like(f64::MIN_POSITIVE)).signs();
+                let flags = moving & (passed | (b0.signs() & reach.signs()));
                 if flags != 0 {
-                    self.flagged(block, at, flags, [half_turns, kick], time);
+                    let last = lanes.acceleration(&self.equation, &clock, sense);
+                    let gain = scale * table.length;
+                    let ends = [first.scale(gain), last.scale(gain)];
+                    let before = Moving { half_turns, kick };
+                    self.flagged(block, at, flags, [before, after], ends, time);
                 }
             }
             at += Q::WIDTH;
@@ -339,34 +351,38 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         block: &mut Block,
         at: usize,
         flags: u128,
-        before: [A; 2],
+        [before, after]: [Moving<A>; 2],
+        ends: [A; 2],
         time: [f64; 2],
     ) {
-        let mut old = [[0.0; MAX_WIDTH]; 2];
-        before[0].store(&mut old[0]);
-        before[1].store(&mut old[1]);
-        self.enqueue(block, at, flags, &old, time);
+        let stored = &mut block.scratch;
+        before.half_turns.store(&mut stored[0]);
+        before.kick.store(&mut stored[1]);
+        after.half_turns.store(&mut stored[2]);
+        after.kick.store(&mut stored[3]);
+        ends[0].store(&mut stored[4]);
+        ends[1].store(&mut stored[5]);
+        self.enqueue(block, at, flags, time);
     }
 
-    /// Tickets for the flagged lanes of the bundle at `at`, but for those at rest.
+    /// Tickets for the flagged lanes of the bundle at `at`.
     #[inline(never)]
-    fn enqueue(
-        &self,
-        block: &mut Block,
-        at: usize,
-        mut flags: u128,
-        old: &[[f64; MAX_WIDTH]; 2],
-        time: [f64; 2],
-    ) {
+    fn enqueue(&self, block: &mut Block, at: usize, mut flags: u128, time: [f64; 2]) {
+        let scale = 1.0 / self.strobe.schedule.kick;
+        // What a stage's load adds to the kick in one step.
+        let gain = scale / (time[1] - time[0]);
         while flags != 0 {
             let bit = flags.trailing_zeros() as usize;
             flags &= flags - 1;
-            let kick = old[1][bit];
-            if kick != 0.0 {
-                let state = [old[0][bit] * PI, kick / self.strobe.schedule.kick];
-                let sense = 1_f64.copysign(kick);
-                block.queue.push(Ticket::new(at + bit, state, sense, time[0], time[1]));
-            }
+            let [x0, k0, x1, k1, first, last] = block.scratch.each_ref().map(|values| values[bit]);
+            let sense = 1_f64.copysign(k0);
+            let state = [x0 * PI, k0 * scale];
+            let whole = Reached {
+                theta: x1 * PI,
+                velocity: k1 * scale,
+                acceleration: [first * gain, last * gain],
+            };
+            block.queue.extend(Ticket::known(at + bit, state, sense, time, &whole));
         }
     }
 
@@ -394,8 +410,8 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
             let mut first = 0;
             while first < block.queue.len() {
                 let count = (block.queue.len() - first).min(Q::WIDTH);
-                let mut asked = [[0.0; MAX_WIDTH]; 5];
-                gather(&block.queue[first..first + count], &mut asked);
+                gather(&block.queue[first..first + count], &mut block.scratch);
+                let asked = &mut *block.scratch;
                 let mut lanes = Running {
                     theta: Q::load(token, &asked[0]),
                     velocity: Q::load(token, &asked[1]),
@@ -409,7 +425,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 lanes.velocity.store(&mut asked[1]);
                 begin.store(&mut asked[2]);
                 end.store(&mut asked[3]);
-                self.answer(block, first, count, &asked);
+                self.answer(block, first, count);
                 first += count;
             }
             block.queue.retain(|ticket| ticket.lane != usize::MAX);
@@ -417,8 +433,9 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
     }
 
     #[inline(never)]
-    fn answer(&self, block: &mut Block, first: usize, count: usize, ends: &[[f64; MAX_WIDTH]; 5]) {
+    fn answer(&self, block: &mut Block, first: usize, count: usize) {
         for i in 0..count {
+            let ends = &block.scratch;
             let reached = Reached {
                 theta: ends[0][i],
                 velocity: ends[1][i],
@@ -446,7 +463,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
 }
 
 #[inline(never)]
-fn gather(tickets: &[Ticket], asked: &mut [[f64; MAX_WIDTH]; 5]) {
+fn gather(tickets: &[Ticket], asked: &mut [[f64; MAX_WIDTH]; 6]) {
     for (i, ticket) in tickets.iter().enumerate() {
         asked[0][i] = ticket.theta;
         asked[1][i] = ticket.velocity;
@@ -457,10 +474,12 @@ fn gather(tickets: &[Ticket], asked: &mut [[f64; MAX_WIDTH]; 5]) {
 }
 
 /// The lanes whose velocity, `u` before and `v` after a step in the sense of the motion, has passed
-/// zero, or may have touched it: its parabola's least value says so, with a margin.
+/// zero, or may have touched it: its parabola's least value says so, with a margin. Lanes at rest have
+/// not.
 #[inline(always)]
 fn passages<L: Lane>(u: L, v: L, [first, last]: [L; 2], sense: L) -> u128 {
+    let moving = !(u - u.like(f64::MIN_POSITIVE)).signs();
     let (b0, b1) = (first * sense, last * sense);
     let lowest = u.scale(1.6).mul_add(b1 - b0, -(b0 * b0));
-    v.signs() | (b0.signs() & !b1.signs() & lowest.signs())
+    moving & (v.signs() | (b0.signs() & !b1.signs() & lowest.signs()))
 }

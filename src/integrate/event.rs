@@ -9,16 +9,18 @@ use crate::model::rest::Standstill;
 
 /// Integrations after which a ticket gives up; its trajectory counts as failed.
 const MOST_ROUNDS: u32 = 400;
-/// A zero is found when Newton's step falls below this part of the piece's length: what is left
-/// is of its square.
-const CLOSE: f64 = 1e-7;
+/// A zero is found when Newton's step falls below this part of the way to it: with the change of the
+/// acceleration along it taken into account, what is left is of its third power.
+const CLOSE: f64 = 1e-5;
 /// Steps of Newton's method that a root may take before the bracket is halved.
 const MOST_NEWTON: u32 = 8;
 /// Where the velocity's least value, as its cubic gives it, is below this part of its change over the
 /// piece, the integration decides.
 const GRAZING: f64 = 0.1;
-/// Samples of the cubic in which its first zero is looked for.
-const SAMPLES: usize = 16;
+/// Steps of Newton's method on the cubic.
+const POLISHINGS: usize = 4;
+/// A first guess is at least this part of the piece.
+const LEAST_GUESS: f64 = 1e-6;
 /// After a release the next one is at least this part of the period away: at the stick's edge a slip
 /// may be shorter than rounding can tell.
 const LEAST_SLIP: f64 = 1e-7;
@@ -108,6 +110,19 @@ impl Ticket {
         }
     }
 
+    /// The same where the end of the piece is known already.
+    #[must_use]
+    pub fn known(
+        lane: usize,
+        state: [f64; 2],
+        sense: f64,
+        [begin, end]: [f64; 2],
+        whole: &Reached,
+    ) -> Option<Self> {
+        let mut ticket = Self::new(lane, state, sense, begin, end);
+        matches!(ticket.ended(whole), Progress::Asks).then_some(ticket)
+    }
+
     /// Takes the end of the integration that it asked for.
     #[must_use]
     pub fn take(&mut self, reached: &Reached, equation: &Equation<f64>, period: f64) -> Progress {
@@ -168,8 +183,8 @@ impl Ticket {
 
     /// Asks for the state at the first zero of the cubic over a piece of length `h`.
     fn seek(&mut self, h: f64) {
-        let guess = self.whole.and_then(|w| Cubic::new(self.ends(&w), h).first_zero());
-        self.length = guess.unwrap_or(0.5) * h;
+        let guess = self.whole.map_or(0.5, |w| Cubic::new(self.ends(&w), h).zero());
+        self.length = guess.clamp(LEAST_GUESS, 1.0) * h;
         self.stage = Stage::Root { low: 0.0, high: h, tries: 0 };
     }
 
@@ -192,9 +207,14 @@ impl Ticket {
         let slope = if self.velocity == 0.0 { b - u / t } else { b };
         let step = if u == 0.0 { 0.0 } else { -u / slope };
         if step.abs() <= CLOSE * t || high - low <= 1e-15 * self.end.abs().max(period) {
-            let step = if step.abs() <= CLOSE * t { step } else { 0.0 };
-            let theta =
-                reached.theta + step * (reached.velocity + 0.5 * step * reached.acceleration[1]);
+            let [first, last] = reached.acceleration;
+            let step = if u != 0.0 && step.abs() <= CLOSE * t {
+                let step = -reached.velocity / last;
+                step - 0.5 * (last - first) / (t * last) * step * step
+            } else {
+                0.0
+            };
+            let theta = reached.theta + step * (reached.velocity + 0.5 * step * last);
             return self.stopped(theta, self.begin + t + step, equation, period);
         }
         let mut next = t + step;
@@ -265,21 +285,26 @@ impl Cubic {
         if (0.0..=1.0).contains(&x) { x } else { 0.5 }
     }
 
-    /// Its first passage from above to below zero.
-    fn first_zero(&self) -> Option<f64> {
-        let mut before = 0.0;
-        for k in 1..=SAMPLES {
-            let x = k as f64 / SAMPLES as f64;
-            if self.at(x) < 0.0 {
-                let (mut low, mut high) = (before, x);
-                for _ in 0..20 {
-                    let middle = 0.5 * (low + high);
-                    if self.at(middle) < 0.0 { high = middle } else { low = middle }
-                }
-                return (high > 0.0).then_some(high);
+    /// Its passage from above to below zero, which its ends promise: near enough to begin Newton's
+    /// method on the motion itself.
+    fn zero(&self) -> f64 {
+        // After a reversal the begin is a zero itself, and is divided out.
+        let [a, b, c, d] = match self.0 {
+            [0.0, b, c, d] => [b, c, d, 0.0],
+            whole => whole,
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        let mut x = a / (a - (a + b + c + d));
+        for _ in 0..POLISHINGS {
+            let value = a + x * (b + x * (c + x * d));
+            if value < 0.0 {
+                high = x
+            } else {
+                low = x
             }
-            before = x;
+            let next = x - value / (b + x * (2.0 * c + 3.0 * d * x));
+            x = if next > low && next < high { next } else { 0.5 * (low + high) };
         }
-        None
+        x
     }
 }

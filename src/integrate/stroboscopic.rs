@@ -97,7 +97,8 @@ impl Strobe {
         turns: &mut [f64],
         periods: usize,
     ) -> Result<(), Error> {
-        self.advance_blocks(theta, velocity, turns, self.block_width(), |block| {
+        let width = self.block_width(theta.len());
+        self.advance_blocks(theta, velocity, turns, width, |block| {
             for _ in 0..periods {
                 self.period(block);
                 block.wrap();

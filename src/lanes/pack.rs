@@ -143,20 +143,20 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
 
     #[inline(always)]
     fn load(isa: S, source: &[f64]) -> Self {
-        let width = S::F64_LANES;
+        // Whole registers: a partial load is a function call.
+        let (whole, _) = S::as_simd_f64s(&source[..Self::WIDTH]);
         let mut bundle = Self::splat(isa, 0.0);
-        for (i, pack) in bundle.0.iter_mut().enumerate() {
-            pack.value = isa.partial_load_f64s(&source[i * width..(i + 1) * width]);
+        for (pack, value) in bundle.0.iter_mut().zip(whole) {
+            pack.value = *value;
         }
         bundle
     }
 
     #[inline(always)]
     fn store(self, target: &mut [f64]) {
-        let width = S::F64_LANES;
-        for (i, pack) in self.0.iter().enumerate() {
-            let part = &mut target[i * width..(i + 1) * width];
-            pack.isa.partial_store_f64s(part, pack.value);
+        let (whole, _) = S::as_mut_simd_f64s(&mut target[..Self::WIDTH]);
+        for (value, pack) in whole.iter_mut().zip(&self.0) {
+            *value = pack.value;
         }
     }
 

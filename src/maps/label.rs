@@ -71,6 +71,10 @@ struct Worker<'a> {
 }
 
 impl Source for Worker<'_> {
+    fn count(&self) -> usize {
+        self.shared.count()
+    }
+
     fn next(&mut self) -> Option<(usize, State)> {
         if self.range.is_empty() {
             let begin = self.shared.next.fetch_add(TAKE, Ordering::Relaxed);

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::watch::watched;
-use super::{Parameters, convert, mappable};
+use super::{Parameters, convert, pendulum};
 use crate::error::Error;
 use crate::maps::basins::{Options, basins};
 use crate::maps::starts::{Axis, Starts};
@@ -79,7 +79,7 @@ fn run<'py>(
     choices: Choices,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = mappable(parameters)?;
+    let pendulum = pendulum(parameters)?;
     let options = Options::from(choices);
     let map =
         watched(py, progress.as_ref(), |control| basins(&pendulum, &starts, &options, control))?;

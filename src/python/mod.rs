@@ -34,16 +34,6 @@ fn pendulum(parameters: Parameters) -> Result<Pendulum, Error> {
     Pendulum::new(gamma, p, omega, phase, torque)?.with_friction(theta_r)
 }
 
-/// The same for what runs in lanes, which know no friction yet.
-fn mappable(parameters: Parameters) -> Result<Pendulum, Error> {
-    let pendulum = pendulum(parameters)?;
-    if pendulum.has_friction() {
-        let allowed = "0 for maps and many starts at once";
-        return Err(Error::Range { name: "theta_r", value: pendulum.theta_r, allowed });
-    }
-    Ok(pendulum)
-}
-
 /// The instruction set that a call would use now.
 #[pyfunction]
 fn simd() -> PyResult<&'static str> {

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::watch::watched;
-use super::{Parameters, convert, mappable, pendulum};
+use super::{Parameters, convert, pendulum};
 use crate::error::Error;
 use crate::integrate::trajectory::{self, Request};
 use crate::integrate::{State, Strobe, accuracy};
@@ -30,7 +30,7 @@ pub fn advance<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Advanced<'py>> {
-    let pendulum = mappable(parameters)?;
+    let pendulum = pendulum(parameters)?;
     if steps_per_period == 0 {
         let allowed = "1 or more";
         return Err(Error::Range { name: "steps_per_period", value: 0.0, allowed }.into());
@@ -53,7 +53,7 @@ pub fn choose_steps(
     velocity: PyReadonlyArray1<'_, f64>,
     tol: f64,
 ) -> PyResult<(usize, f64)> {
-    let pendulum = mappable(parameters)?;
+    let pendulum = pendulum(parameters)?;
     let states: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
     let (strobe, error) = accuracy::choose(&pendulum, &states, tol, Path::choose()?)?;

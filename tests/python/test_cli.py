@@ -164,9 +164,18 @@ def test_simulate_says_what_friction_does(pendmap_command: Run) -> None:
     assert result["velocity"] == 0
     assert abs(math.sin(result["theta"])) <= 0.1
     assert {"exponent", "stderr"} <= set(result)
-    run = pendmap_command("basins", "--theta-r", 0.1, "--grid", 10)
-    assert run.returncode == 2
-    assert "theta_r" in run.stderr
+
+
+def test_basins_with_friction_end_at_rest_too(pendmap_command: Run) -> None:
+    words = ("basins", "--theta-r", 0.05, "--grid", 40, "--json")
+    result = json.loads(pendmap_command(*words).stdout)
+    found = {a["name"]: a for a in result["attractors"]}
+    rest = found["rest"]
+    assert rest["multipliers"] is None
+    assert rest["exponent"] is None
+    assert rest["theta"] == rest["velocity"] == 0
+    assert 0 < rest["fraction"] < found["oscillation 2:0"]["fraction"]
+    assert result["undecided"] == 0
 
 
 def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path: Path) -> None:

@@ -46,7 +46,10 @@ def model_options(function: Command) -> Command:
     for name, text in reversed(_MODEL.items()):
         default = getattr(Pendulum(), name)
         function = click.option(
-            f"--{name.replace('_', '-')}", type=NUMBER, default=None, help=f"{text}  [default: {default:g}]"
+            f"--{name.replace('_', '-')}",
+            type=NUMBER,
+            default=None,
+            help=f"{text}  [default: {default:g}]",
         )(function)
     return function
 
