@@ -26,7 +26,7 @@ class ViscousDamping(Effect):
     formula = "-b v"
     drawn = False
 
-    b: float = size(0.01, 0.05, "1/s")
+    b: float = size(0.0025, 0.01, "1/s")
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
         return -self.b * motion.velocity
@@ -41,7 +41,7 @@ class CoulombFriction(Effect):
     formula = "-f sign v"
     drawn = False
 
-    f: float = size(0.02, 0.1, "rad/s2")
+    f: float = size(0.013, 0.053, "rad/s2")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats | float:
         return self.f
@@ -55,7 +55,7 @@ class QuadraticDrag(Effect):
     group = "damping"
     formula = "-q v abs(v)"
 
-    q: float = size(0.001, 0.01, "1/rad")
+    q: float = size(0.0002, 0.0008, "1/rad")
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
         return -self.q * motion.velocity * motion.speed
@@ -69,7 +69,7 @@ class CubicDamping(Effect):
     group = "damping"
     formula = "-k3 v^3"
 
-    k3: float = size(0.0001, 0.001, "s/rad2")
+    k3: float = size(2e-05, 8e-05, "s/rad2")
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
         return -self.k3 * motion.velocity**3
@@ -83,7 +83,7 @@ class PowerLawDrag(Effect):
     group = "damping"
     formula = "-q abs(v)^n sign v"
 
-    q: float = size(0.003, 0.03, "rad^(1-n) s^(n-2)")
+    q: float = size(0.0009, 0.0035, "rad^(1-n) s^(n-2)")
     n: float = shape(1.3, 1.7, "", least=0.0, most=5.0)
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
@@ -100,7 +100,7 @@ class AsymmetricViscous(Effect):
     formula = "-b abs(v)"
     signed = True
 
-    b: float = size(0.002, 0.02, "1/s")
+    b: float = size(0.0005, 0.002, "1/s")
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
         return -self.b * motion.speed
@@ -118,7 +118,7 @@ class AsymmetricCoulomb(Effect):
     formula = "-d abs(sign v)"
     signed = True
 
-    d: float = size(0.005, 0.03, "rad/s2")
+    d: float = size(0.0035, 0.014, "rad/s2")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
         return self.d * direction
@@ -136,7 +136,7 @@ class StribeckFriction(Effect):
     formula = "-a exp(-(v/vs)^2) sign v"
     delta: ClassVar[float] = 2.0
 
-    a: float = size(0.02, 0.15, "rad/s2")
+    a: float = size(0.05, 0.2, "rad/s2")
     vs: float = shape(0.1, 0.6, "rad/s", least=1e-3)
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
@@ -162,7 +162,7 @@ class LoadDependentFriction(Effect):
     group = "load"
     formula = "-k (abs((1 + a(t)) cos th + v^2/w0^2) - 1) sign v"
 
-    k: float = size(0.005, 0.03, "rad/s2")
+    k: float = size(0.003, 0.012, "rad/s2")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
         return self.k * (motion.side * motion.load - 1)
@@ -179,7 +179,7 @@ class CoulombDrift(Effect):
     group = "friction"
     formula = "-r t sign v, t lab time"
 
-    r: float = size(5e-5, 3e-4, "rad/s3")
+    r: float = size(2.5e-05, 0.0001, "rad/s3")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
         return self.r * motion.lab
@@ -212,7 +212,7 @@ class ViscousDrift(Effect):
     group = "damping"
     formula = "-r t v, t lab time"
 
-    r: float = size(3e-5, 2e-4, "1/s2")
+    r: float = size(5e-06, 2e-05, "1/s2")
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
         return -self.r * motion.lab * motion.velocity
@@ -227,7 +227,7 @@ class WarmingViscous(Effect):
     group = "damping"
     formula = "+b (1 - exp(-t/tau)) v, t lab time"
 
-    b: float = size(0.005, 0.04, "1/s")
+    b: float = size(0.0012, 0.005, "1/s")
     tau: float = shape(60.0, 240.0, "s", least=1e-3)
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
@@ -249,7 +249,7 @@ class DahlFriction(Effect):
     formula = "-f z/zc, z' = v - abs(v) z/zc"
     states = 1
 
-    f: float = size(0.01, 0.06, "rad/s2")
+    f: float = size(0.012, 0.05, "rad/s2")
     zc: float = shape(0.02, 0.1, "rad", least=1e-3)
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
@@ -268,7 +268,7 @@ class RoughSpot(Effect):
     group = "friction"
     formula = "-f exp(-(1 - cos(th - th0))/w^2) sign v"
 
-    f: float = size(0.1, 0.6, "rad/s2")
+    f: float = size(0.04, 0.16, "rad/s2")
     th0: float = shape(-1.0, 1.0, "rad")
     w: float = shape(0.1, 0.4, "rad", least=1e-3)
 

@@ -264,9 +264,7 @@ def _until_rest(plan: RunPlan, path: Path) -> RunPlan:
 def _strayed(plain: Equation, paths: list[Path], instants: list[Floats]) -> list[Floats]:
     """The motion minus that of a rig without effects, set back on it every second, rad."""
     begins = [np.arange(0.0, max(times[-1], WINDOW / 2), WINDOW) for times in instants]
-    ends = [
-        np.append(begin[1:], times[-1]) for begin, times in zip(begins, instants, strict=True)
-    ]
+    ends = [np.append(begin[1:], times[-1]) for begin, times in zip(begins, instants, strict=True)]
     starts = Starts(
         run=np.repeat(np.arange(len(paths)), [begin.size for begin in begins]),
         begin=np.concatenate(begins),

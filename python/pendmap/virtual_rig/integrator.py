@@ -33,7 +33,7 @@ TOLERANCE: Final = 1e-11
 
 _FIXED: Final = 3e-13
 """Change of the velocity at which Picard's iteration ends, rad/s."""
-_ITERATIONS: Final = 40
+_ITERATIONS: Final = 25
 _SHORTEST: Final = 1e-9
 _BASIS: Final = np.vstack([gauss.basis(np.zeros(1), gauss.NODES + 2), gauss.SCAN_BASIS])
 _PLACES: Final = np.concatenate([[0.0], gauss.SCAN])
@@ -254,7 +254,7 @@ class _Lanes:
         for k in rows[direction == 0]:
             self._releases(step, int(k), found)
         if self.equation.watches_load:
-            for k in rows:
+            for k in rows[self._may_unload(step, rows)]:
                 self._unloads(step, int(k), found)
         return found
 
@@ -283,6 +283,18 @@ class _Lanes:
         motion = self._held(int(step.lane[k]), places * step.length[k])
         up, down = self.equation.margins(motion, own)
         return up[0], down[0]
+
+    def _may_unload(self, step: _Step, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Tell in which steps the load on the bearing may change sign."""
+        lane = step.lane[rows]
+        time = self.time[lane][:, np.newaxis] + _PLACES * step.length[rows][:, np.newaxis]
+        sign = self.side[lane][:, np.newaxis]
+        theta, velocity = step.theta[rows] @ _BASIS.T, step.velocity[rows] @ _BASIS[:, :-1].T
+        run, direction = self.run[lane][:, np.newaxis], self.direction[lane][:, np.newaxis]
+        load = sign * self.equation.motion(run, time, theta, velocity, direction, sign).load
+        # Between two places it falls by less than it changes from one to the next somewhere.
+        near = load.min(axis=1) < np.abs(np.diff(load, axis=1)).max(axis=1)
+        return np.asarray(near)
 
     def _unloads(
         self, step: _Step, k: int, found: dict[int, tuple[float, Callable[[int], None]]]

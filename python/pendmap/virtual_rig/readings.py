@@ -75,7 +75,7 @@ class EncoderOffset(ReadingEffect):
     signed = True
     order = 4
 
-    d: float = size(0.003, 0.02, "rad")
+    d: float = size(0.0004, 0.0015, "rad")
 
     def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
         return angle + self.d
@@ -90,7 +90,7 @@ class EncoderGain(ReadingEffect):
     signed = True
     order = 3
 
-    e: float = size(0.001, 0.01, "", most=0.9)
+    e: float = size(1.7e-05, 7e-05, "", most=0.9)
 
     def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
         return (1 + self.e) * angle
@@ -104,7 +104,7 @@ class EncoderEccentricity(ReadingEffect):
     formula = "reading th + e sin(th + psi)"
     order = 2
 
-    e: float = size(0.003, 0.03, "rad", most=0.9)
+    e: float = size(0.0005, 0.002, "rad", most=0.9)
     psi: float = shape(-math.pi, math.pi, "rad")
 
     def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
@@ -119,7 +119,7 @@ class EncoderBacklash(ReadingEffect):
     formula = "reading y with abs(th - y) <= b/2, y moves only when pushed"
     order = 1
 
-    b: float = size(0.005, 0.04, "rad")
+    b: float = size(0.0014, 0.006, "rad")
 
     def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
         half = self.b / 2
@@ -139,7 +139,7 @@ class SensorLag(ReadingEffect):
     formula = "reading y, y' = (th - y)/tau"
     order = 0
 
-    tau: float = size(0.001, 0.01, "s", most=10.0)
+    tau: float = size(0.00016, 0.0006, "s", most=10.0)
 
     def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
         if self.tau == 0:
@@ -179,7 +179,7 @@ class Timebase(ReadingEffect):
     formula = "recorded time (1 + e) t"
     signed = True
 
-    e: float = size(2e-4, 2e-3, "", most=0.9)
+    e: float = size(1.3e-05, 5e-05, "", most=0.9)
 
     def clock(self, time: Floats) -> Floats:
         return time / (1 + self.e)

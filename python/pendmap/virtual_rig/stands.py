@@ -41,7 +41,7 @@ class PivotCompliance(Effect):
     formula = "-x'' cos th, x'' + 2 z wx x' + wx^2 x = -mu (th'' cos th - v^2 sin th)"
     states = 2
 
-    mu: float = size(0.003, 0.02, "", most=0.3)
+    mu: float = size(0.008, 0.03, "", most=0.3)
     wx: float = shape(40.0, 80.0, "rad/s", least=1.0, most=1000.0)
     z: float = shape(0.01, 0.05, "", least=0.0, most=2.0)
 
@@ -72,15 +72,15 @@ class TwoModePivot(PivotCompliance):
     """The same with two modes: the pivot's post, and the table under it."""
 
     variant = "two_modes"
-    formula = "-(x1 + x2)'' cos th, each as in pivot_compliance"
+    formula = "-(x1 + x2)'' cos th, each as in pivot_compliance, mu2 = share mu"
     states = 4
 
-    mu2: float = shape(0.002, 0.01, "", least=0.0, most=0.3)
-    wx2: float = shape(15.0, 30.0, "rad/s", least=1.0, most=1000.0)
+    share: float = shape(0.05, 0.2, "", least=0.0, most=1.0)
+    wx2: float = shape(28.0, 38.0, "rad/s", least=1.0, most=1000.0)
     z2: float = shape(0.02, 0.08, "", least=0.0, most=2.0)
 
     def _modes(self) -> list[tuple[float, float, float]]:
-        return [(self.mu, self.wx, self.z), (self.mu2, self.wx2, self.z2)]
+        return [(self.mu, self.wx, self.z), (self.share * self.mu, self.wx2, self.z2)]
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class BaseSway(Effect):
     group = "stand"
     formula = "-w0^2 A cos(ws t + psi) cos th, t lab time"
 
-    A: float = size(0.0005, 0.004, "g")
+    A: float = size(0.00017, 0.0007, "g")
     ws: float = shape(2.0, 10.0, "rad/s", least=0.0, most=100.0)
     psi: float = shape(-np.pi, np.pi, "rad")
 
@@ -108,7 +108,7 @@ class Impulses(Effect):
     group = "stand"
     formula = "v jumps by +J or -J at lab times t_k"
 
-    J: float = size(0.02, 0.1, "rad/s")
+    J: float = size(0.01, 0.04, "rad/s")
     every: float = shape(10.0, 25.0, "s", least=0.1)
     pattern: float = shape(0, 999_999, "", whole=True, least=0)
 
@@ -137,7 +137,7 @@ class DriveAmplitude(_DriveEffect):
     name = "drive_amplitude"
     formula = "p (1 + e)"
 
-    e: float = size(0.003, 0.03, "", most=0.9)
+    e: float = size(0.0015, 0.006, "", most=0.9)
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
         return dataclasses.replace(drive, p=drive.p * (1 + self.e))
@@ -150,7 +150,7 @@ class DrivePhase(_DriveEffect):
     name = "drive_phase"
     formula = "phi + d"
 
-    d: float = size(0.005, 0.04, "rad")
+    d: float = size(0.001, 0.004, "rad")
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
         return dataclasses.replace(drive, phase=drive.phase + self.d)
@@ -163,7 +163,7 @@ class DriveFrequency(_DriveEffect):
     name = "drive_frequency"
     formula = "Omega (1 + e)"
 
-    e: float = size(5e-5, 5e-4, "", most=0.9)
+    e: float = size(1e-05, 4e-05, "", most=0.9)
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
         return dataclasses.replace(drive, frequency=drive.frequency * (1 + self.e))
@@ -176,7 +176,7 @@ class DriveChirp(_DriveEffect):
     name = "drive_chirp"
     formula = "phase Omega t + r t^2/2 + phi"
 
-    r: float = size(1e-4, 8e-4, "rad/s2")
+    r: float = size(1.5e-05, 6e-05, "rad/s2")
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
         return dataclasses.replace(drive, chirp=np.full_like(drive.p, self.r))
@@ -190,7 +190,7 @@ class DriveSecondHarmonic(_DriveEffect):
     formula = "a(t) + e p cos(2 (Omega t + phi) + psi)"
     signed = False
 
-    e: float = size(0.005, 0.05, "", most=10.0)
+    e: float = size(0.0027, 0.011, "", most=10.0)
     psi: float = shape(-math.pi, math.pi, "rad")
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
@@ -206,7 +206,7 @@ class LateralDrive(_DriveEffect):
     formula = "-w0^2 e p cos(Omega t + phi + psi) cos th"
     signed = False
 
-    e: float = size(0.003, 0.03, "", most=10.0)
+    e: float = size(0.0007, 0.003, "", most=10.0)
     psi: float = shape(-math.pi, math.pi, "rad")
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:

@@ -26,7 +26,7 @@ class BiasTorque(Effect):
     formula = "+B"
     signed = True
 
-    B: float = size(0.005, 0.03, "rad/s2")
+    B: float = size(0.004, 0.015, "rad/s2")
 
     def torque(self, motion: Motion, own: Floats) -> float:
         return self.B
@@ -40,7 +40,7 @@ class BearingHarmonic(Effect):
     group = "torque"
     formula = "+A sin(n th + psi)"
 
-    A: float = size(0.02, 0.1, "rad/s2")
+    A: float = size(0.016, 0.065, "rad/s2")
     n: float = shape(2, 6, "", whole=True, least=1, most=100)
     psi: float = shape(-np.pi, np.pi, "rad")
 
@@ -57,7 +57,7 @@ class Magnet(Effect):
     formula = "-A (x/w) exp(-x^2/(2 w^2)), x = th wrapped"
     signed = True
 
-    A: float = size(0.05, 0.3, "rad/s2")
+    A: float = size(0.04, 0.16, "rad/s2")
     w: float = shape(0.08, 0.2, "rad", least=1e-3)
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
@@ -75,7 +75,7 @@ class DipoleMagnet(Effect):
     formula = "-A (sin th/d) (1 + 2 (1 - cos th)/d^2)^(-5/2)"
     signed = True
 
-    A: float = size(0.05, 0.3, "rad/s2")
+    A: float = size(0.07, 0.3, "rad/s2")
     d: float = shape(0.15, 0.4, "rad", least=1e-3)
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
@@ -91,7 +91,7 @@ class ElasticRestoring(Effect):
     group = "torque"
     formula = "-k th, th not wrapped"
 
-    k: float = size(0.003, 0.02, "1/s2")
+    k: float = size(0.0003, 0.0012, "1/s2")
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
         return -self.k * motion.theta
@@ -106,7 +106,7 @@ class RigTilt(Effect):
     formula = "-w0^2 (sin(th + d) - sin th)"
     signed = True
 
-    d: float = size(0.003, 0.02, "rad")
+    d: float = size(0.0004, 0.0015, "rad")
 
     def torque(self, motion: Motion, own: Floats) -> Floats:
         return np.asarray(-(motion.w0**2) * (np.sin(motion.theta + self.d) - motion.sin))
@@ -120,7 +120,7 @@ class InertiaRipple(Effect):
     group = "inertia"
     formula = "inertia 1 + e cos(n th + psi): -e cos(..) th'' + (e n/2) sin(..) v^2"
 
-    e: float = size(0.002, 0.015, "", most=0.9)
+    e: float = size(0.0007, 0.0028, "", most=0.9)
     n: float = shape(1, 3, "", whole=True, least=1, most=100)
     psi: float = shape(-np.pi, np.pi, "rad")
 
@@ -144,7 +144,7 @@ class AddedMass(Effect):
     formula = "-e (th'' + w0^2 a(t) sin th)"
     needs = "forced"
 
-    e: float = size(0.003, 0.03, "", most=10.0)
+    e: float = size(0.0008, 0.0035, "", most=10.0)
 
     def inertia(self, motion: Motion) -> float:
         return self.e
@@ -162,7 +162,7 @@ class LateAddedMass(Effect):
     group = "inertia"
     formula = "-e th'' in runs that begin after lab time t0"
 
-    e: float = size(0.001, 0.01, "", most=10.0)
+    e: float = size(0.0004, 0.0015, "", most=10.0)
     t0: float = shape(60.0, 200.0, "s")
 
     def inertia(self, motion: Motion) -> Floats:
