@@ -52,7 +52,7 @@ __all__ = ["command"]
 @click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="Do not say what was written.")
-def command(
+def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,
     out: Path | None,

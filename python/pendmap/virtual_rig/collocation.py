@@ -32,8 +32,6 @@ __all__ = [
     "INTEGRAL",
     "NODES",
     "POINTS",
-    "SCAN",
-    "SCAN_BASIS",
     "SECOND",
     "SECOND_INTEGRAL",
     "basis",
@@ -77,12 +75,6 @@ SECOND_INTEGRAL: Final[Floats] = _integral(NODES + 1)
 
 SECOND: Final[Floats] = basis(POINTS, NODES + 2) @ SECOND_INTEGRAL @ INTEGRAL @ COEFFICIENTS
 """Likewise of the integral of the integral."""
-
-SCAN: Final[Floats] = np.arange(1, 17) / 16
-"""Places within a step where signs are looked at."""
-
-SCAN_BASIS: Final[Floats] = basis(SCAN, NODES + 2)
-"""Legendre polynomials there, shape (16, NODES + 2)."""
 
 
 def value(coefficients: Sequence[float], s: float) -> float:

@@ -14,11 +14,10 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.random import Generator
     from numpy.typing import NDArray
 
@@ -98,7 +97,7 @@ def size(low: float, high: float, unit: str, most: float = math.inf) -> Any:  # 
     )
 
 
-def shape(
+def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     low: float,
     high: float,
     unit: str,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -93,7 +94,7 @@ class Equation:
         self.drive = drive
         self.states = sum(effect.states for effect in effects)
         ends = np.cumsum([0, *(effect.states for effect in effects)])
-        self._own = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self._own = [slice(a, b) for a, b in itertools.pairwise(ends)]
         self.watches_load = any(effect.group == "load" for effect in effects)
         self._refuse_negative()
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from pendmap.virtual_rig.collocation import SCAN, value
+from pendmap.virtual_rig.collocation import value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-__all__ = ["may_turn", "root", "stop_of", "turn_of"]
+__all__ = ["PLACES", "may_turn", "root", "stop_of", "turn_of"]
 
 _TINY: Final = 1e-4
 """Where a velocity that starts at zero is looked at first, as a share of the step."""
 
-_PLACES: Final = np.concatenate([[0.0], SCAN])
+PLACES: Final[Floats] = np.arange(17) / 16
+"""Places within a step where signs are looked at, shape (17,)."""
 
 
 def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> Flags:
@@ -42,7 +43,7 @@ def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> Flags:
         can reach 0 between two of the places.
     """
     crosses = (velocity[:, 1:] <= 0).any(axis=1)
-    reach = length / SCAN.size * np.abs(acceleration).max(axis=1)
+    reach = length / (PLACES.size - 1) * np.abs(acceleration).max(axis=1)
     low = velocity.min(axis=1, where=velocity > 0, initial=np.inf) < reach
     dips = ((acceleration[:, :-1] < 0) & (acceleration[:, 1:] > 0)).any(axis=1)
     return np.asarray(crosses | (low & dips))
@@ -69,8 +70,8 @@ def turn_of(
     def slope(s: float) -> float:
         return direction * value(acceleration, s)
 
-    for k in range(1, _PLACES.size):
-        low, high = _PLACES[k - 1], _PLACES[k]
+    for k in range(1, PLACES.size):
+        low, high = PLACES[k - 1], PLACES[k]
         if k == 1 and seen[0] <= 0:
             low = _TINY * high
             if forward(low) <= 0:
@@ -106,14 +107,14 @@ def stop_of(margin: Callable[[float], float], seen: Floats) -> float | None:
     seen : array, shape (17,)
         The margin at s = 0, 1/16, ... 1.
     """
-    for k in range(1, _PLACES.size):
-        low, high = _PLACES[k - 1], _PLACES[k]
+    for k in range(1, PLACES.size):
+        low, high = PLACES[k - 1], PLACES[k]
         if seen[k] <= 0:
             # A margin of 0 where the stick begins is used up at once; the least step keeps time
             # going.
             return root(margin, low, high) if seen[k - 1] > 0 else low + _TINY * (high - low)
-        if 1 < k < SCAN.size and _dips(seen[k - 1 : k + 2]):
-            ends = (_PLACES[k - 1], _PLACES[k + 1])
+        if 1 < k < PLACES.size - 1 and _dips(seen[k - 1 : k + 2]):
+            ends = (PLACES[k - 1], PLACES[k + 1])
             found = minimize_scalar(margin, bounds=ends, method="bounded", options={"xatol": 1e-9})
             if found.fun <= 0:
                 return root(margin, low, float(found.x))

@@ -6,8 +6,6 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from pendmap.virtual_rig.equation import Parameters
 
 if TYPE_CHECKING:
