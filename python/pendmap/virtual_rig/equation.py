@@ -55,7 +55,7 @@ class Parameters:
     friction: float
 
     def __post_init__(self) -> None:
-        for name, value in (("w0", self.w0), ("c/m", self.c_over_m), ("Tr", self.friction)):
+        for name, value in dataclasses.asdict(self).items():
             if not math.isfinite(value):
                 raise InputError(f"{name} is {value}: allowed is any finite number")
             if value < 0 or (name == "w0" and value == 0):

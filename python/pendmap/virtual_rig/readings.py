@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.signal import lfilter
 
 from pendmap.virtual_rig.effect import Effect, shape, size
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["READINGS", "ReadingEffect", "read"]
+__all__ = ["READINGS", "ReadingEffect", "fading", "read"]
 
 _FINE: Final = 1e-3
 """Step of the lag's exact response to a cubic between two points, s."""
@@ -64,6 +64,11 @@ def read(path: Path, time: Floats, effects: list[ReadingEffect]) -> Floats:
     result = np.empty_like(angle)
     result[order] = angle
     return result[: time.size]
+
+
+def fading(values: Floats, factor: float) -> Floats:
+    """Return ``y[k] = factor y[k - 1] + values[k]``, the filter of first order, shape (N,)."""
+    return np.array(list(itertools.accumulate(values.tolist(), lambda y, x: factor * y + x)))
 
 
 @dataclass(frozen=True)
@@ -165,7 +170,7 @@ class SensorLag(ReadingEffect):
         end = settled(every, np.full(step_count, step))
         # Departure from the settled reading at the start of each interval.
         jumps = np.concatenate([[0.0], end[:-1] - begin[1:]])
-        departure = lfilter([1.0], [1.0, -fade], jumps)
+        departure = fading(jumps, fade)
         k = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, step_count - 1)
         t = time - grid[k]
         return np.asarray(settled(k, t) + departure[k] * np.exp(-t / self.tau))

@@ -7,9 +7,9 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.signal import lfilter
 
 from pendmap.errors import InputError
+from pendmap.virtual_rig.readings import fading
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -122,4 +122,4 @@ class Sensor:
             return white
         driven = math.sqrt(1 - rho**2) * white
         driven[0] = white[0]
-        return np.asarray(lfilter([1.0], [1.0, -rho], driven))
+        return fading(driven, rho)
