@@ -270,7 +270,9 @@ def test_the_rig_shares_no_code_with_what_is_fitted() -> None:
         ("rig hidden --out x --dropouts 0.9", "0.5"),
         ("rig hidden --out x --free 0 --forced 0", "1 to 99"),
         ("rig hidden --out x --duration 0", "3600"),
-        ("rig hidden --out x --w0 0", "above 0"),
+        ("rig hidden --out x --w0 0", "0.1 to 100"),
+        ("rig hidden --out x --c-over-m nan", "nan"),
+        ("rig hidden --out x --rate 1e5 --duration 3600", "up to"),
         ("rig hidden --out x --tr=-1", "-1"),
         ("rig hidden --out x --seed=-1", "-1"),
         ("rig hidden --out no/such/x", "no/such"),
@@ -312,10 +314,11 @@ def test_what_is_there_is_replaced_only_if_asked(rig: Run, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("moment", ["computing", "writing"])
 def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path, moment: str) -> None:
-    words = [str(COMMAND), "rig", "hidden", "--rate", "2000", "--out", "lab"]
+    runs = ["--free", "60"] if moment == "computing" else ["--rate", "2000"]
+    words = [str(COMMAND), "rig", "hidden", *runs, "--out", "lab"]
     process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     if moment == "computing":
-        time.sleep(0.9)
+        time.sleep(1.2)
     while moment == "writing" and process.poll() is None and not list(tmp_path.glob(".lab*")):
         time.sleep(0.001)
     process.send_signal(signal.SIGINT)

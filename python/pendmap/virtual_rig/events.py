@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 __all__ = ["PLACES", "may_turn", "root", "stop_of", "turn_of"]
 
 _TINY: Final = 1e-4
-"""Where a velocity that starts at zero is looked at first, as a share of the step."""
+"""Where a velocity that starts at zero is looked at first, as a share of a sixteenth step."""
+_ROUNDING: Final = 1e-12
+"""Velocity that may be rounding, rad/s."""
 
 PLACES: Final[Floats] = np.arange(17) / 16
 """Places within a step where signs are looked at, shape (17,)."""
@@ -71,11 +73,12 @@ def turn_of(
         return direction * value(acceleration, s)
 
     for k in range(1, PLACES.size):
-        low, high = PLACES[k - 1], PLACES[k]
+        low, high = float(PLACES[k - 1]), float(PLACES[k])
         if k == 1 and seen[0] <= 0:
             low = _TINY * high
             if forward(low) <= 0:
-                return 0.0
+                # It slipped for no time, or rounding hides whether it did: time has to go on.
+                return low if abs(seen[1]) > _ROUNDING else high
         if seen[k] <= 0:
             return root(forward, low, high)
         if slope(low) < 0 < slope(high):
@@ -109,14 +112,13 @@ def stop_of(margin: Callable[[float], float], seen: Floats) -> float | None:
     """
     for k in range(1, PLACES.size):
         low, high = PLACES[k - 1], PLACES[k]
-        if seen[k] <= 0:
-            # A margin of 0 where the stick begins is used up at once; the least step keeps time
-            # going.
+        if seen[k] < 0:
+            # A margin of 0 where the stick begins is used up at once, but time has to go on.
             return root(margin, low, high) if seen[k - 1] > 0 else low + _TINY * (high - low)
         if 1 < k < PLACES.size - 1 and _dips(seen[k - 1 : k + 2]):
             ends = (PLACES[k - 1], PLACES[k + 1])
             found = minimize_scalar(margin, bounds=ends, method="bounded", options={"xatol": 1e-9})
-            if found.fun <= 0:
+            if found.fun < 0:
                 return root(margin, low, float(found.x))
     return None
 

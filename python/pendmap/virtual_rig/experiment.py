@@ -31,6 +31,8 @@ WINDOW: Final = 1.0
 """Length of the pieces over which the gap is measured, s: short enough that chaos stays small."""
 
 _AFTER_REST: Final = 3.0
+_MOST_SAMPLES: Final = 10_000_000
+"""Samples of all runs together; their records take 250 megabytes."""
 _RIG, _RUNS, _EFFECTS, _SENSOR = range(4)
 
 
@@ -84,6 +86,7 @@ class Request:
     jitter: float = 0.0
 
     def __post_init__(self) -> None:
+        self._refuse_rig()
         if self.preset not in PRESETS:
             known = ", ".join(PRESETS)
             raise InputError(f"experiment {self.preset!r} is not known: allowed are {known}")
@@ -96,6 +99,20 @@ class Request:
         free, forced = self.runs
         if min(free, forced) < 0 or not 1 <= free + forced <= 99:  # noqa: PLR2004
             raise InputError(f"{free} free and {forced} forced runs: allowed are 1 to 99 together")
+        seconds = self.duration or PRESETS[self.preset].duration[1]
+        if self.rate * seconds * (free + forced) > _MOST_SAMPLES:
+            raise InputError(
+                f"rate is {self.rate:g}: with {free + forced} runs of {seconds:g} s allowed is up"
+                f" to {_MOST_SAMPLES / seconds / (free + forced):.4g} Hz"
+            )
+
+    def _refuse_rig(self) -> None:
+        # What is far outside takes for ever: the steps follow the quickest time of the rig.
+        ranges = {"w0": (0.1, 100.0, "rad/s"), "c_over_m": (0.0, 100.0, "1/s")}
+        for name, (low, high, unit) in ranges.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise InputError(f"{name} is {value:g}: allowed is {low:g} to {high:g} {unit}")
 
     @property
     def runs(self) -> tuple[int, int]:

@@ -93,7 +93,10 @@ def write(experiment: Experiment, where: Places) -> None:
     old = part.with_suffix(".old")
     with held_interrupts():
         try:
-            part.mkdir()
+            try:
+                part.mkdir()
+            except OSError as error:
+                raise type(error)(error.errno, error.strerror, str(folder)) from error
             for k, run in enumerate(experiment.runs):
                 _write_run(part / _file(k), run)
             with (part / "experiment.toml").open("wb") as file:
