@@ -22,6 +22,7 @@ _COMMANDS = {
     "info": "Show the version, the instruction set used, the threads.",
     "simulate": "Integrate one trajectory: time history, phase plane, Poincaré section.",
     "basins": "Map the basins of attraction.",
+    "rig": "Write an experiment of a virtual rig, its truth beside it.",
     "plot": "Draw a result again, without computing.",
     "view": "Open a recording in the Rerun viewer.",
 }

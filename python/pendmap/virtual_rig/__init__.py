@@ -1,0 +1,26 @@
+"""A virtual rig: experiments whose truth is known, to try identification and diagnosis on.
+
+It stands apart on purpose. Its equation, integrator and formulas share no code with the models
+that are fitted to its records, and it imports none of them: else a test on its records would only
+show that the package agrees with itself.
+"""
+
+from __future__ import annotations
+
+from pendmap.virtual_rig.catalogue import EFFECTS, describe
+from pendmap.virtual_rig.experiment import Experiment, Request, Run, make
+from pendmap.virtual_rig.presets import PRESETS
+from pendmap.virtual_rig.writer import Places, places, write
+
+__all__ = [
+    "EFFECTS",
+    "PRESETS",
+    "Experiment",
+    "Places",
+    "Request",
+    "Run",
+    "describe",
+    "make",
+    "places",
+    "write",
+]

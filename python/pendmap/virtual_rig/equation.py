@@ -1,0 +1,183 @@
+"""The rig's equation of motion over lanes and times, with all its effects."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.virtual_rig.effect import Motion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.virtual_rig.drive import Drive
+    from pendmap.virtual_rig.effect import Effect
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Equation", "Parameters"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameters:
+    """The paper's rig, eq. 2.1, in SI.
+
+    ``th'' + c_over_m th' + w0**2 (1 + a(t)) sin th = -friction sign(th')``
+
+    Parameters
+    ----------
+    w0 : float
+        Natural frequency ``sqrt(g / l)``, rad/s; above 0.
+    c_over_m : float
+        Viscous damping ``c / m``, 1/s; 0 or more.
+    friction : float
+        Dry friction ``Tr``, rad/s^2; 0 or more.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or outside its range.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eq. 2.1.
+    """
+
+    w0: float
+    c_over_m: float
+    friction: float
+
+    def __post_init__(self) -> None:
+        for name, value in dataclasses.asdict(self).items():
+            if not math.isfinite(value):
+                raise InputError(f"{name} is {value}: allowed is any finite number")
+            if value < 0 or (name == "w0" and value == 0):
+                allowed = "a number above 0" if name == "w0" else "0 or more"
+                raise InputError(f"{name} is {value:g}: allowed is {allowed}")
+
+
+class Equation:
+    """Accelerations of all runs of an experiment.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        The rig without its effects.
+    drive : Drive
+        The drive that is meant, for R runs.
+    lab : array, shape (R,)
+        When each run began, s.
+    effects : sequence of Effect
+        What is hidden in the rig.
+
+    Raises
+    ------
+    InputError
+        If the effects can make dry friction or viscous damping negative, or the inertia vanish.
+    """
+
+    def __init__(
+        self, parameters: Parameters, drive: Drive, lab: Floats, effects: Sequence[Effect]
+    ) -> None:
+        self.parameters = parameters
+        self.effects = list(effects)
+        self.lab = lab
+        for effect in effects:
+            drive = effect.alter(drive, lab)
+        self.drive = drive
+        self.states = sum(effect.states for effect in effects)
+        ends = np.cumsum([0, *(effect.states for effect in effects)])
+        self._own = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        self.watches_load = any(effect.group == "load" for effect in effects)
+        self._refuse_negative()
+
+    def _refuse_negative(self) -> None:
+        least = {
+            "Tr": self.parameters.friction + sum(e.least_friction() for e in self.effects),
+            "c/m": self.parameters.c_over_m + sum(e.least_damping() for e in self.effects),
+        }
+        for name, value in least.items():
+            if value < 0:
+                names = ", ".join(effect.title for effect in self.effects)
+                raise InputError(
+                    f"{names}: {name} would fall to {value:.3g}: allowed are effects that leave"
+                    " it 0 or more"
+                )
+
+    def motion(  # noqa: PLR0913, PLR0917 (the state of a lane has that many parts)
+        self,
+        run: NDArray[np.intp],
+        time: Floats,
+        theta: Floats,
+        velocity: Floats,
+        direction: Floats,
+        side: Floats,
+    ) -> Motion:
+        """Return the motion of lanes; :class:`Motion` says which shapes."""
+        m = Motion()
+        m.run, m.time, m.theta, m.velocity = run, time, theta, velocity
+        m.direction, m.side, m.w0 = direction, side, self.parameters.w0
+        m.lab = self.lab[run] + time
+        m.sin, m.cos = np.sin(theta), np.cos(theta)
+        m.speed = direction * velocity
+        m.vertical, m.lateral = self.drive.at(run, time)
+        return m
+
+    def smooth(self, m: Motion, own: Floats) -> Floats:
+        """Everything but dry friction, per inertia, rad/s^2, shape (L, K)."""
+        p = self.parameters
+        total = -p.c_over_m * m.velocity - p.w0**2 * (1 + m.vertical) * m.sin
+        if not isinstance(m.lateral, float):
+            total -= p.w0**2 * m.lateral * m.cos
+        for effect, part in zip(self.effects, self._own, strict=True):
+            total = total + effect.torque(m, own[..., part])
+        return total
+
+    def friction(self, m: Motion, direction: Floats) -> Floats | float:
+        """Dry friction in a direction, rad/s^2, shape (L, K)."""
+        level: Floats | float = self.parameters.friction
+        for effect in self.effects:
+            level = level + effect.friction(m, direction)
+        return level
+
+    def rates(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
+        """Return accelerations, shape (L, K), and rates of the effects' own variables.
+
+        Lanes whose direction is 0 stick: their acceleration is 0.
+        """
+        force = self.smooth(m, own) - m.direction * self.friction(m, m.direction)
+        inertia: Floats | float = 1.0
+        for effect in self.effects:
+            inertia = inertia + effect.inertia(m)
+        acceleration = np.where(m.direction == 0, 0.0, force / inertia)
+        if not self.states:
+            return acceleration, own
+        parts = [
+            effect.rates(m, own[..., part], acceleration)
+            for effect, part in zip(self.effects, self._own, strict=True)
+            if effect.states
+        ]
+        return acceleration, np.concatenate(parts, axis=-1)
+
+    def margins(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
+        """How far a pendulum at rest is from slipping up and down, rad/s^2, shape (L, K).
+
+        It slips toward positive angles where the first is negative, toward negative ones where
+        the second is.
+        """
+        load = self.smooth(m, own)
+        one = np.ones_like(m.direction)
+        return self.friction(m, one) - load, load + self.friction(m, -one)
+
+    def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:
+        """Times since the run began, s, and jumps of the velocity there, rad/s."""
+        lab = float(self.lab[run])
+        found = [kick for e in self.effects for kick in e.kicks(lab + begin, lab + end)]
+        return sorted((time - lab, jump) for time, jump in found)

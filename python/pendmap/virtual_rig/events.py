@@ -1,0 +1,132 @@
+"""Where within a step the velocity or a margin of the stick passes zero."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+from pendmap.virtual_rig.collocation import value
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+__all__ = ["PLACES", "may_turn", "root", "stop_of", "turn_of"]
+
+_TINY: Final = 1e-4
+"""Where a velocity that starts at zero is looked at first, as a share of a sixteenth step."""
+_ROUNDING: Final = 1e-12
+"""Velocity that may be rounding, rad/s."""
+
+PLACES: Final[Floats] = np.arange(17) / 16
+"""Places within a step where signs are looked at, shape (17,)."""
+
+
+def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> Flags:
+    """Tell which lanes need a closer look: those that may come to rest within the step.
+
+    Parameters
+    ----------
+    velocity, acceleration : array, shape (L, 17)
+        At s = 0, 1/16, ... 1, times the lane's direction.
+    length : array, shape (L,)
+        Length of the step, s.
+
+    Returns
+    -------
+    array of bool, shape (L,)
+        Where the velocity is not above 0 somewhere after s = 0, or where it has a minimum that
+        can reach 0 between two of the places.
+    """
+    crosses = (velocity[:, 1:] <= 0).any(axis=1)
+    reach = length / (PLACES.size - 1) * np.abs(acceleration).max(axis=1)
+    low = velocity.min(axis=1, where=velocity > 0, initial=np.inf) < reach
+    dips = ((acceleration[:, :-1] < 0) & (acceleration[:, 1:] > 0)).any(axis=1)
+    return np.asarray(crosses | (low & dips))
+
+
+def turn_of(
+    velocity: list[float], acceleration: list[float], direction: float, seen: Floats
+) -> float | None:
+    """First place after s = 0 where a velocity becomes zero; ``None`` if it does not.
+
+    Parameters
+    ----------
+    velocity, acceleration : list of float
+        Legendre coefficients over the step.
+    direction : float
+        Sign of the velocity before that place.
+    seen : array, shape (17,)
+        ``direction * velocity`` at s = 0, 1/16, ... 1.
+    """
+
+    def forward(s: float) -> float:
+        return direction * value(velocity, s)
+
+    def slope(s: float) -> float:
+        return direction * value(acceleration, s)
+
+    for k in range(1, PLACES.size):
+        low, high = float(PLACES[k - 1]), float(PLACES[k])
+        if k == 1 and seen[0] <= 0:
+            low = _TINY * high
+            if forward(low) <= 0:
+                # It slipped for no time, or rounding hides whether it did: time has to go on.
+                return low if abs(seen[1]) > _ROUNDING else high
+        if seen[k] <= 0:
+            return root(forward, low, high)
+        if slope(low) < 0 < slope(high):
+            # A dip between two places: the velocity is least where the acceleration is zero.
+            least = root(slope, low, high)
+            if forward(least) <= 0:
+                return root(forward, low, least)
+    return None
+
+
+def root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function whose signs differ at ``low`` and ``high``.
+
+    Where rounding hides that, the end with the smaller value is the zero.
+    """
+    at_low, at_high = function(low), function(high)
+    if at_low * at_high >= 0:
+        return low if abs(at_low) < abs(at_high) else high
+    return float(brentq(function, low, high, xtol=1e-15, rtol=1e-15, maxiter=200))
+
+
+def stop_of(margin: Callable[[float], float], seen: Floats) -> float | None:
+    """First place after s = 0 where a margin is used up; ``None`` if it is not.
+
+    Parameters
+    ----------
+    margin : function
+        The margin at a place s.
+    seen : array, shape (17,)
+        The margin at s = 0, 1/16, ... 1.
+    """
+    for k in range(1, PLACES.size):
+        low, high = PLACES[k - 1], PLACES[k]
+        if seen[k] < 0:
+            # A margin of 0 where the stick begins is used up at once, but time has to go on.
+            return root(margin, low, high) if seen[k - 1] > 0 else low + _TINY * (high - low)
+        if 1 < k < PLACES.size - 1 and _dips(seen[k - 1 : k + 2]):
+            ends = (PLACES[k - 1], PLACES[k + 1])
+            found = minimize_scalar(margin, bounds=ends, method="bounded", options={"xatol": 1e-9})
+            if found.fun < 0:
+                return root(margin, low, float(found.x))
+    return None
+
+
+def _dips(three: Floats) -> bool:
+    """Whether the parabola through three neighbours may go below zero between them."""
+    before, here, after = (float(x) for x in three)
+    bend = before - 2 * here + after
+    if not (here <= before and here <= after and bend > 0):
+        return False
+    return here <= 2 * (after - before) ** 2 / (8 * bend) + bend / 4

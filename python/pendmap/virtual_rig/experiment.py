@@ -1,0 +1,301 @@
+"""An experiment made: clean motion, record and truth of every run."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.virtual_rig.catalogue import draw
+from pendmap.virtual_rig.drive import Drive
+from pendmap.virtual_rig.equation import Equation, Parameters
+from pendmap.virtual_rig.integrator import Starts, integrate
+from pendmap.virtual_rig.presets import PRESETS, RunPlan
+from pendmap.virtual_rig.readings import ReadingEffect, read
+from pendmap.virtual_rig.sensor import Sensor
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.virtual_rig.effect import Effect
+    from pendmap.virtual_rig.path import Path
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Experiment", "Request", "Run", "make"]
+
+WINDOW: Final = 1.0
+"""Length of the pieces over which the gap is measured, s: short enough that chaos stays small."""
+
+_AFTER_REST: Final = 3.0
+_MOST_SAMPLES: Final = 10_000_000
+"""Samples of all runs together; their records take 250 megabytes."""
+_RIG, _RUNS, _EFFECTS, _SENSOR = range(4)
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """What a user asks of the rig; ``None`` leaves it to the preset and the seed.
+
+    Parameters
+    ----------
+    preset : str
+        A name of ``PRESETS``.
+    seed : int
+        All draws come from it; 0 or more.
+    effects : tuple of str
+        Effects to hide; :func:`pendmap.virtual_rig.catalogue.draw` says how they are written.
+    size : float
+        Multiplies the size of every effect that is drawn; above 0.
+    w0, c_over_m, friction : float
+        The rig in SI, rad/s, 1/s, rad/s^2.
+    free, forced : int
+        How many runs of each kind, at most 99 together.
+    duration : float
+        Length of every run, s, at most 3600.
+    noise : float
+        Noise of the sensor, degrees.
+    rate, counts, correlation, dropouts, outliers, jitter
+        As in :class:`Sensor`.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or outside its range.
+    """
+
+    preset: str
+    seed: int = 0
+    effects: tuple[str, ...] = ()
+    size: float = 1.0
+    w0: float | None = None
+    c_over_m: float | None = None
+    friction: float | None = None
+    free: int | None = None
+    forced: int | None = None
+    duration: float | None = None
+    noise: float | None = None
+    rate: float = 100.0
+    counts: int = 4096
+    correlation: float = 0.0
+    dropouts: float = 0.0
+    outliers: float = 0.0
+    jitter: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._refuse_rig()
+        if self.preset not in PRESETS:
+            known = ", ".join(PRESETS)
+            raise InputError(f"experiment {self.preset!r} is not known: allowed are {known}")
+        if self.seed < 0:
+            raise InputError(f"seed is {self.seed}: allowed is 0 or more")
+        if not (math.isfinite(self.size) and self.size > 0):
+            raise InputError(f"size is {self.size:g}: allowed is a finite number above 0")
+        if self.duration is not None and not 1 <= self.duration <= 3600:  # noqa: PLR2004
+            raise InputError(f"duration is {self.duration:g}: allowed is 1 to 3600 s")
+        free, forced = self.runs
+        if min(free, forced) < 0 or not 1 <= free + forced <= 99:  # noqa: PLR2004
+            raise InputError(f"{free} free and {forced} forced runs: allowed are 1 to 99 together")
+        seconds = self.duration or PRESETS[self.preset].duration[1]
+        if self.rate * seconds * (free + forced) > _MOST_SAMPLES:
+            raise InputError(
+                f"rate is {self.rate:g}: with {free + forced} runs of {seconds:g} s allowed is up"
+                f" to {_MOST_SAMPLES / seconds / (free + forced):.4g} Hz"
+            )
+
+    def _refuse_rig(self) -> None:
+        # What is far outside takes for ever: the steps follow the quickest time of the rig.
+        ranges = {"w0": (0.1, 100.0, "rad/s"), "c_over_m": (0.0, 100.0, "1/s")}
+        for name, (low, high, unit) in ranges.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise InputError(f"{name} is {value:g}: allowed is {low:g} to {high:g} {unit}")
+
+    @property
+    def runs(self) -> tuple[int, int]:
+        """How many free and forced runs."""
+        preset = PRESETS[self.preset]
+        free = preset.free if self.free is None else self.free
+        return free, preset.forced if self.forced is None else self.forced
+
+    def stream(self, *path: int) -> np.random.Generator:
+        """A stream of random numbers of its own for each part of the experiment."""
+        return np.random.default_rng([self.seed, *path])
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """One run: what was meant, what happened, what was recorded.
+
+    Parameters
+    ----------
+    plan : RunPlan
+        What was meant.
+    path : Path
+        The clean motion.
+    time, angle : array, shape (N,)
+        The record: s and rad.
+    lost : int
+        Samples that the record lacks.
+    gap : float
+        What the effects change in the reading within a second, rad rms; no parameter is adapted.
+    """
+
+    plan: RunPlan
+    path: Path
+    time: Floats
+    angle: Floats
+    lost: int
+    gap: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """All runs, and the truth about them."""
+
+    request: Request
+    parameters: Parameters
+    effects: list[Effect]
+    sensor: Sensor
+    runs: list[Run]
+
+    @property
+    def gap(self) -> float:
+        """What the effects change in the reading within a second, rad rms over all samples."""
+        weights = [run.time.size for run in self.runs]
+        return math.sqrt(float(np.average([run.gap**2 for run in self.runs], weights=weights)))
+
+
+def make(request: Request) -> Experiment:
+    """Draw an experiment, integrate its runs and read its sensor.
+
+    The same request gives the same experiment, bit for bit on one machine.
+
+    Raises
+    ------
+    InputError
+        If a value, a name of an effect or a combination is not allowed.
+    """
+    preset = PRESETS[request.preset]
+    rng = request.stream(_RIG)
+    drawn = preset.parameters(rng)
+    given = {"w0": request.w0, "c_over_m": request.c_over_m, "friction": request.friction}
+    parameters = dataclasses.replace(drawn, **{k: v for k, v in given.items() if v is not None})
+    sensor = _sensor(request, rng)
+    plans = preset.plan(request.stream(_RUNS), parameters.w0, request.runs)
+    if request.duration is not None:
+        plans = _lasting(plans, request.duration)
+    kinds = {plan.kind for plan in plans}
+    asked = list(request.effects or preset.effects)
+    effects = draw(asked, request.stream(_EFFECTS), request.size, kinds)
+    readings = [effect for effect in effects if isinstance(effect, ReadingEffect)]
+    others = [effect for effect in effects if not isinstance(effect, ReadingEffect)]
+    lab = np.array([plan.lab_time for plan in plans])
+    drive = Drive.harmonic(
+        np.array([plan.p for plan in plans]),
+        np.array([plan.frequency for plan in plans]),
+        np.array([plan.phase for plan in plans]),
+    )
+    equation = Equation(parameters, drive, lab, others)
+    paths = _integrate(equation, plans, readings)
+    if preset.until_rest and request.duration is None:
+        plans = [_until_rest(*pair) for pair in zip(plans, paths, strict=True)]
+    instants = [
+        sensor.instants(sensor.times(plan.duration), request.stream(_SENSOR, k, 1))
+        for k, plan in enumerate(plans)
+    ]
+    strayed = [np.zeros_like(times) for times in instants]
+    if others:
+        strayed = _strayed(Equation(parameters, drive, lab, []), paths, instants)
+    runs = []
+    for k, (plan, path) in enumerate(zip(plans, paths, strict=True)):
+        reading = read(path, _true(instants[k], readings), readings)
+        angle, keep = sensor.write_down(reading, request.stream(_SENSOR, k, 0))
+        gap = reading - path.angle(instants[k]) + strayed[k]
+        runs.append(
+            Run(
+                plan=plan,
+                path=path,
+                time=sensor.times(plan.duration)[keep],
+                angle=angle[keep],
+                lost=int((~keep).sum()),
+                gap=math.sqrt(float(np.mean(gap**2))),
+            )
+        )
+    return Experiment(request, parameters, effects, sensor, runs)
+
+
+def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
+    low, high = PRESETS[request.preset].noise
+    drawn = math.exp(rng.uniform(math.log(low), math.log(high)))
+    noise = drawn if request.noise is None else request.noise
+    if not (math.isfinite(noise) and 0 <= noise <= 180):  # noqa: PLR2004 (degrees)
+        raise InputError(f"noise is {noise:g}: allowed is 0 to 180 degrees")
+    shared = {field.name for field in dataclasses.fields(Sensor)} - {"noise"}
+    settings: dict[str, Any] = {name: getattr(request, name) for name in shared}
+    return Sensor(noise=math.radians(noise), **settings)
+
+
+def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
+    """The same runs with another length, and the same pauses between them."""
+    result, lab = [], 0.0
+    for k, plan in enumerate(plans):
+        result.append(dataclasses.replace(plan, duration=duration, lab_time=round(lab, 1)))
+        if k + 1 < len(plans):
+            pause = plans[k + 1].lab_time - plan.lab_time - plan.duration
+            lab += duration + pause
+    return result
+
+
+def _integrate(
+    equation: Equation, plans: list[RunPlan], readings: list[ReadingEffect]
+) -> list[Path]:
+    ends = [max(_true(np.array([plan.duration]), readings)[0], 0.0) for plan in plans]
+    starts = Starts(
+        run=np.arange(len(plans)),
+        begin=np.zeros(len(plans)),
+        end=np.array(ends),
+        theta=np.array([plan.theta for plan in plans]),
+        velocity=np.array([plan.velocity for plan in plans]),
+    )
+    return integrate(equation, starts)
+
+
+def _true(time: Floats, readings: list[ReadingEffect]) -> Floats:
+    """True times of what is recorded at ``time``."""
+    for effect in readings:
+        time = effect.clock(time)
+    return time
+
+
+def _until_rest(plan: RunPlan, path: Path) -> RunPlan:
+    if not path.events or path.events[-1].what != "stick":
+        return plan
+    end = math.ceil(path.events[-1].time + _AFTER_REST)
+    return dataclasses.replace(plan, duration=min(plan.duration, float(end)))
+
+
+def _strayed(plain: Equation, paths: list[Path], instants: list[Floats]) -> list[Floats]:
+    """The motion minus that of a rig without effects, set back on it every second, rad."""
+    begins = [np.arange(0.0, max(times[-1], WINDOW / 2), WINDOW) for times in instants]
+    ends = [np.append(begin[1:], times[-1]) for begin, times in zip(begins, instants, strict=True)]
+    starts = Starts(
+        run=np.repeat(np.arange(len(paths)), [begin.size for begin in begins]),
+        begin=np.concatenate(begins),
+        end=np.concatenate(ends),
+        theta=np.concatenate([path.angle(t) for path, t in zip(paths, begins, strict=True)]),
+        velocity=np.concatenate([path.velocity(t) for path, t in zip(paths, begins, strict=True)]),
+    )
+    pieces = iter(integrate(plain, starts))
+    result = []
+    for path, begin, times in zip(paths, begins, instants, strict=True):
+        which = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, begin.size - 1)
+        other = np.empty_like(times)
+        for n in range(begin.size):
+            mine = which == n
+            other[mine] = next(pieces).angle(times[mine])
+        result.append(path.angle(times) - other)
+    return result

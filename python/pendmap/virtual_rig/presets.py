@@ -1,0 +1,196 @@
+"""Which runs an experiment has, drawn from its seed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+from pendmap.virtual_rig.equation import Parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.random import Generator
+
+__all__ = ["PRESETS", "Preset", "RunPlan"]
+
+
+@dataclasses.dataclass(frozen=True)
+class RunPlan:
+    """What is meant to happen in one run.
+
+    Parameters
+    ----------
+    kind : str
+        ``free`` or ``forced``.
+    theta, velocity : float
+        State when the run begins, rad and rad/s.
+    duration : float
+        Length of the record, s.
+    p, frequency, phase : float
+        The drive ``p cos(Omega t + phi)``; ``p`` is 0 in a free run.
+    lab_time : float
+        When the run begins, s.
+    """
+
+    kind: str
+    theta: float
+    velocity: float
+    duration: float
+    p: float = 0.0
+    frequency: float = 1.0
+    phase: float = 0.0
+    lab_time: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Preset:
+    """An experiment by name.
+
+    Parameters
+    ----------
+    about : str
+        What it is, in a line.
+    free, forced : int
+        How many runs of each kind.
+    duration : (float, float)
+        Range of their lengths, s.
+    c_over_m, friction : (float, float)
+        Ranges of c/m, 1/s, and of Tr, rad/s^2.
+    noise : (float, float)
+        Range of the noise, degrees, drawn log-uniformly.
+    effects : tuple of str
+        What is hidden if nothing is asked for.
+    until_rest : bool
+        Whether a record ends a little after the pendulum has come to rest.
+    """
+
+    about: str
+    free: int
+    forced: int
+    duration: tuple[float, float]
+    c_over_m: tuple[float, float]
+    friction: tuple[float, float]
+    noise: tuple[float, float]
+    effects: tuple[str, ...]
+    until_rest: bool = False
+
+    def parameters(self, rng: Generator) -> Parameters:
+        """Draw the rig without its effects."""
+        w0 = rng.uniform(6.0, 6.4)
+        return Parameters(w0, rng.uniform(*self.c_over_m), rng.uniform(*self.friction))
+
+    def plan(self, rng: Generator, w0: float, counts: tuple[int, int]) -> list[RunPlan]:
+        """Draw the runs, free and forced ones in turn, one after another in lab time.
+
+        Parameters
+        ----------
+        rng : Generator
+            Where they come from.
+        w0 : float
+            Natural frequency, rad/s.
+        counts : (int, int)
+            Free and forced runs.
+        """
+        free = [(_free(rng, k, w0, alone=self.until_rest)) for k in range(counts[0])]
+        forced = [_FORCED[k % len(_FORCED)](rng, w0) for k in range(counts[1])]
+        mixed = []
+        for k in range(max(counts)):
+            mixed += free[k : k + 1] + forced[k : k + 1]
+        plans, lab = [], 0.0
+        for plan in mixed:
+            duration = round(float(rng.uniform(*self.duration)), 1)
+            plans.append(dataclasses.replace(plan, duration=duration, lab_time=round(lab, 1)))
+            lab += duration + float(rng.uniform(10.0, 30.0))
+        return plans
+
+
+def _free(rng: Generator, k: int, w0: float, *, alone: bool) -> RunPlan:
+    """The k-th free decay: releases at rest from wide to narrow, every fifth flung round."""
+    sign = float(rng.choice((-1.0, 1.0)))
+    if alone:
+        return RunPlan("free", sign * rng.uniform(2.9, 3.05), 0.0, 0.0)
+    ranges = ((2.7, 3.05), (1.0, 1.6), None, (1.8, 2.4), (0.4, 0.8))
+    span = ranges[k % len(ranges)]
+    if span is None:
+        return RunPlan("free", rng.uniform(-0.3, 0.3), sign * rng.uniform(2.2, 3.2) * w0, 0.0)
+    return RunPlan("free", sign * rng.uniform(*span), 0.0, 0.0)
+
+
+def _forced(rng: Generator, frequency: float, p: float, theta: float, velocity: float) -> RunPlan:
+    phase = rng.uniform(-math.pi, math.pi)
+    p, frequency, phase = round(p, 3), round(frequency, 3), round(phase, 3)
+    return RunPlan("forced", theta, velocity, 0.0, p, frequency, phase)
+
+
+def _swinging(rng: Generator, w0: float) -> RunPlan:
+    """The first resonance: an oscillation at half the drive's frequency."""
+    frequency, p = rng.uniform(1.9, 2.04) * w0, rng.uniform(0.2, 0.6)
+    theta = rng.choice((-1.0, 1.0)) * rng.uniform(0.4, 1.2)
+    return _forced(rng, frequency, p, float(theta), 0.0)
+
+
+def _rotating(rng: Generator, w0: float) -> RunPlan:
+    """Near the rotation with one turn a forcing period, either way."""
+    way = float(rng.choice((-1.0, 1.0)))
+    plan = _forced(rng, rng.uniform(1.2, 2.0) * w0, rng.uniform(0.4, 1.0), 0.0, 0.0)
+    # There the angle follows the drive's phase, and is quickest where the pivot pulls down most.
+    theta = way * (plan.phase + rng.uniform(-0.6, 0.2))
+    velocity = way * plan.frequency * (1 + 0.25 * math.cos(plan.phase))
+    return dataclasses.replace(plan, theta=theta, velocity=velocity)
+
+
+def _slow(rng: Generator, w0: float) -> RunPlan:
+    """Driven about as slowly as it swings: the second resonance."""
+    frequency, p = rng.uniform(0.85, 1.1) * w0, rng.uniform(0.3, 1.0)
+    return _forced(rng, frequency, p, rng.uniform(-2.5, 2.5), rng.uniform(-0.5, 0.5) * w0)
+
+
+def _strong(rng: Generator, w0: float) -> RunPlan:
+    """Strongly driven from far off: wide swings, turns, chaos for a while."""
+    frequency, p = rng.uniform(1.8, 2.1) * w0, rng.uniform(0.6, 1.0)
+    return _forced(rng, frequency, p, rng.uniform(-2.5, 2.5), rng.uniform(-1.0, 1.0) * w0)
+
+
+_FORCED: Final[tuple[Callable[[Generator, float], RunPlan], ...]] = (
+    _swinging,
+    _rotating,
+    _slow,
+    _strong,
+)
+
+PRESETS: Final[dict[str, Preset]] = {
+    "free_decay": Preset(
+        about="one release near pi until it rests; viscous damping and Coulomb friction",
+        free=1,
+        forced=0,
+        duration=(120.0, 120.0),
+        c_over_m=(0.045, 0.055),
+        friction=(0.07, 0.09),
+        noise=(0.1, 0.1),
+        effects=("none",),
+        until_rest=True,
+    ),
+    "forced": Preset(
+        about="four runs under drive, swinging and rotating",
+        free=0,
+        forced=4,
+        duration=(30.0, 40.0),
+        c_over_m=(0.05, 0.1),
+        friction=(0.05, 0.1),
+        noise=(0.1, 0.1),
+        effects=("none",),
+    ),
+    "hidden": Preset(
+        about="five free and four forced runs, an effect hidden in them that the seed chooses",
+        free=5,
+        forced=4,
+        duration=(15.0, 30.0),
+        c_over_m=(0.05, 0.1),
+        friction=(0.05, 0.1),
+        noise=(0.05, 0.5),
+        effects=("any",),
+    ),
+}
+"""The experiments that have a name."""

@@ -1,0 +1,206 @@
+"""The experiment's folder, and the truth beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import importlib.metadata
+import math
+import shutil
+import uuid
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import tomli_w
+
+from pendmap.errors import InputError
+from pendmap.files import held_interrupts
+
+if TYPE_CHECKING:
+    import os
+
+    from pendmap.virtual_rig.effect import Effect
+    from pendmap.virtual_rig.experiment import Experiment, Run
+
+__all__ = ["FORMAT_VERSION", "Places", "places", "write"]
+
+FORMAT_VERSION: Final = 1
+"""Version of the layout of the truth file."""
+
+_GRAVITY: Final = 9.81
+
+
+@dataclasses.dataclass(frozen=True)
+class Places:
+    """Where an experiment is written.
+
+    Parameters
+    ----------
+    experiment : Path
+        The folder.
+    truth : Path
+        The file beside it, ``FOLDER.truth.toml``.
+    """
+
+    experiment: Path
+    truth: Path
+
+
+def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
+    """Check where an experiment shall be written, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        If the folder is not empty, or there is a truth already, and they may not be replaced; or
+        if the folder is not an experiment and shall be replaced.
+    FileNotFoundError, NotADirectoryError
+        If the folder above does not exist, or the path is a file.
+    """
+    folder = Path(out)
+    if not folder.name or folder.name == "..":
+        folder = folder.resolve()
+    truth = folder.with_name(f"{folder.name}.truth.toml")
+    if not folder.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "the folder does not exist", str(folder.parent))
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, "is not a folder", str(folder))
+    full = folder.is_dir() and any(folder.iterdir())
+    if full and not replace:
+        raise InputError(f"{folder}: is not empty: allowed is a new or empty folder, or --replace")
+    if full and not (folder / "experiment.toml").is_file():
+        raise InputError(f"{folder}: is not an experiment: --replace replaces nothing else")
+    if truth.exists() and not replace:
+        raise InputError(f"{truth}: exists: allowed is another folder, or --replace")
+    return Places(folder, truth)
+
+
+def write(experiment: Experiment, where: Places) -> None:
+    """Write the folder and the truth: both complete, or neither.
+
+    They are written beside their places under hidden names and renamed at the end; an interrupt
+    waits until then.
+
+    Raises
+    ------
+    OSError
+        If they cannot be written.
+    """
+    mark = uuid.uuid4().hex[:8]
+    folder, truth = where.experiment, where.truth
+    part = folder.with_name(f".{folder.name}-{mark}.part")
+    truth_part = part.with_suffix(".part.toml")
+    old = part.with_suffix(".old")
+    with held_interrupts():
+        try:
+            try:
+                part.mkdir()
+            except OSError as error:
+                raise type(error)(error.errno, error.strerror, str(folder)) from error
+            for k, run in enumerate(experiment.runs):
+                _write_run(part / _file(k), run)
+            with (part / "experiment.toml").open("wb") as file:
+                tomli_w.dump(_description(experiment), file)
+            with truth_part.open("wb") as file:
+                tomli_w.dump(_truth(experiment), file)
+            if folder.exists():
+                folder.rename(old)
+            try:
+                part.rename(folder)
+            except OSError:
+                if old.exists():
+                    old.rename(folder)
+                raise
+            truth_part.replace(truth)
+        finally:
+            for leftover in (part, old):
+                shutil.rmtree(leftover, ignore_errors=True)
+            truth_part.unlink(missing_ok=True)
+
+
+def _file(k: int) -> str:
+    return f"run_{k:02d}.csv"
+
+
+def _write_run(path: Path, run: Run) -> None:
+    # 12 digits keep every count apart, and an angle without counts to 1e-11 rad.
+    rows = zip(run.time.tolist(), run.angle.tolist(), strict=True)
+    lines = ["t_s,theta_rad", *(f"{time:.6f},{angle:.12g}" for time, angle in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _description(experiment: Experiment) -> dict[str, Any]:
+    """What somebody who did the experiment would know."""
+    rig: dict[str, Any] = {"gravity": _GRAVITY, "w0": round(experiment.parameters.w0, 1)}
+    if experiment.sensor.counts:
+        rig["encoder_counts"] = experiment.sensor.counts
+    runs = []
+    for k, run in enumerate(experiment.runs):
+        plan = run.plan
+        entry: dict[str, Any] = {"file": _file(k), "kind": plan.kind, "lab_time_s": plan.lab_time}
+        if plan.kind == "forced":
+            entry["drive"] = _drive(run)
+        runs.append(entry)
+    return {"rig": rig, "run": runs}
+
+
+def _drive(run: Run) -> dict[str, float]:
+    return {"p": run.plan.p, "Omega": run.plan.frequency, "phi": run.plan.phase}
+
+
+def _truth(experiment: Experiment) -> dict[str, Any]:
+    """Everything that was drawn and hidden."""
+    request, parameters, sensor = experiment.request, experiment.parameters, experiment.sensor
+    asked = {k: v for k, v in dataclasses.asdict(request).items() if v is not None}
+    return {
+        "format_version": FORMAT_VERSION,
+        "equation": "th'' + c_over_m th' + w0^2 (1 + p cos(Omega t + phi)) sin th = "
+        "-Tr sign(th') + effects, per unit of inertia, SI",
+        "provenance": {"pendmap_version": importlib.metadata.version("pendmap"), "request": asked},
+        "pendulum": {
+            "w0": parameters.w0,
+            "c_over_m": parameters.c_over_m,
+            "Tr": parameters.friction,
+            "zeta": parameters.c_over_m / (2 * parameters.w0),
+            "theta_r": parameters.friction / parameters.w0**2,
+        },
+        "effect": [_effect(effect) for effect in experiment.effects],
+        "sensor": {
+            "rate_hz": sensor.rate,
+            "encoder_counts": sensor.counts,
+            "noise_rad": sensor.noise,
+            "noise_deg": math.degrees(sensor.noise),
+            "correlation": sensor.correlation,
+            "dropouts": sensor.dropouts,
+            "outliers": sensor.outliers,
+            "jitter_s": sensor.jitter,
+        },
+        # Without adapting any parameter, set back on the true motion every 3 s.
+        "gap_rms_rad": experiment.gap,
+        "run": [_run(k, run) for k, run in enumerate(experiment.runs)],
+    }
+
+
+def _effect(effect: Effect) -> dict[str, Any]:
+    fields = dataclasses.fields(effect)
+    entry: dict[str, Any] = {"name": effect.name, "group": effect.group, "formula": effect.formula}
+    if effect.variant:
+        entry["variant"] = effect.variant
+    entry["parameters"] = {field.name: getattr(effect, field.name) for field in fields}
+    entry["units"] = {field.name: field.metadata["unit"] or "1" for field in fields}
+    return entry
+
+
+def _run(k: int, run: Run) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "file": _file(k),
+        "kind": run.plan.kind,
+        "theta0_rad": float(run.plan.theta),
+        "velocity0_rad_s": float(run.plan.velocity),
+        "samples_lost": run.lost,
+        "gap_rms_rad": run.gap,
+    }
+    if run.path.events and run.path.events[-1].what == "stick":
+        entry["rests_from_s"] = run.path.events[-1].time
+        entry["rests_at_rad"] = run.path.events[-1].theta
+    return entry

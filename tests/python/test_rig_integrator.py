@@ -1,0 +1,253 @@
+"""The virtual rig's integrator against numbers and integrators of others."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendmap.virtual_rig.damping import DahlFriction, LoadDependentFriction, SharpStribeckFriction
+from pendmap.virtual_rig.drive import Drive
+from pendmap.virtual_rig.equation import Equation, Parameters
+from pendmap.virtual_rig.integrator import Starts, integrate
+from pendmap.virtual_rig.readings import SensorLag
+from pendmap.virtual_rig.stands import Impulses, PivotCompliance
+from pendmap.virtual_rig.torques import InertiaRipple, Magnet
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.virtual_rig.effect import Effect
+    from pendmap.virtual_rig.path import Path
+
+LOW = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
+
+
+def run(  # noqa: PLR0913, PLR0917 (a run has that many numbers)
+    parameters: Parameters,
+    drive: tuple[float, float, float],
+    theta: float,
+    velocity: float,
+    end: float,
+    effects: Sequence[Effect] = (),
+) -> Path:
+    """Integrate one run from lab time 0."""
+    arrays = (np.array([x]) for x in drive)
+    equation = Equation(parameters, Drive.harmonic(*arrays), np.zeros(1), effects)
+    begin = np.zeros(1)
+    starts = Starts(
+        np.array([0]), begin, begin + end, np.array([float(theta)]), np.array([float(velocity)])
+    )
+    (path,) = integrate(equation, starts)
+    return path
+
+
+def scipy_with_events(
+    parameters: Parameters,
+    drive: tuple[float, float, float],
+    theta: float,
+    velocity: float,
+    end: float,
+) -> tuple[float, float, int]:
+    """Integrate with DOP853, turn by turn, sticks by events; end state and number of sticks.
+
+    An event that comes and goes between two of its steps is missed: they are kept short.
+    """
+    p, frequency, phase = drive
+    w0, c, limit = parameters.w0, parameters.c_over_m, parameters.friction
+
+    def load(t: float, th: float) -> float:
+        return -(w0**2) * (1 + p * math.cos(frequency * t + phase)) * math.sin(th)
+
+    def stopped(_: float, y: np.ndarray) -> float:
+        return float(y[1])
+
+    stopped.terminal = True  # type: ignore[attr-defined]
+    t, y, sticks = 0.0, [theta, velocity], 0
+    while t < end:
+        sign = float(np.sign(y[1]))
+        if sign == 0:
+            here = load(t, y[0])
+            sign = float(np.sign(here)) if abs(here) > limit else 0.0
+        if sign == 0:
+            sticks += 1
+
+            def slips(s: float, _: np.ndarray, th: float = y[0]) -> float:
+                return limit - abs(load(s, th))
+
+            slips.terminal = True  # type: ignore[attr-defined]
+            held = solve_ivp(lambda *_: [1.0], (t, end), [0.0], events=slips, max_step=2e-3, **LOW)
+            t = float(held.t[-1])
+            sign = float(np.sign(load(t, y[0])))
+            if t >= end:
+                break
+
+        def rate(s: float, y: np.ndarray, sign: float = sign) -> list[float]:
+            return [y[1], load(s, y[0]) - c * y[1] - sign * limit]
+
+        stopped.direction = -sign  # type: ignore[attr-defined]
+        piece = solve_ivp(rate, (t, end), y, events=stopped, max_step=5e-3, **LOW)
+        t, y = float(piece.t[-1]), [float(piece.y[0, -1]), float(piece.y[1, -1])]
+        if piece.status == 1:
+            y[1] = 0.0
+    return y[0], y[1], sticks
+
+
+def test_free_decay_of_the_truths(truths: dict[str, Any]) -> None:
+    case = truths["free_decay"]["nonlinear"][0]
+    times, peaks = ([float(x) for x in case[key]] for key in ("times", "thetas"))
+    parameters = Parameters(float(case["w0"]), float(case["c_over_m"]), float(case["Tr"]))
+    path = run(parameters, (0, 1, 0), float(case["theta0"]), 0, times[-1] + 5)
+    assert [event.what for event in path.events] == ["turn"] * (len(peaks) - 2) + ["stick"]
+    assert [event.time for event in path.events] == pytest.approx(times[1:], abs=1e-10)
+    assert [event.theta for event in path.events] == pytest.approx(peaks[1:], abs=1e-11)
+    still = path.angle(np.array([times[-1] + 4]))
+    assert still == pytest.approx(peaks[-1], abs=1e-11)
+
+
+@pytest.mark.parametrize("case", range(6))
+def test_stick_and_slip_of_the_truths(truths: dict[str, Any], case: int) -> None:
+    true = truths["stick_slip"][case]
+    parameters = Parameters(1, true["gamma"], true["theta_r"])
+    end = true["periods"] * math.tau / true["omega"]
+    path = run(parameters, (true["p"], true["omega"], 0), true["theta0"], true["v0"], end)
+    events = [event for event in true["events"] if event["what"] != "stuck for ever"]
+    assert [event.what for event in path.events] == [event["what"] for event in events]
+    for mine, other in zip(path.events, events, strict=True):
+        assert mine.time == pytest.approx(other["tau"], abs=1e-9)
+        assert mine.theta == pytest.approx(other["theta"], abs=1e-10)
+    last = np.array([end])
+    assert path.angle(last) == pytest.approx(true["theta"], abs=1e-11)
+    assert path.velocity(last) == pytest.approx(true["v"], abs=1e-11)
+
+
+def test_trajectories_of_the_truths(truths: dict[str, Any]) -> None:
+    for true in truths["trajectories"]:
+        gamma, p, omega = (float(true[key]) for key in ("gamma", "p", "omega"))
+        end = float(true["times"][0])
+        drive = (p, omega, 0.0)
+        path = run(Parameters(1, gamma, 0), drive, float(true["theta0"]), float(true["v0"]), end)
+        assert path.angle(np.array([end])) == pytest.approx(float(true["theta"][0]), abs=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_models_against_scipy_with_events(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    heavy = seed % 2 == 0  # friction like a brake: it sticks again and again
+    parameters = Parameters(
+        rng.uniform(3, 8), rng.uniform(0, 0.5), rng.uniform(8, 14) if heavy else rng.uniform(0, 0.3)
+    )
+    drive = (rng.uniform(0.3, 1.2), rng.uniform(2, 14), rng.uniform(-3, 3))
+    theta, velocity, end = rng.uniform(-3, 3), rng.uniform(-6, 6), 4.0
+    expected = scipy_with_events(parameters, drive, theta, velocity, end)
+    path = run(parameters, drive, theta, velocity, end)
+    state = float(path.angle(np.array([end]))[0]), float(path.velocity(np.array([end]))[0])
+    assert state == pytest.approx(expected[:2], abs=1e-9)
+    assert sum(event.what == "stick" for event in path.events) == expected[2]
+    assert not heavy or expected[2] >= 1
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, -math.pi / 2, math.pi])
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_starts_at_the_edge_of_a_stick_come_to_their_end(friction: float, phase: float) -> None:
+    for strength in (0.0, 0.5):
+        limit = math.asin(friction / (36 * (1 + strength * math.cos(phase))))
+        for theta in (limit, -limit, math.pi - limit, 0.0):
+            path = run(Parameters(6, 0.1, friction), (strength, 12, phase), theta, 0, 3)
+            assert path.steps < 1000
+            assert np.isfinite(path.angle(np.array([3.0]))).all()
+
+
+def test_energy_without_friction_is_kept() -> None:
+    path = run(Parameters(6.2, 0, 0), (0, 1, 0), 3.0, 0, 60)
+    time = np.linspace(0, 60, 500)
+    energy = path.velocity(time) ** 2 / 2 - 6.2**2 * np.cos(path.angle(time))
+    assert np.ptp(energy) < 1e-10
+
+
+def test_a_pivot_that_gives_way_against_its_lagrangian() -> None:
+    # Cart and pendulum from the Lagrangian: M x'' + m l (th'' cos - th'^2 sin) = -k x - d x'.
+    w0, mu, wx, z, c = 6.2, 0.05, 30.0, 0.02, 0.1
+
+    def rate(_: float, y: np.ndarray) -> list[float]:
+        th, v, x, u = y
+        matrix = np.array([[1.0, math.cos(th)], [mu * math.cos(th), 1.0]])
+        force = [
+            -c * v - w0**2 * math.sin(th),
+            mu * v**2 * math.sin(th) - 2 * z * wx * u - wx**2 * x,
+        ]
+        a, b = np.linalg.solve(matrix, force)
+        return [v, a, u, b]
+
+    other = solve_ivp(rate, (0, 4), [0.5, 11.0, 0, 0], **LOW)
+    effect = PivotCompliance(mu=mu, wx=wx, z=z)
+    path = run(Parameters(w0, c, 0), (0, 1, 0), 0.5, 11.0, 4, [effect])
+    assert path.angle(np.array([4.0])) == pytest.approx(other.y[0, -1], abs=1e-9)
+
+
+def test_an_inertia_that_varies_keeps_its_energy() -> None:
+    # (1 + e cos(n th + psi)) v^2 / 2 - w0^2 cos th is what a Lagrangian with that inertia keeps.
+    effect = InertiaRipple(e=0.3, n=2, psi=0.7)
+    path = run(Parameters(6.2, 0, 0), (0, 1, 0), 2.0, 0, 20, [effect])
+    time = np.linspace(0, 20, 300)
+    theta, velocity = path.angle(time), path.velocity(time)
+    inertia = 1 + 0.3 * np.cos(2 * theta + 0.7)
+    assert np.ptp(inertia * velocity**2 / 2 - 6.2**2 * np.cos(theta)) < 1e-9
+
+
+def test_corners_and_cusps_against_scipy_in_pieces() -> None:
+    # All signs written out: scipy crosses them with steps that it has to shorten.
+    w0, friction = 6.2, 0.3
+    load = LoadDependentFriction(k=0.1)
+    sharp = SharpStribeckFriction(a=0.1, vs=0.5)
+    magnet = Magnet(A=0.5, w=0.1)
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        th, v = y
+        up = 1 + 0.9 * math.cos(9 * t)
+        x = (th - math.tau * round(th / math.tau)) / 0.1
+        dry = friction + 0.1 * (abs(up * math.cos(th) + (v / w0) ** 2) - 1)
+        dry += 0.1 * math.exp(-abs(v / 0.5))
+        pull = 0.5 * x * math.exp(-(x**2) / 2)
+        return [v, -(w0**2) * up * math.sin(th) - math.copysign(dry, v) - pull]
+
+    other = solve_ivp(rate, (0, 2), [2.5, 1.0], **(LOW | {"max_step": 1e-3}))
+    effects = [load, sharp, magnet]
+    path = run(Parameters(w0, 0, friction), (0.9, 9, 0), 2.5, 1.0, 2, effects)
+    assert path.angle(np.array([2.0])) == pytest.approx(other.y[0, -1], abs=1e-7)
+
+
+def test_dahl_friction_yields_before_it_slips() -> None:
+    # Well inside the yield, the contact is a spring f/zc: the small swing is that much quicker.
+    effect = DahlFriction(f=0.5, zc=0.05)
+    path = run(Parameters(6.2, 0, 0), (0, 1, 0), 1e-5, 0, 3, [effect])
+    turns = [event.time for event in path.events if event.what == "turn"]
+    period = 2 * float(np.mean(np.diff(turns)))
+    assert period == pytest.approx(math.tau / math.sqrt(6.2**2 + 10), rel=1e-3)
+
+
+def test_impulses_are_jumps_of_the_velocity() -> None:
+    effect = Impulses(J=0.05, every=2.0, pattern=7)
+    path = run(Parameters(6.2, 0.1, 0.1), (0, 1, 0), 1.0, 0, 10, [effect])
+    kicks = effect.kicks(0, 10)
+    assert len(kicks) >= 3
+    for time, jump in kicks:
+        before, after = path.velocity(np.array([time - 1e-9, time + 1e-9]))
+        assert after - before == pytest.approx(jump, abs=1e-6)
+
+
+def test_a_lag_against_its_differential_equation() -> None:
+    path = run(Parameters(6.2, 0.1, 0.1), (0, 1, 0), 2.5, 0, 3)
+    lag = SensorLag(tau=0.02)
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        return [(float(path.angle(np.array([t]))[0]) - float(y[0])) / 0.02]
+
+    time = np.sort(np.random.default_rng(1).uniform(0, 3, 40))
+    start = lag.distort(np.array([0.0, 1.0]), np.zeros(2), path)[0]
+    other = solve_ivp(rate, (0, 3), [start], t_eval=time, rtol=1e-9, atol=1e-10, max_step=0.05)
+    span = np.concatenate([[0.0], time, [3.0]])
+    assert lag.distort(span, np.zeros(span.size), path)[1:-1] == pytest.approx(other.y[0], abs=2e-8)
