@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias, TypedDict
 
 import numpy as np
@@ -11,6 +11,7 @@ __all__ = [
     "basins_list",
     "choose_steps",
     "default_threads",
+    "effects",
     "simd",
     "simd_available",
     "simulate",
@@ -18,7 +19,9 @@ __all__ = [
 
 __version__: str
 
-_Parameters: TypeAlias = tuple[float, float, float, float, float, float]
+_Parameters: TypeAlias = tuple[
+    float, float, float, float, float, float, float, Sequence[tuple[str, Sequence[float]]]
+]
 _Axis: TypeAlias = tuple[float, float, int]
 _Floats: TypeAlias = NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int, int], object]
@@ -34,6 +37,7 @@ class _Choices(TypedDict):
 def simd() -> str: ...
 def simd_available() -> list[str]: ...
 def default_threads() -> int: ...
+def effects() -> list[dict[str, Any]]: ...
 def advance(
     parameters: _Parameters,
     theta: _Floats,

@@ -74,9 +74,12 @@ class Pendulum:
         return math.tau if self.p == 0 else math.tau / self.omega
 
     @property
-    def parameters(self) -> tuple[float, float, float, float, float, float]:
-        """All six, in the order of the class."""
-        return (self.gamma, self.p, self.omega, self.phase, self.torque, self.theta_r)
+    def parameters(
+        self,
+    ) -> tuple[float, float, float, float, float, float, float, list[tuple[str, list[float]]]]:
+        """All that the kernel takes: the six of the class, time in the laboratory, effects."""
+        own = (self.gamma, self.p, self.omega, self.phase, self.torque, self.theta_r)
+        return (*own, 0.0, [])
 
     @property
     def title(self) -> str:

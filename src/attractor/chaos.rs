@@ -282,7 +282,7 @@ fn turns_over_the_top(strobe: &Strobe, members: &[&Walk]) -> (Kind, i64) {
     let mut block = Block::new(width);
     block.fill(&theta[..followed], &velocity[..followed], strobe.schedule.kick);
     // The well between two upright positions; a passage over the top changes it by one.
-    let well = |half_turns: f64| ((half_turns + 1.0) / 2.0).floor() as i64;
+    let well = |half_turns: f64| (0.5 * half_turns + 0.5).floor() as i64;
     let mut last: Vec<i64> = block.half_turns[..followed].iter().map(|x| well(*x)).collect();
     let mut before = vec![None::<i64>; followed];
     let mut turned = vec![[false; 2]; followed];

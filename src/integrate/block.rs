@@ -8,28 +8,23 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
-use super::event::{Progress, Reached, Ticket};
-use super::general::{Own, Running, Shared};
-use super::step::{Moving, Rubbing};
+use super::event::Ticket;
+use super::runner::Runner;
 use super::stroboscopic::Strobe;
-use crate::lanes::sine::{Coarse, Degree, Fine, wrap};
+use crate::lanes::sine::wrap;
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
-use crate::model::Equation;
 use crate::model::pendulum::Route;
-use crate::model::rest::Standstill;
 
 /// Most trajectories of a block with events: enough for the queue of a step to fill its lanes.
 const WITH_EVENTS: usize = 6144;
-/// How much further than its first acceleration takes it a velocity may go within a step.
-const REACH: f64 = 1.25;
 
 /// A lane that is held fast.
 #[derive(Clone, Copy, Debug)]
-struct Held {
-    lane: usize,
-    half_turns: f64,
-    until: f64,
-    sense: f64,
+pub(super) struct Held {
+    pub lane: usize,
+    pub half_turns: f64,
+    pub until: f64,
+    pub sense: f64,
 }
 
 /// The states of a block, in memory, and those that wait.
@@ -44,10 +39,10 @@ pub struct Block {
     /// Angles over pi at which friction has held a trajectory during the last period; NaN where it
     /// has not.
     pub held_at: Vec<f64>,
-    held: Vec<Held>,
-    queue: Vec<Ticket>,
+    pub(super) held: Vec<Held>,
+    pub(super) queue: Vec<Ticket>,
     /// What goes between lanes and queue.
-    scratch: Box<[[f64; MAX_WIDTH]; 6]>,
+    pub(super) scratch: Box<[[f64; MAX_WIDTH]; 6]>,
 }
 
 impl Block {
@@ -86,6 +81,22 @@ impl Block {
             *half_turns = wrapped;
             *turns += whole;
         }
+    }
+
+    /// Holds the held lanes through the step, and lets go those whose time has come.
+    #[inline(never)]
+    pub(super) fn let_go(&mut self, time: [f64; 2]) {
+        let Self { half_turns, kick, held, queue, .. } = self;
+        held.retain(|h| {
+            half_turns[h.lane] = h.half_turns;
+            kick[h.lane] = 0.0;
+            if h.until >= time[1] {
+                return true;
+            }
+            let state = [h.half_turns * PI, 0.0];
+            queue.push(Ticket::new(h.lane, state, h.sense, h.until.max(time[0]), time[1]));
+            false
+        });
     }
 }
 
@@ -155,331 +166,4 @@ impl Job for Singly<'_> {
         let Steps { strobe, block, range } = self.0;
         Runner::<S::Single, S::Single>::new(strobe, ((), ())).run(block, range);
     }
-}
-
-/// What runs a block of one pendulum: `Q` is the narrower kind of lanes, for the queue and for
-/// effects.
-struct Runner<'a, L: Lane, Q: Lane> {
-    strobe: &'a Strobe,
-    tokens: (L::Token, Q::Token),
-    equation: Equation<Q>,
-    single: Equation<f64>,
-    length: f64,
-}
-
-impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
-    #[inline(always)]
-    fn new(strobe: &'a Strobe, tokens: (L::Token, Q::Token)) -> Self {
-        let single = strobe.equation.clone();
-        let equation = single.map(Q::splat(tokens.1, 0.0));
-        Self { strobe, tokens, equation, single, length: strobe.pendulum.period() }
-    }
-
-    #[inline(always)]
-    fn run(&self, block: &mut Block, range: Range<usize>) {
-        let Strobe { route, events, extra, fine, .. } = *self.strobe;
-        if route == Route::Smooth && !extra {
-            if fine {
-                self.smooth::<Fine>(block, range);
-            } else {
-                self.smooth::<Coarse>(block, range);
-            }
-            return;
-        }
-        if events && range.start == 0 {
-            self.begin(block);
-        }
-        let steps = self.strobe.steps();
-        for k in range {
-            let time = [k, k + 1].map(|k| self.length * k as f64 / steps as f64);
-            match (route, extra) {
-                (Route::General, _) => self.general_step(block, k, time),
-                (Route::Friction, false) => self.friction_step(block, k, time),
-                _ => self.step_with_effects(block, k, time),
-            }
-            if events {
-                self.let_go(block, time);
-                self.work_off(block);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn load(&self, block: &Block, at: usize) -> Moving<L> {
-        Moving {
-            half_turns: L::load(self.tokens.0, &block.half_turns[at..]),
-            kick: L::load(self.tokens.0, &block.kick[at..]),
-        }
-    }
-
-    #[inline(always)]
-    fn smooth<D: Degree>(&self, block: &mut Block, range: Range<usize>) {
-        let schedule = &self.strobe.schedule;
-        let steps = &schedule.steps()[range];
-        let mut at = 0;
-        while at < block.kick.len() {
-            let mut lanes = self.load(block, at);
-            for loads in steps {
-                lanes.step::<D>(loads, schedule.decay);
-            }
-            lanes.half_turns.store(&mut block.half_turns[at..]);
-            lanes.kick.store(&mut block.kick[at..]);
-            at += L::WIDTH;
-        }
-    }
-
-    /// Lanes at rest are held, or begin to move.
-    #[inline(never)]
-    fn begin(&self, block: &mut Block) {
-        block.held.clear();
-        block.queue.clear();
-        block.held_at.fill(f64::NAN);
-        for lane in 0..block.kick.len() {
-            if block.kick[lane] != 0.0 {
-                continue;
-            }
-            let half_turns = block.half_turns[lane];
-            let held = match self.single.standstill(0.0, half_turns * PI) {
-                Standstill::Held { until, sense } => Held { lane, half_turns, until, sense },
-                // Let go at once.
-                Standstill::Moves(sense) => Held { lane, half_turns, until: 0.0, sense },
-            };
-            if held.until > 0.0 {
-                block.held_at[lane] = half_turns;
-            }
-            block.held.push(held);
-        }
-    }
-
-    /// A step under Coulomb friction with the sign of each velocity held.
-    #[inline(always)]
-    fn friction_step(&self, block: &mut Block, k: usize, time: [f64; 2]) {
-        let schedule = &self.strobe.schedule;
-        let loads = &schedule.steps()[k];
-        let one = L::splat(self.tokens.0, 1.0);
-        let mut at = 0;
-        while at < block.kick.len() {
-            let before = self.load(block, at);
-            let mut after = before;
-            let sense = one.with_sign_of(before.kick);
-            let rubbing = Rubbing(sense.scale(-self.single.theta_r));
-            let ends = after.step_with::<Fine, _>(loads, schedule.decay, &rubbing);
-            after.half_turns.store(&mut block.half_turns[at..]);
-            after.kick.store(&mut block.kick[at..]);
-            let flags = passages(before.kick * sense, after.kick * sense, ends, sense);
-            if flags != 0 {
-                self.flagged(block, at, flags, [before, after], ends, time);
-            }
-            at += L::WIDTH;
-        }
-    }
-
-    /// The same with effects that do not depend on the velocity but for its sign.
-    #[inline(always)]
-    fn step_with_effects(&self, block: &mut Block, k: usize, time: [f64; 2]) {
-        let schedule = &self.strobe.schedule;
-        let token = self.tokens.1;
-        let one = Q::splat(token, 1.0);
-        let mut at = 0;
-        while at < block.kick.len() {
-            let before = Moving {
-                half_turns: Q::load(token, &block.half_turns[at..]),
-                kick: Q::load(token, &block.kick[at..]),
-            };
-            let mut after = before;
-            let sense = one.with_sign_of(before.kick);
-            let loads = &schedule.steps()[k];
-            let ends = after.step_under(&self.equation, loads, schedule.decay, sense);
-            after.half_turns.store(&mut block.half_turns[at..]);
-            after.kick.store(&mut block.kick[at..]);
-            if self.strobe.events {
-                let flags = passages(before.kick * sense, after.kick * sense, ends, sense);
-                if flags != 0 {
-                    self.flagged(block, at, flags, [before, after], ends, time);
-                }
-            }
-            at += Q::WIDTH;
-        }
-    }
-
-    /// The same for torques that depend on the velocity.
-    #[inline(always)]
-    fn general_step(&self, block: &mut Block, k: usize, time: [f64; 2]) {
-        let table = &self.strobe.timetable;
-        let token = self.tokens.1;
-        let scale = self.strobe.schedule.kick;
-        let one = Q::splat(token, 1.0);
-        let clock = Shared { forcing: &table.steps()[k], length: Q::splat(token, table.length) };
-        let mut at = 0;
-        while at < block.kick.len() {
-            let half_turns = Q::load(token, &block.half_turns[at..]);
-            let kick = Q::load(token, &block.kick[at..]);
-            let sense = one.with_sign_of(kick);
-            let mut lanes =
-                Running { theta: half_turns.scale(PI), velocity: kick.scale(1.0 / scale) };
-            let before = lanes.velocity * sense;
-            let first = lanes.step(&self.equation, &clock, sense);
-            let after = Moving {
-                half_turns: lanes.theta.scale(FRAC_1_PI),
-                kick: lanes.velocity.scale(scale),
-            };
-            after.half_turns.store(&mut block.half_turns[at..]);
-            after.kick.store(&mut block.kick[at..]);
-            if self.strobe.events {
-                // The end's acceleration costs a stage: it is asked for only where the begin's is against
-                // the motion and strong enough to stop it within the step.
-                let b0 = first * sense;
-                let reach = b0.scale_add(REACH * table.length, before);
-                let passed = (lanes.velocity * sense).signs();
-                let moving = !(before - before.like(f64::MIN_POSITIVE)).signs();
-                let flags = moving & (passed | (b0.signs() & reach.signs()));
-                if flags != 0 {
-                    let last = lanes.acceleration(&self.equation, &clock, sense);
-                    let gain = scale * table.length;
-                    let ends = [first.scale(gain), last.scale(gain)];
-                    let before = Moving { half_turns, kick };
-                    self.flagged(block, at, flags, [before, after], ends, time);
-                }
-            }
-            at += Q::WIDTH;
-        }
-    }
-
-    #[inline(always)]
-    fn flagged<A: Lane>(
-        &self,
-        block: &mut Block,
-        at: usize,
-        flags: u128,
-        [before, after]: [Moving<A>; 2],
-        ends: [A; 2],
-        time: [f64; 2],
-    ) {
-        let stored = &mut block.scratch;
-        before.half_turns.store(&mut stored[0]);
-        before.kick.store(&mut stored[1]);
-        after.half_turns.store(&mut stored[2]);
-        after.kick.store(&mut stored[3]);
-        ends[0].store(&mut stored[4]);
-        ends[1].store(&mut stored[5]);
-        self.enqueue(block, at, flags, time);
-    }
-
-    /// Tickets for the flagged lanes of the bundle at `at`.
-    #[inline(never)]
-    fn enqueue(&self, block: &mut Block, at: usize, mut flags: u128, time: [f64; 2]) {
-        let scale = 1.0 / self.strobe.schedule.kick;
-        // What a stage's load adds to the kick in one step.
-        let gain = scale / (time[1] - time[0]);
-        while flags != 0 {
-            let bit = flags.trailing_zeros() as usize;
-            flags &= flags - 1;
-            let [x0, k0, x1, k1, first, last] = block.scratch.each_ref().map(|values| values[bit]);
-            let sense = 1_f64.copysign(k0);
-            let state = [x0 * PI, k0 * scale];
-            let whole = Reached {
-                theta: x1 * PI,
-                velocity: k1 * scale,
-                acceleration: [first * gain, last * gain],
-            };
-            block.queue.extend(Ticket::known(at + bit, state, sense, time, &whole));
-        }
-    }
-
-    /// Holds the held lanes through the step, and lets go those whose time has come.
-    #[inline(never)]
-    fn let_go(&self, block: &mut Block, time: [f64; 2]) {
-        let Block { half_turns, kick, held, queue, .. } = block;
-        held.retain(|h| {
-            half_turns[h.lane] = h.half_turns;
-            kick[h.lane] = 0.0;
-            if h.until >= time[1] {
-                return true;
-            }
-            let state = [h.half_turns * PI, 0.0];
-            queue.push(Ticket::new(h.lane, state, h.sense, h.until.max(time[0]), time[1]));
-            false
-        });
-    }
-
-    /// Runs the queue until every ticket has arrived or is held.
-    #[inline(always)]
-    fn work_off(&self, block: &mut Block) {
-        let token = self.tokens.1;
-        while !block.queue.is_empty() {
-            let mut first = 0;
-            while first < block.queue.len() {
-                let count = (block.queue.len() - first).min(Q::WIDTH);
-                gather(&block.queue[first..first + count], &mut block.scratch);
-                let asked = &mut *block.scratch;
-                let mut lanes = Running {
-                    theta: Q::load(token, &asked[0]),
-                    velocity: Q::load(token, &asked[1]),
-                };
-                let sense = Q::load(token, &asked[2]);
-                let clock =
-                    Own { begin: Q::load(token, &asked[3]), length: Q::load(token, &asked[4]) };
-                let begin = lanes.step(&self.equation, &clock, sense);
-                let end = lanes.acceleration(&self.equation, &clock, sense);
-                lanes.theta.store(&mut asked[0]);
-                lanes.velocity.store(&mut asked[1]);
-                begin.store(&mut asked[2]);
-                end.store(&mut asked[3]);
-                self.answer(block, first, count);
-                first += count;
-            }
-            block.queue.retain(|ticket| ticket.lane != usize::MAX);
-        }
-    }
-
-    #[inline(never)]
-    fn answer(&self, block: &mut Block, first: usize, count: usize) {
-        for i in 0..count {
-            let ends = &block.scratch;
-            let reached = Reached {
-                theta: ends[0][i],
-                velocity: ends[1][i],
-                acceleration: [ends[2][i], ends[3][i]],
-            };
-            let ticket = &mut block.queue[first + i];
-            let lane = ticket.lane;
-            match ticket.take(&reached, &self.single, self.length) {
-                Progress::Asks => continue,
-                Progress::Arrived { theta, velocity } => {
-                    block.half_turns[lane] = theta * FRAC_1_PI;
-                    block.kick[lane] = velocity * self.strobe.schedule.kick;
-                }
-                Progress::Held { theta, until, sense } => {
-                    let half_turns = theta * FRAC_1_PI;
-                    block.half_turns[lane] = half_turns;
-                    block.kick[lane] = 0.0;
-                    block.held_at[lane] = half_turns;
-                    block.held.push(Held { lane, half_turns, until, sense });
-                }
-            }
-            ticket.lane = usize::MAX;
-        }
-    }
-}
-
-#[inline(never)]
-fn gather(tickets: &[Ticket], asked: &mut [[f64; MAX_WIDTH]; 6]) {
-    for (i, ticket) in tickets.iter().enumerate() {
-        asked[0][i] = ticket.theta;
-        asked[1][i] = ticket.velocity;
-        asked[2][i] = ticket.sense;
-        asked[3][i] = ticket.begin;
-        asked[4][i] = ticket.length;
-    }
-}
-
-/// The lanes whose velocity, `u` before and `v` after a step in the sense of the motion, has passed
-/// zero, or may have touched it: its parabola's least value says so, with a margin. Lanes at rest have
-/// not.
-#[inline(always)]
-fn passages<L: Lane>(u: L, v: L, [first, last]: [L; 2], sense: L) -> u128 {
-    let moving = !(u - u.like(f64::MIN_POSITIVE)).signs();
-    let (b0, b1) = (first * sense, last * sense);
-    let lowest = u.scale(1.6).mul_add(b1 - b0, -(b0 * b0));
-    moving & (v.signs() | (b0.signs() & !b1.signs() & lowest.signs()))
 }

@@ -199,9 +199,9 @@ impl Ticket {
         let t = self.length;
         let (u, b) = (self.sense * reached.velocity, self.sense * reached.acceleration[1]);
         if u >= 0.0 {
-            low = t
+            low = t;
         } else {
-            high = t
+            high = t;
         }
         // After a reversal the begin is a zero itself, and is divided out.
         let slope = if self.velocity == 0.0 { b - u / t } else { b };
@@ -230,7 +230,7 @@ impl Ticket {
     fn stopped(&mut self, theta: f64, tau: f64, equation: &Equation<f64>, period: f64) -> Progress {
         let released = self.velocity == 0.0 && tau - self.begin < LEAST_SLIP * period;
         match equation.standstill(tau, theta) {
-            Standstill::Moves(sense) if !released || sense != self.sense => {
+            Standstill::Moves(sense) if !released || sense * self.sense < 0.0 => {
                 if tau >= self.end {
                     // The rest of the step is lost in rounding: the motion goes on in its sense.
                     return Progress::Arrived { theta, velocity: sense * f64::MIN_POSITIVE };
@@ -298,9 +298,9 @@ impl Cubic {
         for _ in 0..POLISHINGS {
             let value = a + x * (b + x * (c + x * d));
             if value < 0.0 {
-                high = x
+                high = x;
             } else {
-                low = x
+                low = x;
             }
             let next = x - value / (b + x * (2.0 * c + 3.0 * d * x));
             x = if next > low && next < high { next } else { 0.5 * (low + high) };

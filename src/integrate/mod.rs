@@ -6,11 +6,13 @@
 //! - [`tangent`]: numbers with derivatives, for the variational equations
 //! - [`general`]: one step where torques depend on the velocity
 //! - [`block`]: a block of trajectories, one forcing period; [`event`]: turns, sticks, releases
+//!   in it
 //! - [`course`], [`dense`], [`turning`], [`stick`], [`flight`]: one trajectory of any model, adaptive,
 //!   with exact turns, sticks and releases
 //! - [`sample`], [`sensitivity`]: the same at chosen times, with derivatives by parameters and start
 //! - [`flow`]: the stroboscopic map by it, with its derivative
 //! - [`stroboscopic`]: many trajectories, one forcing period at a time
+//! - [`stretch`]: tangents beside them
 //! - [`accuracy`]: how many steps a tolerance asks for
 //! - [`trajectory`]: one trajectory, sampled in time
 
@@ -23,11 +25,13 @@ pub mod event;
 pub mod flight;
 pub mod flow;
 pub mod general;
+mod runner;
 pub mod sample;
 pub mod schedule;
 pub mod sensitivity;
 pub mod step;
 pub mod stick;
+pub mod stretch;
 pub mod stroboscopic;
 pub mod tableau;
 pub mod tangent;

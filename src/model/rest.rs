@@ -92,7 +92,7 @@ impl Equation<f64> {
         }
         let candidate = |sense: f64| {
             let cosine = ((self.torque - sense * limit) / sine - 1.0) / motion.p;
-            if !(-1.0..1.0).contains(&cosine) || cosine == -1.0 {
+            if cosine.abs() >= 1.0 || cosine.is_nan() {
                 return None;
             }
             let angle = cosine.acos().copysign(sense * pull);

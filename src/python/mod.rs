@@ -4,6 +4,7 @@
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
 mod convert;
+mod library;
 mod maps;
 mod motion;
 mod watch;
@@ -12,7 +13,7 @@ use pyo3::prelude::*;
 
 use crate::error::Error;
 use crate::lanes::Path;
-use crate::model::Pendulum;
+use crate::model::{Effect, Kind, Pendulum};
 
 /// One mapping of errors for all functions: what the caller gave is a `ValueError`.
 impl From<Error> for PyErr {
@@ -26,12 +27,18 @@ impl From<Error> for PyErr {
     }
 }
 
-/// `(gamma, p, omega, phase, torque, theta_r)` as Python hands it over.
-type Parameters = (f64, f64, f64, f64, f64, f64);
+/// `(gamma, p, omega, phase, torque, theta_r, lab_time, effects)` as Python hands it over; each
+/// effect is its name and its parameters in the library's order.
+type Parameters = (f64, f64, f64, f64, f64, f64, f64, Vec<(String, Vec<f64>)>);
 
 fn pendulum(parameters: Parameters) -> Result<Pendulum, Error> {
-    let (gamma, p, omega, phase, torque, theta_r) = parameters;
-    Pendulum::new(gamma, p, omega, phase, torque)?.with_friction(theta_r)
+    let (gamma, p, omega, phase, torque, theta_r, lab_time, effects) = parameters;
+    let mut pendulum = Pendulum::new(gamma, p, omega, phase, torque)?.with_friction(theta_r)?;
+    pendulum.lab_time = lab_time;
+    for (name, values) in effects {
+        pendulum = pendulum.with_effect(Effect::new(Kind::named(&name)?, &values)?)?;
+    }
+    Ok(pendulum)
 }
 
 /// The instruction set that a call would use now.
@@ -60,6 +67,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simd, module)?)?;
     module.add_function(wrap_pyfunction!(simd_available, module)?)?;
     module.add_function(wrap_pyfunction!(default_threads, module)?)?;
+    module.add_function(wrap_pyfunction!(library::effects, module)?)?;
     module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
     module.add_function(wrap_pyfunction!(motion::choose_steps, module)?)?;
     module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;

@@ -134,7 +134,7 @@ fn orbits_with_friction_are_those_of_the_reference() {
                 .map(|p| distance(*p, known))
                 .fold(f64::INFINITY, f64::min);
             assert!(error < 1e-9, "{kind} at {truth}: {error:e}");
-            assert_eq!(map.share(0) + map.share(-1), 0.0, "{kind} at {truth}");
+            assert!(map.share(0) + map.share(-1) < 1e-9, "{kind} at {truth}");
         }
     }
 }
@@ -145,7 +145,7 @@ fn what_creeps_at_the_edge_is_at_rest() {
     let map = basins_on_plane(&rubbing(0.1, 1.5, 0.87, 0.2), 60);
     let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
     assert!(names.contains(&"rest"), "{names:?}");
-    assert_eq!(map.share(0), 0.0);
+    assert!(map.share(0) < 1e-9);
     let rest = names.iter().position(|n| *n == "rest").expect("there");
     assert!(map.attractors[rest].multipliers.is_empty());
 }

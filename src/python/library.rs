@@ -1,0 +1,42 @@
+//! The library of effects, as Python sees it.
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::model::Kind;
+use crate::model::effects::Power;
+
+/// Name, group, formula, parameters and the rest of every effect.
+#[pyfunction]
+pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
+    let list = PyList::empty(py);
+    for kind in Kind::ALL {
+        let definition = kind.definition();
+        let dict = PyDict::new(py);
+        dict.set_item("name", definition.name)?;
+        dict.set_item("group", definition.group.word())?;
+        dict.set_item("formula", definition.formula)?;
+        dict.set_item("revealed_by", definition.revealed_by)?;
+        dict.set_item("mappable", definition.mappable.word())?;
+        let parameters = PyList::empty(py);
+        for parameter in definition.parameters {
+            let entry = PyDict::new(py);
+            entry.set_item("name", parameter.name)?;
+            entry.set_item("unit", parameter.unit)?;
+            // w0 to this power, or to 2 less the value of the parameter of that name.
+            let (power, exponent) = match parameter.power {
+                Power::Of(power) => (power, None),
+                Power::TwoMinus(index) => (2, Some(definition.parameters[index].name)),
+            };
+            entry.set_item("power_of_w0", power)?;
+            entry.set_item("power_of_w0_less", exponent)?;
+            entry.set_item("range", parameter.range)?;
+            entry.set_item("typical", parameter.typical)?;
+            entry.set_item("meaning", parameter.meaning)?;
+            parameters.append(entry)?;
+        }
+        dict.set_item("parameters", parameters)?;
+        list.append(dict)?;
+    }
+    Ok(list)
+}
