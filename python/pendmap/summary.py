@@ -82,9 +82,11 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
         row = {key: dataset[key].values[k] for key in ("fraction", "stderr", "twin", "exponent")}
         twin = int(row["twin"])
         mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
+        held = bool(row["exponent"] != row["exponent"])  # friction holds it: there is none
+        rate = "held by friction" if held else f"exponent {row['exponent']:.4f}"
         lines.append(
             f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
-            f"exponent {row['exponent']:.4f}{mirror}."
+            f"{rate}{mirror}."
         )
     if not lines:
         lines.append("No attractor was found.")
