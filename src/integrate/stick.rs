@@ -9,13 +9,12 @@ use std::f64::consts::{PI, TAU};
 
 use super::course::Course;
 use super::tangent::Number;
+use crate::model::equation::Forcing;
 
-/// An excess that does not pass this counts as none: rounding makes as much, and what moves in the
-/// meantime is far smaller still.
-const ROUNDING: f64 = 1e-13;
-/// Phases closer to a release than this, rad, are at it: those on the other side have an excess of
-/// less than [`ROUNDING`].
-const SAME_PHASE: f64 = 4e-7;
+/// An excess that does not pass this part of the friction counts as none: it opens a window of time
+/// so short that what moves in it, about the square of the excess, is lost in the last place of the
+/// angle.
+const EDGE: f64 = 1e-10;
 /// Samples of the excess in a period.
 const SAMPLES: usize = 96;
 /// Halvings of a bracket: its width falls below the last place of the time.
@@ -39,46 +38,54 @@ pub enum Release {
 /// When a pendulum that is at rest at `theta` at time `tau` moves; looked for until `until` where
 /// the equation does not repeat.
 pub fn release<N: Number>(course: &Course<N>, tau: f64, theta: f64, until: f64) -> Release {
-    let (excess, sense) = greatest(course, tau, theta);
-    if excess > ROUNDING {
-        return Release::Now(sense);
+    let [forth, back] = excesses(course, tau, theta);
+    // The load cancels in their sum.
+    let edge = EDGE * (-0.5 * (forth + back)).max(0.0);
+    if forth.max(back) > edge {
+        return Release::Now(if forth >= back { 1.0 } else { -1.0 });
     }
     if course.is_harmonic() {
-        return harmonic(course, tau, theta);
+        return harmonic(course, tau, theta, edge);
     }
     let end = course.period().map_or(until, |period| tau + 1.1 * period);
-    match sampled(course, tau, theta, end) {
+    match sampled(course, tau, theta, end, edge) {
         Some((time, sense)) => Release::At(time, sense),
         None if course.period().is_some() => Release::Never,
         None => Release::Later,
     }
 }
 
+/// The excess in the sense 1 and in the sense -1.
+fn excesses<N: Number>(course: &Course<N>, tau: f64, theta: f64) -> [f64; 2] {
+    [1.0, -1.0].map(|sense| course.excess(tau, theta, sense))
+}
+
 /// The greater excess of both senses, and its sense.
 fn greatest<N: Number>(course: &Course<N>, tau: f64, theta: f64) -> (f64, f64) {
-    let [forth, back] = [1.0, -1.0].map(|sense| course.excess(tau, theta, sense));
+    let [forth, back] = excesses(course, tau, theta);
     if forth >= back { (forth, 1.0) } else { (back, -1.0) }
 }
 
 /// The closed form: the excess in the sense `s` is `swing cos(angle) - limit`, where `swing >= 0`.
-fn harmonic<N: Number>(course: &Course<N>, tau: f64, theta: f64) -> Release {
+fn harmonic<N: Number>(course: &Course<N>, tau: f64, theta: f64, edge: f64) -> Release {
     let equation = course.plain();
     let motion = &equation.motion;
-    let still = crate::model::equation::Forcing { vertical: 1.0, lateral: 0.0, lab: 0.0 };
+    let still = Forcing { vertical: 1.0, lateral: 0.0, lab: 0.0 };
     let at = equation.point(&still, theta, 0.0, 1.0);
     let (constant, swing) = (equation.load(&still, &at), -at.sine * motion.p);
     let mut first = None::<(f64, f64)>;
     for sense in [1.0, -1.0] {
         let limit = equation.friction(&at) - sense * constant;
         let size = swing.abs();
-        if size - limit <= ROUNDING {
+        if size - limit <= edge {
             continue;
         }
         // Where it is positive lies within `half` on either side of the phase 0.
         let half = (limit / size).clamp(-1.0, 1.0).acos();
         let turn = if sense * swing < 0.0 { PI } else { 0.0 };
         let mut wait = (-half - (motion.omega * tau + motion.phase + turn)).rem_euclid(TAU);
-        if wait > TAU - SAME_PHASE {
+        if wait > TAU - half {
+            // At the entry, up to rounding, or within the edge behind it.
             wait = 0.0;
         }
         let time = tau + wait / motion.omega;
@@ -90,7 +97,13 @@ fn harmonic<N: Number>(course: &Course<N>, tau: f64, theta: f64) -> Release {
 }
 
 /// The first time up to `end` at which the excess becomes positive, and the sense.
-fn sampled<N: Number>(course: &Course<N>, tau: f64, theta: f64, end: f64) -> Option<(f64, f64)> {
+fn sampled<N: Number>(
+    course: &Course<N>,
+    tau: f64,
+    theta: f64,
+    end: f64,
+    edge: f64,
+) -> Option<(f64, f64)> {
     let interval = course.time_scale() / SAMPLES as f64;
     let count = ((end - tau) / interval).ceil().max(1.0) as usize;
     let time = |k: usize| tau + (k as f64 * interval).min(end - tau);
@@ -98,11 +111,11 @@ fn sampled<N: Number>(course: &Course<N>, tau: f64, theta: f64, end: f64) -> Opt
     let mut before = [f64::NEG_INFINITY, greatest(course, tau, theta).0];
     for k in 1..=count {
         let now = greatest(course, time(k), theta).0;
-        let mut positive = (now > ROUNDING).then(|| time(k));
-        if before[1] >= before[0] && before[1] >= now {
+        let mut positive = (now > edge).then(|| time(k));
+        if before[1] > before[0] && before[1] >= now {
             // A maximum lies about the sample before: it may be positive on its own.
             let (peak, height) = highest(course, theta, time(k.saturating_sub(2)), time(k));
-            if height > ROUNDING {
+            if height > edge {
                 positive = Some(peak);
             }
         }

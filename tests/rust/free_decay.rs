@@ -20,7 +20,7 @@ fn decay(gamma: f64, theta_r: f64, theta: f64) -> Vec<Event> {
     flight.events
 }
 
-/// gamma and theta_r of an entry in SI.
+/// `gamma` and `theta_r` of an entry in SI.
 fn model(entry: &Value) -> (f64, f64) {
     (2.0 * number(&entry["zeta"]), number(&entry["Tr"]) / number(&entry["w0"]).powi(2))
 }
