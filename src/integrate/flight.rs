@@ -8,6 +8,7 @@
 
 use super::course::Course;
 use super::dense::Leap;
+use super::event::{Event, EventKind};
 use super::stick::{Release, release};
 use super::tangent::Number;
 use super::turning::{self, Turning};
@@ -26,43 +27,6 @@ const FINE: f64 = 1e-4;
 const CROWDED: (f64, u32) = (1e-10, 20);
 /// The rest given to such a state; it doubles each time.
 const PAUSE: f64 = 1e-9;
-
-/// What happened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EventKind {
-    /// The velocity passed zero.
-    Turn,
-    /// The velocity became zero, and friction holds.
-    Stick,
-    /// The load overcame the friction.
-    Release,
-    /// It never will.
-    StuckForEver,
-}
-
-impl EventKind {
-    /// The words for it.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Turn => "turn",
-            Self::Stick => "stick",
-            Self::Release => "release",
-            Self::StuckForEver => "stuck for ever",
-        }
-    }
-}
-
-/// What happened, when and where.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
-    /// When.
-    pub tau: f64,
-    /// What.
-    pub kind: EventKind,
-    /// At which angle, rad, not wrapped.
-    pub theta: f64,
-}
 
 /// A piece of a trajectory.
 #[derive(Debug)]

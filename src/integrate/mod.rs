@@ -4,7 +4,7 @@
 //! - [`schedule`]: what all trajectories of a run of equal steps share, damping folded in
 //! - [`step`]: one step, for any number type
 //! - [`tangent`]: numbers with derivatives, for the variational equations
-//! - [`course`], [`dense`], [`turning`], [`stick`], [`flight`]: one trajectory of any model, adaptive,
+//! - [`course`], [`dense`], [`turning`], [`stick`], [`event`], [`flight`]: one trajectory of any model, adaptive,
 //!   with exact turns, sticks and releases
 //! - [`sample`], [`sensitivity`]: the same at chosen times, with derivatives by parameters and start
 //! - [`flow`]: the stroboscopic map by it, with its derivative
@@ -16,6 +16,7 @@ pub mod accuracy;
 pub mod course;
 pub mod dense;
 pub mod dop853;
+pub mod event;
 pub mod flight;
 pub mod flow;
 pub mod sample;

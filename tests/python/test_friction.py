@@ -60,7 +60,14 @@ def scipy_run(x: Pendulum, theta: float, velocity: float) -> tuple[list[Happenin
 
         stop.terminal, stop.direction = True, -sense  # type: ignore[attr-defined]
         run = solve_ivp(
-            slope, (time, UNTIL), state, "DOP853", events=stop, rtol=3e-14, atol=1e-14, max_step=STEP
+            slope,
+            (time, UNTIL),
+            state,
+            "DOP853",
+            events=stop,
+            rtol=3e-14,
+            atol=1e-14,
+            max_step=STEP,
         )
         time, state = float(run.t[-1]), [float(run.y[0, -1]), float(run.y[1, -1])]
         if run.status == 0:

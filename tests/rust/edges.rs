@@ -2,7 +2,8 @@
 
 use pendmap::integrate::State;
 use pendmap::integrate::course::Course;
-use pendmap::integrate::flight::{Event, EventKind, Flight};
+use pendmap::integrate::event::{Event, EventKind};
+use pendmap::integrate::flight::Flight;
 use pendmap::integrate::flow::Flow;
 use pendmap::integrate::sample::{Sampled, sample};
 use pendmap::model::{Effect, Kind, Pendulum};
@@ -151,6 +152,10 @@ fn what_leaves_the_range_of_numbers_is_called_lost() {
     let run = run(&pendulum, 0.0, [0.0, 3.0], 5.0, 100);
     assert!(run.states[99].iter().all(|x| x.is_nan()));
     assert!(run.states[0].iter().all(|x| x.is_finite()));
+    let course = Course::new(&pendulum, true, TOLERANCE, |_, value| value);
+    let mut flight = Flight::new(&course, 0.0, [0.0, 3.0], 5.0);
+    flight.finish(|_| ());
+    assert!(flight.is_lost() && flight.tau < 0.5);
 }
 
 fn models() -> impl Strategy<Value = Pendulum> {

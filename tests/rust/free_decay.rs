@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use pendmap::integrate::course::Course;
-use pendmap::integrate::flight::{Event, EventKind, Flight};
+use pendmap::integrate::event::{Event, EventKind};
+use pendmap::integrate::flight::Flight;
 use pendmap::model::Pendulum;
 use serde_json::Value;
 

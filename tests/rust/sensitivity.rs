@@ -2,7 +2,7 @@
 
 use pendmap::integrate::State;
 use pendmap::integrate::course::Course;
-use pendmap::integrate::flight::EventKind;
+use pendmap::integrate::event::EventKind;
 use pendmap::integrate::sample::sample;
 use pendmap::integrate::sensitivity::sensitivities;
 use pendmap::model::{Effect, Kind, Pendulum};

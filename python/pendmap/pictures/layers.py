@@ -169,8 +169,8 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
 def parameters(attrs: Mapping[Any, Any]) -> str:
     """Return the pendulum's parameters in one line.
 
-    Phase, torque and friction stand there only where they are not 0, and without drive, p = 0, there is no
-    frequency and no phase.
+    Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
+    there is no frequency and no phase.
     """
     driven = float(attrs.get("p", 1.0)) != 0.0
     always = ("gamma", "p", "omega") if driven else ("gamma", "p")
