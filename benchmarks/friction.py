@@ -1,4 +1,4 @@
-"""Coulomb friction at equal error, on one thread: pendmap, heyoka with terminal events, a naive RK4."""
+"""Coulomb friction at equal error, on one thread: pendmap, heyoka with events, a naive RK4."""
 
 from __future__ import annotations
 
@@ -142,7 +142,8 @@ def main() -> None:
         )
     _, velocity = mine.advance(*draw(50_000), 20)
     say(
-        f"\n{CASE}, theta_r {THETA_R}: error after {PERIODS} periods on {SAMPLE} starts (seed {SEED})"
+        f"\n{CASE}, theta_r {THETA_R}: error after {PERIODS} periods on {SAMPLE} starts "
+        f"(seed {SEED})"
     )
     say(table(("method", "setting", "median error", "95 %", "ns", "times ours"), rows))
     say(f"stuck after 20 periods: {np.mean(velocity == 0.0):.1%} of the starts")

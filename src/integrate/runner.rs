@@ -5,15 +5,15 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
 use super::block::{Block, Held};
-use super::event::{Progress, Reached, Ticket};
 use super::general::{Own, Running, Shared};
 use super::step::{Moving, Rubbing};
 use super::stroboscopic::Strobe;
+use super::ticket::{Progress, Reached, Ticket};
 use crate::lanes::sine::{Coarse, Degree, Fine};
 use crate::lanes::{Lane, MAX_WIDTH};
 use crate::model::Equation;
 use crate::model::pendulum::Route;
-use crate::model::rest::Standstill;
+use crate::model::rest::{Release, release};
 
 /// How much further than its first acceleration takes it a velocity may go within a step.
 const REACH: f64 = 1.25;
@@ -100,11 +100,12 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 continue;
             }
             let half_turns = block.half_turns[lane];
-            let held = match self.single.standstill(0.0, half_turns * PI) {
-                Standstill::Held { until, sense } => Held { lane, half_turns, until, sense },
-                // Let go at once.
-                Standstill::Moves(sense) => Held { lane, half_turns, until: 0.0, sense },
+            let (until, sense) = match release(&self.single, 0.0, half_turns * PI, self.length) {
+                Release::Now(sense) => (0.0, sense),
+                Release::At(time, sense) => (time, sense),
+                Release::Later | Release::Never => (f64::INFINITY, 1.0),
             };
+            let held = Held { lane, half_turns, until, sense };
             if held.until > 0.0 {
                 block.held_at[lane] = half_turns;
             }

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accuracy::{PERIODS, TOLERANCES};
 use super::course::{Course, FINEST};
-use super::flight::{Event, Flight};
+use super::event::Event;
+use super::flight::Flight;
 use super::sample::{Sampled, sample};
 use super::stroboscopic::State;
 use super::tangent::{Number, Tangent};

@@ -169,7 +169,7 @@ impl<R: Real> Equation<R> {
     /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at
     /// rest, against a constant friction.
     #[must_use]
-    pub fn has_closed_release(&self) -> bool {
+    pub fn is_plain(&self) -> bool {
         self.plain && !self.sideways && self.torques.is_empty() && self.frictions.is_empty()
     }
 

@@ -2,6 +2,8 @@
 //! and the reference values of `tests/truths.json`.
 //!
 //! - [`exact`], [`order`]: solutions in closed form, energy, order of convergence
+//! - [`stick_slip`], [`free_decay`], [`edges`]: friction, event by event, and where rounding could decide
+//! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`sine`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
@@ -12,6 +14,7 @@
 mod attractors;
 mod bifurcations;
 mod chaos;
+mod edges;
 mod exact;
 mod free_decay;
 mod friction;

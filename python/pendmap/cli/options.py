@@ -44,12 +44,10 @@ def model_options(function: Command) -> Command:
     )
     function = model(preset(function))
     for name, text in reversed(_MODEL.items()):
+        option = f"--{name.replace('_', '-')}"
         default = getattr(Pendulum(), name)
         function = click.option(
-            f"--{name.replace('_', '-')}",
-            type=NUMBER,
-            default=None,
-            help=f"{text}  [default: {default:g}]",
+            option, type=NUMBER, default=None, help=f"{text}  [default: {default:g}]"
         )(function)
     return function
 
