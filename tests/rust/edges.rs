@@ -6,6 +6,7 @@ use pendmap::integrate::event::{Event, EventKind};
 use pendmap::integrate::flight::Flight;
 use pendmap::integrate::flow::Flow;
 use pendmap::integrate::sample::{Sampled, sample};
+use pendmap::model::rest::Load as _;
 use pendmap::model::{Effect, Kind, Pendulum};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -194,8 +195,8 @@ proptest! {
                     EventKind::Release => {
                         stuck = false;
                         // The sense of the load.
-                        sense = if course.excess(event.tau, event.theta, 1.0)
-                            > course.excess(event.tau, event.theta, -1.0) { 1.0 } else { -1.0 };
+                        sense = if course.excess_toward(event.tau, event.theta, 1.0)
+                            > course.excess_toward(event.tau, event.theta, -1.0) { 1.0 } else { -1.0 };
                     }
                     EventKind::StuckForEver => prop_assert!(stuck),
                 }
@@ -206,7 +207,7 @@ proptest! {
             if stuck {
                 prop_assert!(state[1].abs() == 0.0);
                 for s in [1.0, -1.0] {
-                    prop_assert!(course.excess(tau, state[0], s) < 2e-10);
+                    prop_assert!(course.excess_toward(tau, state[0], s) < 2e-10);
                 }
             } else if sense == 0.0 {
                 sense = state[1].signum();
