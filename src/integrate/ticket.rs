@@ -11,7 +11,7 @@ use crate::model::rest::{Release, release};
 const MOST_ROUNDS: u32 = 400;
 /// A zero is found when Newton's step falls below this part of the way to it: with the change of the
 /// acceleration along it taken into account, what is left is of its third power.
-const CLOSE: f64 = 1e-5;
+const CLOSE: f64 = 3e-4;
 /// Steps of Newton's method that a root may take before the bracket is halved.
 const MOST_NEWTON: u32 = 8;
 /// Where the velocity's least value, as its cubic gives it, is below this part of its change over the
