@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
-import numpy as np
 from scipy.integrate import solve_ivp
 
 from pendmap import Pendulum, basins, figures, simulate
 from pendmap.figures import style
+
+if TYPE_CHECKING:
+    import numpy as np
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)
