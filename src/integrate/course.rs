@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::tangent::{Number, Tangent};
-use crate::model::effects::Action;
 use crate::model::recorded::Recorded;
 use crate::model::rest::Load;
 use crate::model::{Equation, Pendulum};
@@ -54,7 +53,6 @@ impl<N: Number> Course<N> {
         let mut plain = pendulum.equation();
         plain.ages = ages;
         let changes = ages && pendulum.drifts();
-        let unforced = pendulum.effects.iter().all(|e| e.is(&[Action::Reading]));
         let tolerance = tolerance.max(FINEST);
         let rate = greatest_rate(pendulum).max(if pendulum.is_autonomous() {
             0.0
@@ -63,11 +61,11 @@ impl<N: Number> Course<N> {
         });
         Self {
             equation,
-            plain,
             recorded: None,
             watches: pendulum.has_events(),
             sticks: pendulum.has_friction(),
-            harmonic: unforced,
+            harmonic: plain.is_plain(),
+            plain,
             period: (!changes).then(|| pendulum.period()),
             look: pendulum.period(),
             longest: LONGEST_STEP.0 * tolerance.powf(LONGEST_STEP.1) / rate,

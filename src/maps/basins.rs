@@ -135,6 +135,7 @@ impl BasinMap {
 /// The basins of attraction of `pendulum` over `starts`.
 ///
 /// # Errors
+/// [`Error::NotMappable`] for effects that a map cannot have,
 /// [`Error::Range`] and [`Error::Tolerance`] for requests that cannot be met,
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn basins(
@@ -143,6 +144,7 @@ pub fn basins(
     options: &Options,
     control: &Control,
 ) -> Result<BasinMap, Error> {
+    pendulum.check_mappable()?;
     let path = Path::choose()?;
     if starts.is_empty() {
         return Err(Error::Range { name: "starts", value: 0.0, allowed: "1 or more" });

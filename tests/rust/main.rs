@@ -4,7 +4,8 @@
 //! - [`exact`], [`order`]: solutions in closed form, energy, order of convergence
 //! - [`stick_slip`], [`free_decay`], [`edges`]: friction, event by event, and where rounding could decide
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
-//! - [`sine`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
+//! - [`effects`]: the library, each effect in every respect
+//! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
 //! - [`maps`], [`layers`], [`threads`]: whole planes
@@ -15,6 +16,8 @@ mod attractors;
 mod bifurcations;
 mod chaos;
 mod edges;
+mod effects;
+mod elementary;
 mod exact;
 mod free_decay;
 mod friction;
