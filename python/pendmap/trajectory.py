@@ -168,8 +168,8 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
         ),
         (
             f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
-            f"after 5 periods and by {a['end_error']:.1e} at the end ({a['steps_per_period']} steps "
-            "a period)."
+            f"after 5 periods and by {a['end_error']:.1e} at the end "
+            f"({a['steps_per_period']} steps a period)."
         ),
     ]
     if not a["reached_error"] <= a["tol"]:

@@ -10,6 +10,7 @@ import click
 
 from pendmap.cli.types import NUMBER
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
+from pendmap.model.quantities import check
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -73,6 +74,9 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
             raise click.UsageError(
                 f"{option}: allowed with --model of a file in SI; here --{other}"
             )
+    for name in _SI:
+        if name in typed:
+            check(name, typed[name])
     bare = {name: value for name, value in typed.items() if name in _BARE}
     base = dataclasses.replace(PRESETS[preset] if preset else Pendulum(), **bare)
     return base if model is None else load_model(model, typed)

@@ -116,7 +116,7 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
     """
     checked = {name: check(name, value) for name, value in given.items()}
     w0 = check("w0", natural_frequency(checked))
-    result = {"w0": w0, **{name: checked[name] for name in OPTIONAL if name in checked}}
+    result = {"w0": w0} | {name: checked[name] for name in OPTIONAL if name in checked}
 
     ways = _given(checked, "c_over_m")
     if "zeta" in checked:
