@@ -214,11 +214,11 @@ def _pendulum(
             raise InputError(
                 f"has no dimensions: {name} is allowed beside a model in SI; here it is p or omega"
             )
-    numbers = dict(table)
+    numbers = {name: checks.number(name, value) for name, value in table.items()}
     zeta = numbers.pop("zeta", None)
     if zeta is not None and "gamma" not in typed:
         gamma = 2 * quantities.check("zeta", zeta)
-        given = checks.number("gamma", numbers.setdefault("gamma", gamma))
+        given = numbers.setdefault("gamma", gamma)
         quantities.one("gamma", {"gamma": given, f"2 zeta of zeta = {zeta:g}": gamma})
     numbers |= typed
     driven = numbers.get("p", 0) != 0 or any(effect.drives for effect in effects)
