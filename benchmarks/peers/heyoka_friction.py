@@ -1,4 +1,4 @@
-"""heyoka's adaptive Taylor integrator with terminal events: stick and slip under Coulomb friction."""
+"""heyoka's adaptive Taylor integrator with terminal events: stick and slip."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import heyoka as hy  # type: ignore[import-untyped]
 import numpy as np
 
-from peers.common import Case
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from peers.common import Case
 
     Floats = NDArray[np.float64]
 

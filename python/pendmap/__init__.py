@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError
-from pendmap.model import PRESETS, Pendulum
+from pendmap.model import PRESETS, Effect, Pendulum, Rig, load_model, save_model
 
 if TYPE_CHECKING:
     from pendmap.grid import Axis, Grid
@@ -23,14 +23,18 @@ if TYPE_CHECKING:
 __all__ = [
     "PRESETS",
     "Axis",
+    "Effect",
     "Grid",
     "InputError",
     "Pendulum",
+    "Rig",
     "advance",
     "basins",
     "basins_of",
     "load",
+    "load_model",
     "save",
+    "save_model",
     "simulate",
 ]
 

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
+from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
 from pendmap.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
-    from pendmap.model import Pendulum
+    from pendmap.model import Pendulum, Rig
 
 __all__ = ["RELIABLE", "cells", "complete", "table"]
 
@@ -28,7 +30,9 @@ _LAYERS: Final = {
 }
 
 
-def cells(raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...]) -> dict[str, Any]:
+def cells(
+    raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...], units: Units
+) -> dict[str, Any]:
     """Return the variables with one value a start, over ``dims`` of ``shape``."""
     finite_time = _LAYERS[raw["plane"]] == "finite_time"
     when = "until settled"
@@ -63,21 +67,22 @@ def cells(raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...]) ->
     }
     exponent = raw["finite_time_exponent"]
     if exponent is not None:
-        attributes = {"long_name": f"finite-time Lyapunov exponent {when}", "units": "1 per tau"}
-        cells["finite_time_exponent"] = (dims, exponent.reshape(shape), attributes)
+        attributes = {"long_name": f"finite-time Lyapunov exponent {when}", "units": units.of_rate}
+        values = units.given(exponent, RATE).reshape(shape)
+        cells["finite_time_exponent"] = (dims, values, attributes)
     return cells
 
 
 def complete(
     dataset: xr.Dataset,
     raw: dict[str, Any],
-    pendulum: Pendulum,
+    model: Pendulum | Rig,
     choices: _core._Choices,
     seconds: float,
 ) -> xr.Dataset:
     """Add the table of attractors, all attributes and the summary to the cells."""
     count = dataset["label"].size
-    dataset = dataset.assign(table(raw["attractors"], count)).assign_coords(
+    dataset = dataset.assign(table(raw["attractors"], count, model.units)).assign_coords(
         attractor=("attractor", np.array([a["name"] for a in raw["attractors"]], dtype=str)),
     )
     settle = dataset["settle_periods"].values
@@ -85,14 +90,9 @@ def complete(
     mirror = raw["unreliable_mirror"]
     dataset.attrs = {
         "kind": "basins",
-        "title": pendulum.title,
-        "gamma": pendulum.gamma,
-        "p": pendulum.p,
-        "omega": pendulum.omega,
-        "phase": pendulum.phase,
-        "torque": pendulum.torque,
-        "theta_r": pendulum.theta_r,
-        "section": "tau = 0 mod T, T = 2 pi / omega (2 pi without drive), at the drive's phase",
+        "title": model.title,
+        **model.attributes,
+        "section": model.units.section,
         "tol": choices["tol"],
         "reached_error": raw["reached_error"],
         "steps_per_period": raw["steps_per_period"],
@@ -126,11 +126,15 @@ def complete(
     return dataset
 
 
-def table(attractors: list[dict[str, Any]], count: int) -> dict[str, Any]:
+def table(attractors: list[dict[str, Any]], count: int, units: Units) -> dict[str, Any]:
     """The attractors and their stroboscopic points as variables."""
 
     def column(key: str, none: float) -> list[float]:
         return [none if a[key] is None else a[key] for a in attractors]
+
+    def measured(key: str, power: int) -> NDArray[np.float64]:
+        values: NDArray[np.float64] = np.array(column(key, np.nan), dtype=float)
+        return np.asarray(units.given(values, power))
 
     multipliers = np.full((len(attractors), 2, 2), np.nan)
     for row, attractor in zip(multipliers, attractors, strict=True):
@@ -141,16 +145,19 @@ def table(attractors: list[dict[str, Any]], count: int) -> dict[str, Any]:
     points = [(k + 1, *p) for k, a in enumerate(attractors) for p in a["points"]]
     flat = np.array(points, dtype=float).reshape(-1, 3)
     one = "attractor"
+    flat[:, 2] = units.given(flat[:, 2], VELOCITY)
+    speed = units.given(np.array([c[1] for c in closed], dtype=float), VELOCITY)
+    of_velocity = {"units": units.of_velocity}
     return {
         "id": (one, np.arange(1, len(attractors) + 1, dtype=np.int32)),
         "kind": (one, np.array([a["kind"] for a in attractors], dtype=str)),
         "n": (one, np.array(column("n", 0), dtype=np.int32), {"comment": "0: no meaning"}),
         "w": (one, np.array(column("w", 0), dtype=np.int32)),
         "theta_point": (one, np.array([c[0] for c in closed], dtype=float), {"units": "rad"}),
-        "velocity_point": (one, np.array([c[1] for c in closed], dtype=float), {"units": "1"}),
-        "period": (one, np.array(column("period", np.nan), dtype=float), {"units": "tau"}),
-        "exponent": (one, np.array(column("exponent", np.nan), dtype=float)),
-        "exponent_stderr": (one, np.array(column("exponent_stderr", np.nan), dtype=float)),
+        "velocity_point": (one, speed, of_velocity),
+        "period": (one, measured("period", TIME), {"units": units.of_time}),
+        "exponent": (one, measured("exponent", RATE), {"units": units.of_rate}),
+        "exponent_stderr": (one, measured("exponent_stderr", RATE), {"units": units.of_rate}),
         "fraction": (one, fraction),
         "stderr": (one, np.sqrt(fraction * (1 - fraction) / max(count, 1))),
         "twin": (
@@ -161,5 +168,5 @@ def table(attractors: list[dict[str, Any]], count: int) -> dict[str, Any]:
         "multipliers": ((one, "eigenvalue", "part"), multipliers, {"comment": "part: re, im"}),
         "point_attractor": ("point", flat[:, 0].astype(np.int32)),
         "point_theta": ("point", flat[:, 1], {"units": "rad"}),
-        "point_velocity": ("point", flat[:, 2], {"units": "1"}),
+        "point_velocity": ("point", flat[:, 2], of_velocity),
     }

@@ -67,7 +67,7 @@ class Grid:
     theta : Axis
         Angle, rad; ``(low, high, count)`` does as well.
     velocity : Axis
-        Velocity ``d theta / d tau``; likewise.
+        Velocity ``d theta / d tau``, in rad/s for a :class:`pendmap.Rig`; likewise.
 
     Raises
     ------
@@ -87,9 +87,14 @@ class Grid:
                 checks.of_type(name, axis, Axis, "Axis(-3, 3, 100)")
 
     @classmethod
-    def square(cls, count: int) -> Grid:
-        """Return the default window with ``count`` cells on each side."""
-        return cls(Axis(-math.pi, math.pi, count), Axis(-3.0, 3.0, count))
+    def square(cls, count: int, w0: float = 1.0) -> Grid:
+        """Return the default window with ``count`` cells on each side.
+
+        Velocities reach from ``-3 w0`` to ``3 w0``: with the ``w0`` of a :class:`pendmap.Rig` the
+        window is the same as without dimensions.
+        """
+        fastest = 3.0 * checks.number("w0", w0)
+        return cls(Axis(-math.pi, math.pi, count), Axis(-fastest, fastest, count))
 
     @property
     def cells(self) -> int:

@@ -11,20 +11,26 @@ from pendmap import _core, checks
 from pendmap.basin_dataset import cells, complete
 from pendmap.errors import InputError
 from pendmap.grid import Grid, starts
-from pendmap.model import Pendulum
+from pendmap.model import without_dimensions
+from pendmap.model.units import VELOCITY
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike
 
+    from pendmap.model import Pendulum, Rig
+
     Progress = Callable[[int, int], object]
 
 __all__ = ["basins", "basins_of"]
 
+_DEFAULT = 1000
+"""Cells on each side of a map where nothing is said."""
+
 
 def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
-    pendulum: Pendulum,
+    pendulum: Pendulum | Rig,
     grid: Grid | None = None,
     *,
     tol: float = 1e-6,
@@ -46,11 +52,12 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
 
     Parameters
     ----------
-    pendulum : Pendulum
-        The model.
+    pendulum : Pendulum or Rig
+        The model. With a rig velocities are in rad/s, times in s and exponents in 1/s; only ``tol``
+        and the errors are of numbers without dimensions.
     grid : Grid, optional
         The initial conditions at ``tau = 0``; by default 1000 x 1000 cells of
-        [-pi, pi] x [-3, 3].
+        [-pi, pi] x [-3, 3], with a rig of [-pi, pi] x [-3 w0, 3 w0].
     tol : float
         The 95th percentile, over a sample of the starts, of the difference that halving the step
         makes after 5 periods; 1e-13 to 1e-2.
@@ -87,21 +94,24 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     --------
     basins_of : the same for a list of starts.
     """
-    grid = Grid() if grid is None else grid
-    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    grid = Grid.square(_DEFAULT, units.given(1.0, VELOCITY)) if grid is None else grid
     checks.of_type(
         "grid", grid, Grid, "Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
     )
     checks.call("progress", progress)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
     began = time.perf_counter()
-    axes = grid.theta.as_tuple, grid.velocity.as_tuple
+    low, high, count = grid.velocity.as_tuple
+    slow, fast = units.bare(low, VELOCITY), units.bare(high, VELOCITY)
+    axes = grid.theta.as_tuple, (slow, fast, count)
     raw = _call(_core.basins_grid, pendulum.parameters, *axes, choices, progress)
     seconds = time.perf_counter() - began
     shape = (grid.velocity.count, grid.theta.count)
     dims = ("velocity", "theta")
     dataset = xr.Dataset(
-        cells(raw, dims, shape),
+        cells(raw, dims, shape, units),
         coords={
             "theta": (
                 "theta",
@@ -111,15 +121,16 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
             "velocity": (
                 "velocity",
                 grid.velocity.centres,
-                {"units": "1", "long_name": "initial velocity dtheta/dtau"} | grid.velocity.bounds,
+                {"units": units.of_velocity, "long_name": f"initial velocity {units.derivative}"}
+                | grid.velocity.bounds,
             ),
         },
     )
-    return complete(dataset, raw, pendulum, choices, seconds)
+    return complete(dataset, raw, model, choices, seconds)
 
 
 def basins_of(  # noqa: PLR0913 (as for basins)
-    pendulum: Pendulum,
+    pendulum: Pendulum | Rig,
     theta: ArrayLike,
     velocity: ArrayLike,
     *,
@@ -135,8 +146,8 @@ def basins_of(  # noqa: PLR0913 (as for basins)
 
     Parameters
     ----------
-    pendulum : Pendulum
-        The model.
+    pendulum : Pendulum or Rig
+        The model; as for :func:`basins`.
     theta, velocity : array_like, shape (N,)
         Angles in rad and velocities at ``tau = 0``.
     tol, max_periods, layer_periods, threads, seed, check, progress
@@ -153,21 +164,23 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     InputError
         If the lengths differ, a start is not finite, or a value is outside its range.
     """
-    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    model = pendulum
+    pendulum, units = without_dimensions(model)
     checks.call("progress", progress)
     angles, speeds = starts(theta, velocity)
+    bare = units.bare(speeds, VELOCITY)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
     began = time.perf_counter()
-    raw = _call(_core.basins_list, pendulum.parameters, angles, speeds, choices, progress)
+    raw = _call(_core.basins_list, pendulum.parameters, angles, bare, choices, progress)
     seconds = time.perf_counter() - began
     dataset = xr.Dataset(
-        cells(raw, ("start",), angles.shape)
+        cells(raw, ("start",), angles.shape, units)
         | {
             "start_theta": ("start", angles, {"units": "rad"}),
-            "start_velocity": ("start", speeds, {"units": "1"}),
+            "start_velocity": ("start", speeds, {"units": units.of_velocity}),
         }
     )
-    return complete(dataset, raw, pendulum, choices, seconds)
+    return complete(dataset, raw, model, choices, seconds)
 
 
 def _choices(  # noqa: PLR0913

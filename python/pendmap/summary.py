@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
+from pendmap.model.units import Units
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -68,7 +70,7 @@ def _only_chaos(dataset: xr.Dataset) -> str:
     exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
     return (
         f"One chaotic attractor takes everything: {name}, exponent {exponent:.4f} +- {error:.4f} "
-        "per unit of tau; nothing captured a sampled trajectory within "
+        f"{Units.of(a).per_time}; nothing captured a sampled trajectory within "
         f"{a['chaos_bound']} periods.\n"
         "Labels tell nothing here: net turns and the finite-time exponent after "
         f"{counted(a['layer_periods'], 'period')} are shown instead."
@@ -78,12 +80,14 @@ def _only_chaos(dataset: xr.Dataset) -> str:
 def _attractors(dataset: xr.Dataset) -> list[str]:
     lines = []
     names = [str(name) for name in dataset["attractor"].values]
+    units = Units.of(dataset.attrs)
+    unit = f" {units.of_rate}" if units.si else ""
     for k, name in enumerate(names):
         row = {key: dataset[key].values[k] for key in ("fraction", "stderr", "twin", "exponent")}
         twin = int(row["twin"])
         mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
-        held = bool(row["exponent"] != row["exponent"])  # friction holds it: there is none
-        rate = "held by friction" if held else f"exponent {row['exponent']:.4f}"
+        held = not math.isfinite(row["exponent"])
+        rate = "held by friction" if held else f"exponent {row['exponent']:.4f}{unit}"
         lines.append(
             f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
             f"{rate}{mirror}."

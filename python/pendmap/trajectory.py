@@ -11,13 +11,16 @@ import xarray as xr
 from pendmap import _core, checks
 from pendmap.errors import InputError
 from pendmap.grid import starts
-from pendmap.model import Pendulum
+from pendmap.model import Units, without_dimensions
+from pendmap.model.units import RATE, TIME, VELOCITY
 from pendmap.store import FORMAT_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.model import Pendulum, Rig
 
 __all__ = ["advance", "simulate"]
 
@@ -27,7 +30,7 @@ _ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
 
 
 def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
-    pendulum: Pendulum,
+    pendulum: Pendulum | Rig,
     theta: float,
     velocity: float,
     until: float,
@@ -40,8 +43,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     Parameters
     ----------
-    pendulum : Pendulum
-        The model.
+    pendulum : Pendulum or Rig
+        The model. With a rig everything is in SI: times in s, velocities in rad/s, exponents in
+        1/s; only ``tol`` and the errors are of numbers without dimensions.
     theta, velocity : float
         State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
     until : float
@@ -73,51 +77,54 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     InputError
         If a value is not finite or outside its range.
     """
-    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    model = pendulum
+    pendulum, units = without_dimensions(model)
     theta, velocity = checks.number("theta", theta), checks.number("velocity", velocity)
     until, tol = checks.number("until", until), checks.number("tol", tol)
     lyapunov = checks.flag("lyapunov", lyapunov)
     if until <= 0:
         raise InputError(f"until is {until:g}: allowed is a time above 0")
-    periods = until / pendulum.period
+    periods = until / model.period
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
     samples = checks.whole("samples", samples, 1, checks.MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
         raise InputError(f"until is {until:g}: {periods:.3g} periods do not fit into memory")
     try:
-        start = (theta, velocity)
-        raw = _core.simulate(pendulum.parameters, start, until, tol, samples, lyapunov)
+        start = (theta, units.bare(velocity, VELOCITY))
+        end = units.bare(until, TIME)
+        raw = _core.simulate(pendulum.parameters, start, end, tol, samples, lyapunov)
     except ValueError as error:
         raise InputError(str(error)) from None
+    time, speed = units.given(raw["time"], TIME), units.given(raw["velocity"], VELOCITY)
+    event_time = units.given(raw["event_time"], TIME)
     angle = raw["theta"][::samples]
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
     dataset = xr.Dataset(
         {
             "theta": ("time", raw["theta"], {"units": "rad", "long_name": "angle, not wrapped"}),
-            "velocity": ("time", raw["velocity"], {"units": "1", "long_name": "dtheta/dtau"}),
+            "velocity": (
+                "time",
+                speed,
+                {"units": units.of_velocity, "long_name": units.derivative},
+            ),
             "section_theta": ("period", wrapped, {"units": "rad"}),
-            "section_velocity": ("period", raw["velocity"][::samples], {"units": "1"}),
-            "section_time": ("period", raw["time"][::samples], {"units": "tau"}),
-            "event_time": ("event", raw["event_time"], {"units": "1 / w0"}),
+            "section_velocity": ("period", speed[::samples], {"units": units.of_velocity}),
+            "section_time": ("period", time[::samples], {"units": units.of_time}),
+            "event_time": ("event", event_time, {"units": units.of_time}),
             "event_kind": ("event", np.array(raw["event_kind"], dtype="U14")),
             "event_theta": ("event", raw["event_theta"], {"units": "rad"}),
         },
         coords={
-            "time": ("time", raw["time"], {"units": "1 / w0", "long_name": "tau"}),
+            "time": ("time", time, {"units": units.of_time, "long_name": units.clock}),
             "period": ("period", np.arange(wrapped.size)),
         },
     )
     turns = round((float(raw["theta"][-1]) - theta) / math.tau)
     dataset.attrs = {
         "kind": "trajectory",
-        "title": pendulum.title,
-        "gamma": pendulum.gamma,
-        "p": pendulum.p,
-        "omega": pendulum.omega,
-        "phase": pendulum.phase,
-        "torque": pendulum.torque,
-        "theta_r": pendulum.theta_r,
+        "title": model.title,
+        **model.attributes,
         "theta0": theta,
         "velocity0": velocity,
         "until": until,
@@ -128,37 +135,36 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "turns": turns,
         "stuck": int(raw["stuck"]),
         "lyapunov": int(lyapunov),
-        **_exponent(raw),
+        **_exponent(raw, time, units),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    dataset.attrs["summary"] = _summary(dataset)
+    dataset.attrs["summary"] = _summary(dataset, units)
     return dataset
 
 
-def _exponent(raw: dict[str, Any]) -> dict[str, float]:
+def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> dict[str, float]:
     """The exponent with its standard error, and from when to when it was measured."""
     if raw["exponent"] is None:
         return {}
-    time = raw["time"]
     first = int(_ALIGNMENT * time.size)
     size = max(1, (time.size - first) // _BATCHES)
     last = first + (time.size - first) // size * size - 1
     return {
-        "exponent": raw["exponent"][0],
-        "exponent_stderr": raw["exponent"][1],
+        "exponent": units.given(raw["exponent"][0], RATE),
+        "exponent_stderr": units.given(raw["exponent"][1], RATE),
         "exponent_from": float(time[max(first - 1, 0)]),
         "exponent_to": float(time[last]),
     }
 
 
-def _summary(dataset: xr.Dataset) -> str:
+def _summary(dataset: xr.Dataset, units: Units) -> str:
     a = dataset.attrs
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
     lines = [
         (
-            f"At tau = {a['until']:g}: theta = {theta:.9g} rad ({a['turns']} net turns), "
-            f"velocity = {velocity:.9g}."
+            f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad "
+            f"({a['turns']} net turns), velocity = {units.spoken(format(velocity, '.9g'))}."
         ),
         (
             f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
@@ -174,7 +180,7 @@ def _summary(dataset: xr.Dataset) -> str:
     if a["stuck"]:
         kinds, times = dataset["event_kind"].values, dataset["event_time"].values
         ever = " for ever" if kinds[-1] == "stuck for ever" else ""
-        lines.append(f"Friction holds it since tau = {times[-1]:.9g}{ever}.")
+        lines.append(f"Friction holds it since {units.at(format(times[-1], '.9g'))}{ever}.")
     if a["end_error"] > max(1e-3, a["tol"]):
         lines.append(
             "The end is not predictable at this length: read the motion, not its last state."
@@ -182,15 +188,16 @@ def _summary(dataset: xr.Dataset) -> str:
     if "exponent" in a:
         value, error = a["exponent"], a["exponent_stderr"]
         lines.append(
-            f"Largest Lyapunov exponent of this stretch, tau = {a['exponent_from']:.6g} to "
-            f"{a['exponent_to']:.6g}: {value:.5f} +- {error:.5f} per unit of tau. Transients are "
-            "included; basins gives the exponents of the attractors."
+            f"Largest Lyapunov exponent of this stretch, {units.clock} = "
+            f"{a['exponent_from']:.6g} to {units.seconds(format(a['exponent_to'], '.6g'))}: "
+            f"{value:.5f} +- {error:.5f} {units.per_time}. Transients are included; basins gives "
+            "the exponents of the attractors."
         )
     return "\n".join(lines)
 
 
 def advance(  # noqa: PLR0913
-    pendulum: Pendulum,
+    pendulum: Pendulum | Rig,
     theta: ArrayLike,
     velocity: ArrayLike,
     periods: int,
@@ -204,8 +211,8 @@ def advance(  # noqa: PLR0913
 
     Parameters
     ----------
-    pendulum : Pendulum
-        The model.
+    pendulum : Pendulum or Rig
+        The model; with a rig velocities are in rad/s.
     theta, velocity : array_like, shape (N,)
         Angles in rad and velocities at ``tau = 0``.
     periods : int
@@ -231,9 +238,10 @@ def advance(  # noqa: PLR0913
     InputError
         If the lengths differ, a start is not finite, or a value is outside its range.
     """
-    checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+    pendulum, units = without_dimensions(pendulum)
     checks.call("progress", progress)
     angles, speeds = starts(theta, velocity)
+    speeds = units.bare(speeds, VELOCITY)
     periods = checks.whole("periods", periods, 0, checks.MOST_PERIODS)
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     tol = checks.number("tol", tol)
@@ -244,8 +252,9 @@ def advance(  # noqa: PLR0913
             step = max(1, angles.size // 400)
             sample = angles[::step].copy(), speeds[::step].copy()
             steps_per_period, _ = _core.choose_steps(pendulum.parameters, *sample, tol)
-        return _core.advance(
+        end, speed, turns = _core.advance(
             pendulum.parameters, angles, speeds, periods, steps_per_period, workers, progress
         )
     except ValueError as error:
         raise InputError(str(error)) from None
+    return end, units.given(speed, VELOCITY), turns

@@ -133,15 +133,15 @@ impl<N: Number> Course<N> {
 }
 
 impl<N> Load for Course<N> {
-    fn excess_toward(&self, tau: f64, theta: f64, sense: f64) -> f64 {
+    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
         let mut forcing = self.plain.forcing(tau);
         if let Some(recorded) = &self.recorded {
             let [up, side] = recorded.acceleration(tau);
             forcing.vertical += up;
             forcing.lateral += side;
         }
-        let at = self.plain.point(&forcing, theta, 0.0, sense);
-        sense * self.plain.load(&forcing, &at) - self.plain.friction(&at).max(0.0)
+        let at = self.plain.point(&forcing, theta, 0.0, 1.0);
+        [self.plain.load(&forcing, &at), self.plain.friction(&at).max(0.0)]
     }
     fn equation(&self) -> &Equation<f64> {
         &self.plain

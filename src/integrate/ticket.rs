@@ -9,16 +9,19 @@ use crate::model::rest::{Release, release};
 
 /// Integrations after which a ticket gives up; its trajectory counts as failed.
 const MOST_ROUNDS: u32 = 400;
-/// A zero is found when Newton's step falls below this part of the way to it: with the change of the
-/// acceleration along it taken into account, what is left is of its third power.
-const CLOSE: f64 = 3e-4;
+/// A zero is found when Newton's step falls below this part of the piece, at a step of a quarter; it
+/// falls with the fourth power of the step, so that its square stays below the error of the step. The
+/// change of the acceleration is taken into account, so that little more than the third power is left.
+const CLOSE: f64 = 1e-3;
+/// The bounds within which it stays.
+const CLOSEST: [f64; 2] = [1e-7, 1e-3];
 /// Steps of Newton's method that a root may take before the bracket is halved.
 const MOST_NEWTON: u32 = 8;
 /// Where the velocity's least value, as its cubic gives it, is below this part of its change over the
 /// piece, the integration decides.
 const GRAZING: f64 = 0.1;
 /// Steps of Newton's method on the cubic.
-const POLISHINGS: usize = 4;
+const POLISHINGS: usize = 3;
 /// A first guess is at least this part of the piece.
 const LEAST_GUESS: f64 = 1e-6;
 /// After a release the next one is at least this part of the period away: at the stick's edge a slip
@@ -89,6 +92,10 @@ pub struct Ticket {
     stage: Stage,
     /// What the whole piece gave.
     whole: Option<Reached>,
+    /// The length of the whole piece.
+    piece: f64,
+    /// Which Newton step is small enough.
+    close: f64,
     rounds: u32,
 }
 
@@ -106,6 +113,8 @@ impl Ticket {
             end,
             stage: Stage::Whole,
             whole: None,
+            piece: 0.0,
+            close: 0.0,
             rounds: 0,
         }
     }
@@ -183,6 +192,8 @@ impl Ticket {
 
     /// Asks for the state at the first zero of the cubic over a piece of length `h`.
     fn seek(&mut self, h: f64) {
+        self.piece = h;
+        self.close = h * (CLOSE * (4.0 * h).powi(4)).clamp(CLOSEST[0], CLOSEST[1]);
         let guess = self.whole.map_or(0.5, |w| Cubic::new(self.ends(&w), h).zero());
         self.length = guess.clamp(LEAST_GUESS, 1.0) * h;
         self.stage = Stage::Root { low: 0.0, high: h, tries: 0 };
@@ -206,15 +217,19 @@ impl Ticket {
         // After a reversal the begin is a zero itself, and is divided out.
         let slope = if self.velocity == 0.0 { b - u / t } else { b };
         let step = if u == 0.0 { 0.0 } else { -u / slope };
-        if step.abs() <= CLOSE * t || high - low <= 1e-15 * self.end.abs().max(period) {
+        // The begin may be a zero itself: the series must not reach back to it.
+        let near = step.abs() <= self.close.min(CLOSE * t);
+        if near || high - low <= 1e-15 * self.end.abs().max(period) {
             let [first, last] = reached.acceleration;
-            let step = if u != 0.0 && step.abs() <= CLOSE * t {
+            let jerk = self.jerk(t, first, last);
+            let step = if near && u != 0.0 {
                 let step = -reached.velocity / last;
-                step - 0.5 * (last - first) / (t * last) * step * step
+                step - 0.5 * jerk / last * step * step
             } else {
                 0.0
             };
-            let theta = reached.theta + step * (reached.velocity + 0.5 * step * last);
+            let gain = last + step * jerk / 3.0;
+            let theta = reached.theta + step * (reached.velocity + 0.5 * step * gain);
             return self.stopped(theta, self.begin + t + step, equation, period);
         }
         let mut next = t + step;
@@ -224,6 +239,18 @@ impl Ticket {
         self.length = next;
         self.stage = Stage::Root { low, high, tries: (tries + 1) % (2 * MOST_NEWTON) };
         Progress::Asks
+    }
+
+    /// The change of the acceleration at `t`, from those at the piece's begin, at `t` and at its end.
+    fn jerk(&self, t: f64, first: f64, here: f64) -> f64 {
+        let back = (here - first) / t;
+        match self.whole {
+            Some(whole) if self.piece - t > 0.05 * self.piece => {
+                let ahead = (whole.acceleration[1] - here) / (self.piece - t);
+                back + t * (ahead - back) / self.piece
+            }
+            _ => back,
+        }
     }
 
     /// The velocity is zero at `tau`: what comes next.

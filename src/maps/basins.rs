@@ -222,7 +222,10 @@ fn to_capture(
 ) -> Result<(Labels, u32), Error> {
     let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
     let bound = |catalogue: &Catalogue| {
-        if catalogue.has_chaos() && options.max_periods.is_none() {
+        if catalogue.has_chaos() && catalogue.longest_settle == 0 && options.max_periods.is_none() {
+            // Several chaotic sets and nothing else: no settling to measure patience by.
+            SEARCH_BOUND
+        } else if catalogue.has_chaos() && options.max_periods.is_none() {
             (PATIENCE * catalogue.longest_settle).clamp(LEAST_BOUND, max_periods)
         } else {
             max_periods

@@ -23,9 +23,14 @@ const SECTIONS: usize = 45;
 
 /// What loads a pendulum at rest.
 pub trait Load {
+    /// The load at rest, and what it must exceed to move the pendulum.
+    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2];
     /// By how much the load at rest exceeds what holds the pendulum against moving in the sense
     /// `sense`; it stays at rest while this is not positive for either sense.
-    fn excess_toward(&self, tau: f64, theta: f64, sense: f64) -> f64;
+    fn excess_toward(&self, tau: f64, theta: f64, sense: f64) -> f64 {
+        let [load, hold] = self.load_and_hold(tau, theta);
+        sense * load - hold
+    }
     /// The equation, for the closed form.
     fn equation(&self) -> &Equation<f64>;
     /// Whether gravity under the harmonic drive and what does not change load the pendulum at rest,
@@ -38,11 +43,11 @@ pub trait Load {
 }
 
 impl Load for Equation<f64> {
-    fn excess_toward(&self, tau: f64, theta: f64, sense: f64) -> f64 {
+    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
         let forcing = self.forcing(tau);
-        let at = self.point(&forcing, theta, 0.0, sense);
+        let at = self.point(&forcing, theta, 0.0, 1.0);
         // A friction that its law makes negative holds nothing.
-        sense * self.load(&forcing, &at) - self.friction(&at).max(0.0)
+        [self.load(&forcing, &at), self.friction(&at).max(0.0)]
     }
     fn equation(&self) -> &Equation<f64> {
         self
@@ -130,7 +135,8 @@ pub fn release<L: Load>(load: &L, tau: f64, theta: f64, until: f64) -> Release {
 
 /// The excess in the sense 1 and in the sense -1.
 fn excesses<L: Load>(load: &L, tau: f64, theta: f64) -> [f64; 2] {
-    [1.0, -1.0].map(|sense| load.excess_toward(tau, theta, sense))
+    let [load, hold] = load.load_and_hold(tau, theta);
+    [load - hold, -load - hold]
 }
 
 /// The greater excess of both senses, and its sense.

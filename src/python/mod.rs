@@ -41,6 +41,12 @@ fn pendulum(parameters: Parameters) -> Result<Pendulum, Error> {
     Ok(pendulum)
 }
 
+/// The unit of "periods" of a model, whose parameters and effects are checked.
+#[pyfunction]
+fn period(parameters: Parameters) -> PyResult<f64> {
+    Ok(pendulum(parameters)?.period())
+}
+
 /// The instruction set that a call would use now.
 #[pyfunction]
 fn simd() -> PyResult<&'static str> {
@@ -68,6 +74,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simd_available, module)?)?;
     module.add_function(wrap_pyfunction!(default_threads, module)?)?;
     module.add_function(wrap_pyfunction!(library::effects, module)?)?;
+    module.add_function(wrap_pyfunction!(period, module)?)?;
     module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
     module.add_function(wrap_pyfunction!(motion::choose_steps, module)?)?;
     module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;

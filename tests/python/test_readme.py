@@ -58,6 +58,14 @@ def test_every_snippet_runs(code: str, tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
 
 
+@pytest.mark.parametrize("text", blocks("toml"))
+def test_every_model_file_is_one(text: str, tmp_path: Path, pendmap_command: Run) -> None:
+    (tmp_path / "model.toml").write_text(text, encoding="utf-8")
+    drive = ("--stroke-mm", "20", "--frequency-hz", "1.9")
+    run = pendmap_command("simulate", "--model", "model.toml", *drive, "--until", "30", "--json")
+    assert run.returncode == 0, run.stderr
+
+
 def test_every_link_leads_somewhere() -> None:
     for target in re.findall(r"\]\(([^)#]+)\)", README):
         if not target.startswith("http"):

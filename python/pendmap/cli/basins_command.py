@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED
+from pendmap.cli.model_options import model_from, model_options
 from pendmap.cli.options import (
     Outputs,
-    model_options,
     output_options,
-    pendulum_from,
     progress_options,
 )
 from pendmap.cli.show import progress_bar, show
-from pendmap.cli.types import AXIS, NUMBER, AxisText, Whole
+from pendmap.cli.types import AXIS, NUMBER, Whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +27,11 @@ _DEFAULT = 1000
 @click.command("basins")
 @model_options
 @click.option("--theta", type=AXIS, help="Initial angles, rad.  [default: -pi:pi:1000]")
-@click.option("--velocity", type=AXIS, help="Initial velocities.  [default: -3:3:1000]")
+@click.option(
+    "--velocity",
+    type=AXIS,
+    help="Initial velocities, in SI rad/s.  [default: -3:3:1000, in SI times w0]",
+)
 @click.option("--grid", type=Whole(1, MOST_CELLS), help="Cells on each side of the window.")
 @click.option("--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]")
 @click.option(
@@ -50,28 +53,22 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     Writes basins.nc, basins.png and basins.rrd if no output is named. --json alone writes no file.
     --view writes the recording it opens: basins.rrd, or what --rerun names.
     """
-    pendulum = pendulum_from(given)
+    model = model_from(given)
     outputs = Outputs.take(given, "basins")
-    axes = _axes(given.pop("theta"), given.pop("velocity"), given.pop("grid"))
+    theta, velocity, count = (given.pop(name) for name in ("theta", "velocity", "grid"))
+    if count is not None and (theta is not None or velocity is not None):
+        raise click.UsageError("--grid: allowed alone; --theta and --velocity name their own cells")
 
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins
 
-    grid = Grid(*(Axis(*axis) for axis in axes))
+    usual = Grid.square(count or _DEFAULT, model.units.w0)
+    grid = Grid(
+        Axis(*theta) if theta else usual.theta, Axis(*velocity) if velocity else usual.velocity
+    )
     with progress_bar("basins", shown=outputs.shows_progress) as progress:
-        dataset = basins(pendulum, grid, progress=progress, **given)
+        dataset = basins(model, grid, progress=progress, **given)
     show(dataset, outputs, fields)
-
-
-def _axes(
-    theta: AxisText | None, velocity: AxisText | None, count: int | None
-) -> tuple[AxisText, AxisText]:
-    from math import pi
-
-    if count is not None and (theta is not None or velocity is not None):
-        raise click.UsageError("--grid: allowed alone; --theta and --velocity name their own cells")
-    cells = _DEFAULT if count is None else count
-    return theta or AxisText(-pi, pi, cells), velocity or AxisText(-3.0, 3.0, cells)
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
@@ -105,6 +102,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
     ]
     settled = a["longest_settle"] >= 0
     return {
+        "units": a["units"],
         "attractors": [_attractor(dataset, k) for k in range(dataset.sizes["attractor"])],
         **{name: a.get(name) for name in names},
         "mean_settle": a["mean_settle"] if settled else None,

@@ -4,65 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.checks import MOST_THREADS
-from pendmap.cli.types import NUMBER, OutputFile, Whole
-from pendmap.model import PRESETS, Pendulum
+from pendmap.cli.types import OutputFile, Whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     Command = Callable[..., Any]
 
-__all__ = ["Outputs", "model_options", "output_options", "pendulum_from", "progress_options"]
-
-_MODEL = {
-    "gamma": "Viscous damping c/(m w0).",
-    "p": "Amplitude Y Omega^2/g of the drive.",
-    "omega": "Frequency Omega/w0 of the drive.",
-    "phase": "Phase of the drive at tau = 0, rad.",
-    "torque": "Constant torque over m l^2 w0^2.",
-    "theta_r": "Coulomb friction Tr/w0^2.",
-}
-
-
-def model_options(function: Command) -> Command:
-    """Add the parameters of the pendulum, the presets and the model file."""
-    model = click.option(
-        "--model",
-        "model",
-        type=click.Path(path_type=Path),
-        metavar="FILE.toml",
-        help="Model file; options typed beside it override it.",
-    )
-    preset = click.option(
-        "--preset", type=click.Choice(sorted(PRESETS)), help="A point of the paper's figure 2."
-    )
-    function = model(preset(function))
-    for name, text in reversed(_MODEL.items()):
-        option = f"--{name.replace('_', '-')}"
-        default = getattr(Pendulum(), name)
-        function = click.option(
-            option, type=NUMBER, default=None, help=f"{text}  [default: {default:g}]"
-        )(function)
-    return function
-
-
-def pendulum_from(given: dict[str, Any]) -> Pendulum:
-    """Take the model's options out of ``given`` and make the pendulum that they describe."""
-    model, preset = given.pop("model"), given.pop("preset")
-    typed = {name: given.pop(name) for name in _MODEL}
-    if model is not None and preset is not None:
-        raise click.UsageError("--model and --preset: allowed is one of them")
-    if model is not None:
-        base = Pendulum.from_toml(model)
-    else:
-        base = PRESETS[preset] if preset else Pendulum()
-    return dataclasses.replace(base, **{k: v for k, v in typed.items() if v is not None})
+__all__ = ["Outputs", "output_options", "progress_options"]
 
 
 def progress_options(function: Command) -> Command:

@@ -18,6 +18,7 @@ from pendmap import palette
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
+from pendmap.model.units import VELOCITY, Units
 from pendmap.pictures import layers as layering
 from pendmap.pictures import legend, plane
 
@@ -59,6 +60,8 @@ def figure(
             raise InputError(f"colormap {colormap!r}: labels are coloured by attractor")
     theta = plane.cell_edges(dataset["theta"])
     velocity = plane.cell_edges(dataset["velocity"])
+    units = Units.of(dataset.attrs)
+    slow, fast = (units.bare(bound, VELOCITY) for bound in velocity)
     extent = (*theta, *velocity)
     listed = legend.entries(dataset)
     chaos = [e for e in listed if e.chaotic and len(e.points)]
@@ -76,7 +79,7 @@ def figure(
         note = layering.warning(dataset)
     sheet = Sheet(
         panels,
-        ratio=min(max((velocity[1] - velocity[0]) / (theta[1] - theta[0]), 0.3), 1.3),
+        ratio=min(max((fast - slow) / (theta[1] - theta[0]), 0.3), 1.3),
         title=_title(dataset, shown),
         subtitle=_subtitle(dataset),
         handles=[_handle(entry) for entry in listed],
@@ -94,11 +97,11 @@ def figure(
             _attractors(axes, listed, extent)
         else:
             _scalar(axes, bar, dataset, one, extent=extent, limit=limit, colormap=colormap)
-        style.phase_plane(axes, theta, velocity)
+        style.phase_plane(axes, theta, velocity, units)
     if "labels" in shown and not layering.reliable(dataset):
         _warn(sheet, sheet.axes[shown.index("labels")], dataset)
     if aside:
-        _section(sheet.axes[-1], chaos)
+        _section(sheet.axes[-1], chaos, units)
         sheet.note(sheet.axes[-1], [(note, style.QUIET, "normal")])
     return sheet.figure
 
@@ -257,11 +260,11 @@ def _attractors(axes: Axes, listed: list[legend.Entry], extent: Extent) -> None:
             axes.plot(at[:, 0], at[:, 1], clip_on=False, zorder=5, **_drawn(entry, size))
 
 
-def _section(axes: Axes, chaos: list[legend.Entry]) -> None:
+def _section(axes: Axes, chaos: list[legend.Entry], units: Units) -> None:
     """Draw the stroboscopic points of chaotic attractors on a plane of their own."""
     for entry in chaos:
         _dots(axes, entry.points, entry.colour)
-    style.phase_plane(axes, (-math.pi, math.pi), _section_range(chaos))
+    style.phase_plane(axes, (-math.pi, math.pi), _section_range(chaos), units)
 
 
 def _section_range(chaos: list[legend.Entry]) -> tuple[float, float]:

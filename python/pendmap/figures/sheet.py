@@ -223,13 +223,24 @@ class Sheet:
 def headed(
     size: tuple[float, float], dpi: float, title: str, subtitle: str, *, left: float = LEFT
 ) -> Figure:
-    """Return an empty figure of ``size`` inches with its title and subtitle."""
+    """Return an empty figure of ``size`` inches with its title and subtitle.
+
+    A subtitle that is too long for one line becomes two, at its semicolon, and then smaller.
+    """
     width, height = size
     figure = Figure(figsize=size, dpi=dpi)
     FigureCanvasAgg(figure)
+    room = width - left - 0.1
+    lines = (
+        [subtitle] if style.inches(subtitle, RC["font.size"]) <= room else subtitle.split(";   ")
+    )
+    longest = max(style.inches(line, RC["font.size"]) for line in lines)
+    font = RC["font.size"] * min(1.0, room / max(longest, 1e-3))
     left /= width
     figure.text(left, 1 - 0.27 / height, title, fontsize=12, weight="bold", va="center")
-    figure.text(left, 1 - 0.50 / height, subtitle, color=QUIET, va="center")
+    for k, line in enumerate(lines):
+        down = 0.50 + LINE * (k - 0.25 * (len(lines) - 1))
+        figure.text(left, 1 - down / height, line, color=QUIET, va="center", fontsize=font)
     return figure
 
 

@@ -12,7 +12,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import NullLocator
 
 from pendmap.errors import InputError
-from pendmap.pictures import plane
+from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
+
+    from pendmap.model.units import Units
 
 __all__ = [
     "RC",
@@ -68,9 +70,6 @@ RC: dict[Any, Any] = {
     "agg.path.chunksize": 20000,
 }
 
-THETA = "\N{GREEK SMALL LETTER THETA} (rad)"
-VELOCITY = "d\N{GREEK SMALL LETTER THETA}/d\N{GREEK SMALL LETTER TAU}"
-
 MOST, PIXELS = 100.0, 20000
 """Inches and pixels that a side of a figure may have."""
 
@@ -81,12 +80,14 @@ DPI = (20, 1200)
 """Pixels per inch that may be chosen."""
 
 
-def phase_plane(axes: Axes, theta: tuple[float, float], velocity: tuple[float, float]) -> None:
+def phase_plane(
+    axes: Axes, theta: tuple[float, float], velocity: tuple[float, float], units: Units
+) -> None:
     """Give axes the limits, ticks and names of the phase plane."""
     axes.set_xlim(*theta)
     axes.set_ylim(*velocity)
-    scale(axes, "x", theta, THETA, angle=True)
-    scale(axes, "y", velocity, VELOCITY)
+    scale(axes, "x", theta, names.ANGLE, angle=True)
+    scale(axes, "y", velocity, names.speed(units))
 
 
 def scale(

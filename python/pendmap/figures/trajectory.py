@@ -11,8 +11,9 @@ import numpy.typing as npt
 from pendmap.errors import InputError
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
+from pendmap.model.units import Units
 from pendmap.pictures import layers as layering
-from pendmap.pictures import plane
+from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,7 +79,8 @@ def figure(
 def _subtitle(dataset: xr.Dataset) -> str:
     attrs = dataset.attrs
     start = f"from \N{GREEK SMALL LETTER THETA} = {float(attrs['theta0']):.6g}, "
-    start += f"{style.VELOCITY} = {float(attrs['velocity0']):.6g}"
+    units = Units.of(attrs)
+    start += f"{names.velocity(units)} = {units.spoken(format(float(attrs['velocity0']), '.6g'))}"
     return f"{layering.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}")
 
 
@@ -91,9 +93,10 @@ def _history(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     low, high = axes.get_ylim()
     if high - low < FLAT:
         axes.set_ylim(low - FLAT, high + FLAT)
-    style.scale(axes, "y", axes.get_ylim(), style.THETA, angle=True)
+    style.scale(axes, "y", axes.get_ylim(), names.ANGLE, angle=True)
     if time[-1] > time[0]:
-        style.scale(axes, "x", (float(time[0]), float(time[-1])), "\N{GREEK SMALL LETTER TAU}")
+        clock = names.clock(Units.of(dataset.attrs))
+        style.scale(axes, "x", (float(time[0]), float(time[-1])), clock)
     axes.set_title(mark + "time history")
 
 
@@ -104,7 +107,7 @@ def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     last = plane.broken_at_wrap(theta[late:], velocity[late:])
     axes.plot(early[:, 0], early[:, 1], color=_EARLY_COLOUR, lw=0.5)
     axes.plot(last[:, 0], last[:, 1], color=_LATE_COLOUR, lw=0.7)
-    style.phase_plane(axes, (-math.pi, math.pi), _range(velocity))
+    style.phase_plane(axes, (-math.pi, math.pi), _range(velocity), Units.of(dataset.attrs))
     axes.set_title(mark + "phase plane")
 
 
@@ -115,7 +118,8 @@ def _section(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     size = 1.3 if theta.size > MANY else 2.6
     for which, colour in ((~np.asarray(late, bool), _EARLY_COLOUR), (late, _LATE_COLOUR)):
         axes.plot(theta[which], velocity[which], "o", ms=size, mew=0, color=colour)
-    style.phase_plane(axes, (-math.pi, math.pi), _range(dataset["velocity"].values))
+    speeds = _range(dataset["velocity"].values)
+    style.phase_plane(axes, (-math.pi, math.pi), speeds, Units.of(dataset.attrs))
     axes.set_title(mark + "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section, once a period")
 
 

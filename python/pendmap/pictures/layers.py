@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.model.units import Units
+from pendmap.pictures import names
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -37,7 +40,6 @@ VARIABLES = {
 }
 """Layers by the name a user types, and the variable that holds each."""
 
-_TAU = "\N{GREEK SMALL LETTER TAU}"
 _SYMBOLS = {
     "gamma": "\N{GREEK SMALL LETTER GAMMA}",
     "p": "p",
@@ -45,6 +47,17 @@ _SYMBOLS = {
     "phase": "phase",
     "torque": "torque",
     "theta_r": "\N{GREEK SMALL LETTER THETA}r",
+    "lab_time": "lab time",
+}
+_SI_SYMBOLS = {
+    "w0": ("w0", "rad/s"),
+    "c_over_m": ("c/m", "1/s"),
+    "p": ("p", ""),
+    "Omega": ("\N{GREEK CAPITAL LETTER OMEGA}", "rad/s"),
+    "phi": ("phase", ""),
+    "torque": ("torque", "rad/s\N{SUPERSCRIPT TWO}"),
+    "Tr": ("Tr", "rad/s\N{SUPERSCRIPT TWO}"),
+    "lab_time_s": ("lab time", "s"),
 }
 
 
@@ -112,7 +125,7 @@ def exponents(dataset: xr.Dataset) -> str:
         listed = f"{known[0]:.{digits}f} \N{PLUS-MINUS SIGN} {errors[0]:.{digits}f}"
     else:
         listed = ", ".join(f"{x:.3g}" for x in known)
-    return f"largest exponent {listed} per unit {_TAU}" if known else ""
+    return f"largest exponent {listed} {names.per_time(Units.of(dataset.attrs))}" if known else ""
 
 
 def layers(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -173,21 +186,25 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
         if driven
         else "periods of 2\N{GREEK SMALL LETTER PI} to settle",
         "turns": "net turns",
-        "exponent": f"exponent per unit {_TAU}",
+        "exponent": f"exponent {names.per_time(Units.of(dataset.attrs))}",
     }[layer]
 
 
 def parameters(attrs: Mapping[Any, Any]) -> str:
-    """Return the pendulum's parameters in one line.
+    """Return the model's parameters in one line, in its units, and the names of its effects.
 
     Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
     there is no frequency and no phase.
     """
     driven = float(attrs.get("p", 1.0)) != 0.0
-    always = ("gamma", "p", "omega") if driven else ("gamma", "p")
-    never = () if driven else ("omega", "phase")
-    return ",  ".join(
-        f"{symbol} = {float(attrs[key]):.6g}".replace("-", "\N{MINUS SIGN}")
-        for key, symbol in _SYMBOLS.items()
+    si = Units.of(attrs).si
+    symbols = _SI_SYMBOLS if si else {key: (text, "") for key, text in _SYMBOLS.items()}
+    always = {"w0", "gamma", "c_over_m", "p", *(("omega", "Omega") if driven else ())}
+    never = set() if driven else {"omega", "phase", "Omega", "phi"}
+    parts = [
+        f"{symbol} = {float(attrs[key]):.6g} {unit}".rstrip().replace("-", "\N{MINUS SIGN}")
+        for key, (symbol, unit) in symbols.items()
         if key in attrs and key not in never and (key in always or float(attrs[key]) != 0.0)
-    )
+    ]
+    effects = json.loads(attrs.get("effects", "[]"))
+    return ",  ".join([*parts, *(str(effect["name"]).replace("_", " ") for effect in effects)])

@@ -10,6 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap import palette
+from pendmap.model.units import Units
 from pendmap.pictures import layers as layering
 from pendmap.pictures import legend, plane
 from pendmap.viewer import frame
@@ -46,7 +47,9 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
     ]
     if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
         tabs.append(
-            _around_attractors(listed).view(ROOTS["labels"], "Its attractor, once a period")
+            _around_attractors(dataset, listed).view(
+                ROOTS["labels"], "Its attractor, once a period"
+            )
         )
     aside = rrb.Vertical(
         rrb.TextDocumentView(origin="/legend", name="Legend"),
@@ -69,21 +72,22 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
         if one == "labels" or not layering.finite_time(dataset):
             _attractors(stream, ROOTS[one], listed, around, named=one == "labels")
     if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
-        alone = _around_attractors(listed)
+        alone = _around_attractors(dataset, listed)
         alone.log(stream, ROOTS["labels"])
         _attractors(stream, ROOTS["labels"], listed, alone, named=False)
 
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
-    return frame.Frame(plane.cell_edges(dataset["theta"]), plane.cell_edges(dataset["velocity"]))
+    theta, velocity = (plane.cell_edges(dataset[axis]) for axis in ("theta", "velocity"))
+    return frame.Frame(theta, velocity, Units.of(dataset.attrs))
 
 
-def _around_attractors(listed: list[legend.Entry]) -> frame.Frame:
+def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame:
     """Return a frame that holds every attractor's points, where no map is drawn with them."""
     velocity = np.concatenate([entry.points[:, 1] for entry in listed])
     low, high = float(velocity.min()), float(velocity.max())
     pad = max(0.06 * (high - low), 0.05)
-    return frame.Frame((-np.pi, np.pi), (low - pad, high + pad))
+    return frame.Frame((-np.pi, np.pi), (low - pad, high + pad), Units.of(dataset.attrs))
 
 
 def _title(dataset: xr.Dataset, layer: str) -> str:

@@ -11,8 +11,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pendmap.model.units import NONDIMENSIONAL, VELOCITY, Units
 from pendmap.pictures import layers as layering
-from pendmap.pictures import plane
+from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -102,16 +103,21 @@ class Frame:
     x : (float, float)
         Range of the angle in rad.
     y : (float, float)
-        Range of the nondimensional velocity.
+        Range of the velocity.
+    units : Units
+        What it is counted in.
     """
 
     x: tuple[float, float]
     y: tuple[float, float]
+    units: Units = NONDIMENSIONAL
 
     @property
     def height(self) -> float:
         """Height on the screen: that of the range, but neither a slit nor a tower."""
-        return SIDE * min(max((self.y[1] - self.y[0]) / (self.x[1] - self.x[0]), 0.3), 1.3)
+        low, high = (self.units.bare(bound, VELOCITY) for bound in self.y)
+        ratio: float = (high - low) / (self.x[1] - self.x[0])
+        return SIDE * min(max(ratio, 0.3), 1.3)
 
     def to_screen(self) -> rr.Transform3D:
         """Return the transform from physical units to the screen."""
@@ -170,8 +176,8 @@ class Frame:
             labels.append(label)
         places += [[w / 2, h + 75], [-135, h / 2 - 22]]
         labels += [
-            plane.shifted("\N{GREEK SMALL LETTER THETA} (rad)", across),
-            plane.shifted("d\N{GREEK SMALL LETTER THETA}/d\N{GREEK SMALL LETTER TAU}", up),
+            plane.shifted(names.ANGLE, across),
+            plane.shifted(names.speed(self.units), up),
         ]
         thin = rr.Radius.ui_points(0.75)
         stream.log(

@@ -12,10 +12,13 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.pictures import plane
+from pendmap.model.units import TIME, VELOCITY, Units
+from pendmap.pictures import names, plane
 from pendmap.viewer import frame
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
 
 __all__ = ["blueprint", "log"]
@@ -40,10 +43,10 @@ MANY = 1000
 _POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 2)
 _STRIP = pa.list_(pa.field("item", _POINT, nullable=False))
 
-_STATE = {
-    "theta": ("\N{GREEK SMALL LETTER THETA} (rad)", (0, 114, 178)),
-    "omega": ("d\N{GREEK SMALL LETTER THETA}/d\N{GREEK SMALL LETTER TAU}", (213, 94, 0)),
-    "energy": ("energy", (0, 158, 115)),
+_STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
+    "theta": (lambda _: names.ANGLE, (0, 114, 178)),
+    "omega": (names.speed, (213, 94, 0)),
+    "energy": (lambda _: "energy", (0, 158, 115)),
 }
 
 
@@ -70,7 +73,8 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
         visual_bounds=rrb.VisualBounds2D(x_range=[-reach, reach], y_range=[-reach, reach]),
     )
     state = [
-        rrb.TimeSeriesView(origin=f"/state/{name}", name=text) for name, (text, _) in _STATE.items()
+        rrb.TimeSeriesView(origin=f"/state/{name}", name=text(around.units))
+        for name, (text, _) in _STATE.items()
     ]
     left = rrb.Vertical(
         pendulum,
@@ -92,12 +96,15 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     time = dataset["time"].values.astype(float)
     theta = dataset["theta"].values.astype(float)
     velocity = dataset["velocity"].values.astype(float)
+    units = Units.of(dataset.attrs)
     clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
+    if units.si:
+        clock = "The time of the viewer is that of the rig."
     frame.summary(stream, dataset, clock)
     around = _frame(dataset)
     for root in ("phase", "poincare"):
         around.log(stream, root)
-    _state(stream, time, theta, velocity)
+    _state(stream, time, theta, velocity, units)
     _pendulum(stream, dataset, time, theta)
     _phase(stream, time, theta, velocity)
     _section(stream, dataset)
@@ -107,7 +114,7 @@ def _frame(dataset: xr.Dataset) -> frame.Frame:
     velocity = dataset["velocity"].values
     low, high = float(velocity.min()), float(velocity.max())
     pad = max(0.06 * (high - low), 0.05)
-    return frame.Frame((-math.pi, math.pi), (low - pad, high + pad))
+    return frame.Frame((-math.pi, math.pi), (low - pad, high + pad), Units.of(dataset.attrs))
 
 
 def _stroke(dataset: xr.Dataset) -> float:
@@ -120,11 +127,17 @@ def _at(time: Floats) -> rr.TimeColumn:
     return rr.TimeColumn(frame.TIMELINE, duration=time)
 
 
-def _state(stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Floats) -> None:
-    """Log angle, velocity and energy theta'^2 / 2 + 1 - cos theta, 0 at rest, 2 upside down."""
-    energy = 0.5 * velocity**2 + 1.0 - np.cos(theta)
+def _state(
+    stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Floats, units: Units
+) -> None:
+    """Log angle, velocity and energy theta'^2 / 2 + 1 - cos theta, 0 at rest, 2 upside down.
+
+    The energy is over m g l, in all units.
+    """
+    energy = 0.5 * units.bare(velocity, VELOCITY) ** 2 + 1.0 - np.cos(theta)
     for name, values in (("theta", theta), ("omega", velocity), ("energy", energy)):
-        text, colour = _STATE[name]
+        said, colour = _STATE[name]
+        text = said(units)
         path = f"state/{name}"
         stream.log(path, rr.SeriesLines(colors=[colour], names=[text], widths=[1.5]), static=True)
         stream.send_columns(path, [_at(time)], rr.Scalars.columns(scalars=values))
@@ -138,7 +151,8 @@ def _pendulum(stream: rr.RecordingStream, dataset: xr.Dataset, time: Floats, the
     """
     omega, phase = float(dataset.attrs["omega"]), float(dataset.attrs.get("phase", 0.0))
     stroke = math.copysign(_stroke(dataset), float(dataset.attrs["p"]))
-    height = -stroke * np.cos(omega * time + phase)
+    tau = Units.of(dataset.attrs).bare(time, TIME)
+    height = -stroke * np.cos(omega * tau + phase)
     pivot = np.stack([np.zeros_like(height), height], axis=1)
     bob = pivot + np.stack([np.sin(theta), -np.cos(theta)], axis=1)
     stream.log("pendulum/data", rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0])), static=True)
@@ -153,7 +167,7 @@ def _pendulum(stream: rr.RecordingStream, dataset: xr.Dataset, time: Floats, the
     _strips(stream, "pendulum/data/arm", time, arm, Look(ARM, 2.0))
     turns = omega or 1.0
     samples = (
-        2 * math.pi / turns / max(float(np.median(np.diff(time))), 1e-12) if time.size > 1 else 1
+        2 * math.pi / turns / max(float(np.median(np.diff(tau))), 1e-12) if time.size > 1 else 1
     )
     every = max(1, math.ceil(samples / TRAIL_POINTS))
     chosen = np.arange(0, time.size, max(1, -(-time.size // TRAILS)))

@@ -1,0 +1,82 @@
+"""The options that say which model: its parameters, a preset, a model file."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap.cli.types import NUMBER
+from pendmap.model import PRESETS, Pendulum, Rig, load_model
+from pendmap.model.quantities import check
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Command = Callable[..., Any]
+
+__all__ = ["model_from", "model_options"]
+
+_BARE = {
+    "gamma": "Viscous damping c/(m w0).",
+    "p": "Amplitude Y Omega^2/g of the drive.",
+    "omega": "Frequency Omega/w0 of the drive.",
+    "phase": "Phase of the drive at tau = 0, rad.",
+    "torque": "Constant torque over m l^2 w0^2.",
+    "theta_r": "Coulomb friction Tr/w0^2.",
+}
+_SI = {
+    "stroke_mm": "Amplitude Y of the pivot's motion, half of its way, mm; with a model in SI.",
+    "frequency_hz": "Frequency of the drive, Hz; with a model in SI.",
+}
+_SAME = {"stroke_mm": "p", "frequency_hz": "omega"}
+
+
+def model_options(function: Command) -> Command:
+    """Add the parameters of the pendulum, the presets and the model file."""
+    model = click.option(
+        "--model",
+        "model",
+        type=click.Path(path_type=Path),
+        metavar="FILE.toml",
+        help="Model file, without dimensions or in SI; options typed beside it override it. In SI"
+        " times are in s and velocities in rad/s.",
+    )
+    preset = click.option(
+        "--preset", type=click.Choice(sorted(PRESETS)), help="A point of the paper's figure 2."
+    )
+    function = model(preset(function))
+    for name, text in reversed((_BARE | _SI).items()):
+        default = getattr(Pendulum(), name, None)
+        function = click.option(
+            f"--{name.replace('_', '-')}",
+            type=NUMBER,
+            default=None,
+            help=text if default is None else f"{text}  [default: {default:g}]",
+        )(function)
+    return function
+
+
+def model_from(given: dict[str, Any]) -> Pendulum | Rig:
+    """Take the model's options out of ``given`` and make the model that they describe."""
+    model, preset = given.pop("model"), given.pop("preset")
+    typed = {name: given.pop(name) for name in (*_BARE, *_SI)}
+    typed = {name: value for name, value in typed.items() if value is not None}
+    if model is not None and preset is not None:
+        raise click.UsageError("--model and --preset: allowed is one of them")
+    for one, other in _SAME.items():
+        option = f"--{one.replace('_', '-')}"
+        if one in typed and other in typed:
+            raise click.UsageError(f"{option} and --{other}: allowed is one of them")
+        if one in typed and model is None:
+            raise click.UsageError(
+                f"{option}: allowed with --model of a file in SI; here --{other}"
+            )
+    for name in _SI:
+        if name in typed:
+            check(name, typed[name])
+    bare = {name: value for name, value in typed.items() if name in _BARE}
+    base = dataclasses.replace(PRESETS[preset] if preset else Pendulum(), **bare)
+    return base if model is None else load_model(model, typed)

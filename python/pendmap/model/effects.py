@@ -1,0 +1,176 @@
+"""Effects of the library, with values for their parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import functools
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from pendmap import checks
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from pendmap.model.units import Units
+
+__all__ = ["Effect", "definition", "library"]
+
+
+@functools.cache
+def library() -> dict[str, dict[str, Any]]:
+    """Return the library's effects by name: formula, group, parameters and the rest.
+
+    It is written in Rust; nothing about an effect is written here.
+    """
+    from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
+
+    return {entry["name"]: entry for entry in _core.effects()}
+
+
+def definition(name: object) -> dict[str, Any]:
+    """Return what the library says about an effect.
+
+    Raises
+    ------
+    InputError
+        If it has none of that name.
+    """
+    known = library()
+    if not isinstance(name, str) or name not in known:
+        near = difflib.get_close_matches(str(name), known, n=1)
+        hint = f"the nearest is {near[0]}, " if near else ""
+        raise InputError(
+            f"name is {checks.shown(name)}: allowed is an effect of the library; {hint}"
+            "pendmap effects lists all"
+        )
+    return known[name]
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """An effect of the library with values for its parameters.
+
+    In a :class:`pendmap.Pendulum` its parameters are without dimensions, in a
+    :class:`pendmap.Rig` in the SI units that the library states; each is the one without dimensions
+    times a power of ``w0`` that the library knows.
+
+    Parameters
+    ----------
+    name : str
+        One of the library (``pendmap effects``), like ``quadratic_drag``.
+    parameters : mapping of str to float
+        A value for each of its parameters.
+    ci95 : mapping of str to (float, float), optional
+        Where they were fitted, their intervals of 95 %.
+    probability : float, optional
+        Where it was diagnosed, the probability that its name is right.
+    approximate : bool, optional
+        Whether its form is only nearly right.
+
+    Raises
+    ------
+    InputError
+        If the library has no such effect, a parameter is missing, not known or not finite, or an
+        interval is none.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    ci95: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    probability: float | None = None
+    approximate: bool | None = None
+
+    def __post_init__(self) -> None:
+        names = [entry["name"] for entry in definition(self.name)["parameters"]]
+        given = _mapping(f"{self.name}: parameters", self.parameters, names)
+        missing = [name for name in names if name not in given]
+        if missing:
+            raise InputError(
+                f"{self.name}: {missing[0]} is missing: it needs {', '.join(self.described())}"
+            )
+        values = {name: checks.number(f"{self.name}: {name}", given[name]) for name in names}
+        object.__setattr__(self, "parameters", values)
+        given = _mapping(f"{self.name}: ci95", self.ci95, names)
+        bounds = {n: _interval(f"{self.name}: ci95 of {n}", given[n]) for n in names if n in given}
+        object.__setattr__(self, "ci95", bounds)
+        if self.probability is not None:
+            share = checks.number(f"{self.name}: probability", self.probability)
+            if not 0 <= share <= 1:
+                raise InputError(f"{self.name}: probability is {share:g}: allowed is 0 to 1")
+            object.__setattr__(self, "probability", share)
+        if self.approximate is not None:
+            checks.flag(f"{self.name}: approximate", self.approximate)
+
+    def __hash__(self) -> int:
+        return hash((self.name, *self.parameters.values()))
+
+    def described(self) -> list[str]:
+        """Return the names of its parameters with their SI units."""
+        entries = definition(self.name)["parameters"]
+        return [f"{entry['name']} ({entry['unit']})" for entry in entries]
+
+    @property
+    def values(self) -> list[float]:
+        """The parameters in the library's order."""
+        return list(self.parameters.values())
+
+    @property
+    def drives(self) -> bool:
+        """Whether it moves the pivot."""
+        return bool(definition(self.name)["group"] == "drive")
+
+    @property
+    def drifts(self) -> bool:
+        """Whether it changes with the time in the laboratory; maps hold that still."""
+        return bool(definition(self.name)["mappable"] == "frozen")
+
+    @property
+    def title(self) -> str:
+        """Name and parameters, short."""
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in self.parameters.items())
+        return f"{self.name} ({values})"
+
+    def given(self, units: Units) -> Effect:
+        """Return an effect without dimensions in ``units``."""
+        return self._scaled(units.given)
+
+    def bare(self, units: Units) -> Effect:
+        """Return an effect in ``units`` without dimensions."""
+        return self._scaled(units.bare)
+
+    def _scaled(self, scale: Any) -> Effect:  # noqa: ANN401 (a method of Units)
+        def power(entry: dict[str, Any]) -> float:
+            less = entry["power_of_w0_less"]
+            own: float = entry["power_of_w0"]
+            # The exponents have the power 0: they are the same in all units.
+            return own if less is None else own - self.parameters[less]
+
+        powers = {entry["name"]: power(entry) for entry in definition(self.name)["parameters"]}
+        return dataclasses.replace(
+            self,
+            parameters={n: scale(value, powers[n]) for n, value in self.parameters.items()},
+            ci95={n: (scale(a, powers[n]), scale(b, powers[n])) for n, (a, b) in self.ci95.items()},
+        )
+
+
+def _mapping(what: str, value: object, names: list[str]) -> Mapping[str, object]:
+    if not isinstance(value, Mapping):
+        raise InputError(
+            f"{what} is {checks.shown(value)}: allowed is a mapping of {', '.join(names)}"
+        )
+    unknown = [name for name in value if name not in names]
+    if unknown:
+        raise InputError(
+            f"{what}: {checks.shown(unknown[0])} is not known: allowed are {', '.join(names)}"
+        )
+    return value
+
+
+def _interval(what: str, value: object) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
+        raise InputError(f"{what} is {checks.shown(value)}: allowed is [low, high]")
+    low, high = (checks.number(what, bound) for bound in value)
+    if low > high:
+        raise InputError(f"{what} is [{low:g}, {high:g}]: allowed is [low, high], the lower first")
+    return low, high

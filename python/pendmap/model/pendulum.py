@@ -1,0 +1,223 @@
+"""The pendulum without dimensions: its parameters, effects and presets."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap import checks
+from pendmap.errors import InputError
+from pendmap.model.effects import Effect, definition
+from pendmap.model.units import NONDIMENSIONAL, Units
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+__all__ = ["PRESETS", "Kernel", "Pendulum", "checked_effects"]
+
+Kernel = tuple[float, float, float, float, float, float, float, list[tuple[str, list[float]]]]
+"""What the kernel takes: the six of eq. 1.2 and 2.1, time in the laboratory, effects."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Pendulum:
+    """The parametrically excited pendulum, without dimensions.
+
+    ``th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque - theta_r sign(th')`` with
+    ``tau = w0 t``, ``w0 = sqrt(g / l)``; ``th = 0`` hangs down. At rest it stays there while the
+    load, ``torque`` less the term with ``sin th``, is no greater than ``theta_r``.
+
+    ``effects`` of the library add further terms.
+
+    Any real number will do for a parameter, numpy's too; a float is kept.
+
+    Parameters
+    ----------
+    gamma : float
+        Viscous damping ``c / (m w0)``, twice the damping ratio; 0 or more.
+    p : float
+        Amplitude ``Y Omega**2 / g`` of the pivot's vertical acceleration.
+    omega : float
+        Drive frequency ``Omega / w0``; above 0.
+    phase : float
+        Phase of the drive at ``tau = 0``, rad.
+    torque : float
+        Constant torque over ``m l**2 w0**2``.
+    theta_r : float
+        Coulomb friction ``Tr / w0**2``; 0 or more.
+    lab_time : float
+        Time in the laboratory at ``tau = 0``, times ``w0``, for effects that drift.
+    effects : sequence of Effect
+        Whatever else acts, parameters without dimensions; kept as a tuple.
+    notes : mapping
+        ``covariance`` and ``provenance`` of the model file that it comes from; they are written
+        back unchanged, and no part of what is compared.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or outside its range, an effect is there twice, or one is given
+        that has a parameter of its own here: ``viscous_damping`` beside ``gamma``,
+        ``coulomb_friction`` beside ``theta_r``, ``bias_torque`` beside ``torque``.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eqs. 1.2 and 2.1.
+    """
+
+    gamma: float = 0.1
+    p: float = 1.0
+    omega: float = 2.0
+    phase: float = 0.0
+    torque: float = 0.0
+    theta_r: float = 0.0
+    lab_time: float = 0.0
+    effects: tuple[Effect, ...] = ()
+    notes: Mapping[str, Any] = dataclasses.field(
+        default_factory=dict, repr=False, compare=False, kw_only=True
+    )
+
+    def __post_init__(self) -> None:
+        for name in self.numbers():
+            object.__setattr__(self, name, checks.number(name, getattr(self, name)))
+        for name in ("gamma", "theta_r"):
+            if getattr(self, name) < 0:
+                raise InputError(f"{name} is {getattr(self, name):g}: allowed is 0 or more")
+        if self.omega <= 0:
+            raise InputError(f"omega is {self.omega:g}: allowed is a number above 0")
+        own = {name: (name, getattr(self, name)) for name in self.numbers()}
+        object.__setattr__(self, "effects", checked_effects(self.effects, own))
+        if self.effects:
+            _ = self.period  # the core refuses what is there twice, or outside its range
+
+    @classmethod
+    def numbers(cls) -> tuple[str, ...]:
+        """Return the names of the parameters that are numbers."""
+        return tuple(f.name for f in dataclasses.fields(cls) if f.type == "float")
+
+    @property
+    def units(self) -> Units:
+        """What results are counted in."""
+        return NONDIMENSIONAL
+
+    @property
+    def zeta(self) -> float:
+        """The damping ratio ``gamma / 2``; the paper's section 2 writes gamma for it."""
+        return self.gamma / 2
+
+    @property
+    def period(self) -> float:
+        """The unit of "periods": ``2 pi / omega``, or ``2 pi`` without drive.
+
+        Effects may change the drive's frequency, or drive where ``p`` is 0.
+        """
+        if not self.effects:
+            return math.tau if self.p == 0 else math.tau / self.omega
+        from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
+
+        try:
+            return _core.period(self.parameters)
+        except ValueError as error:
+            raise InputError(str(error)) from None
+
+    @property
+    def parameters(self) -> Kernel:
+        """All that the kernel takes."""
+        own = (self.gamma, self.p, self.omega, self.phase, self.torque, self.theta_r)
+        return (*own, self.lab_time, [(effect.name, effect.values) for effect in self.effects])
+
+    @property
+    def attributes(self) -> dict[str, float | str]:
+        """The parameters as a dataset's attributes; effects as JSON."""
+        numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
+        return {"units": self.units.name} | numbers | {"effects": effects_json(self.effects)}
+
+    @property
+    def title(self) -> str:
+        """The parameters in one line, zeros left out."""
+        shown = [("\N{GREEK SMALL LETTER GAMMA}", self.gamma), ("p", self.p)]
+        if self.p != 0:
+            shown.append(("\N{GREEK SMALL LETTER OMEGA}", self.omega))
+        others = (
+            ("\N{GREEK SMALL LETTER PHI}", self.phase),
+            ("torque", self.torque),
+            ("\N{GREEK SMALL LETTER THETA}r", self.theta_r),
+            ("lab time", self.lab_time),
+        )
+        shown += [(name, value) for name, value in others if value != 0]
+        parts = [f"{name} = {value:g}" for name, value in shown]
+        return ", ".join([*parts, *(effect.title for effect in self.effects)])
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:
+        """Read a model file without dimensions; see :func:`pendmap.load_model`.
+
+        A key that the file leaves out is 0 (``omega``: 1, which has no effect without ``p``).
+
+        Raises
+        ------
+        InputError
+            If it is no model file, or one in SI.
+        OSError
+            If it cannot be read.
+        """
+        from pendmap.model.files import load_model  # noqa: PLC0415 (files are made of models)
+
+        model = load_model(path)
+        if not isinstance(model, cls):
+            raise InputError(
+                f"{path}: is in SI: Rig.from_toml reads it, and its property pendulum has no "
+                "dimensions"
+            )
+        return model
+
+
+def checked_effects(
+    effects: object, own: Mapping[str, tuple[str, float]], what: str = "effects"
+) -> tuple[Effect, ...]:
+    """Return effects as a tuple.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        As given.
+    own : mapping
+        For each parameter of a :class:`Pendulum` what the model calls it, and its value there.
+    what : str
+        What they are, for messages.
+
+    Raises
+    ------
+    InputError
+        If one is no effect, or says what a parameter says already.
+    """
+    if not isinstance(effects, list | tuple):
+        raise InputError(f"{what} is {checks.shown(effects)}: allowed is a tuple of Effect")
+    for effect in effects:
+        checks.of_type(what, effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
+        # The library names the only parameter of such an effect as the paper names it.
+        names = [entry["name"] for entry in definition(effect.name)["parameters"]]
+        if len(names) == 1 and names[0] in own:
+            called, value = own[names[0]]
+            if value != 0:
+                raise InputError(
+                    f"{called} is {value:g} beside the effect {effect.name}: they are the same, "
+                    f"allowed is one of them (the other one left out, or {called} = 0)"
+                )
+    return tuple(effects)
+
+
+def effects_json(effects: tuple[Effect, ...]) -> str:
+    """Return effects as a list of names and parameters, in JSON."""
+    return json.dumps([{"name": e.name, "parameters": dict(e.parameters)} for e in effects])
+
+
+PRESETS: Final = {
+    "fig2a": Pendulum(gamma=0.1, p=1.03, omega=0.87),
+    "fig2b": Pendulum(gamma=0.1, p=1.7, omega=0.87),
+    "fig2c": Pendulum(gamma=0.1, p=1.5, omega=1.8),
+}
+"""The three points of tumbling chaos in figure 2 of Horton, Wiercigroch & Xu (2008)."""

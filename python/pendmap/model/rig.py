@@ -1,0 +1,287 @@
+"""The rig: the same pendulum in SI, and the conversion between the two."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap import checks
+from pendmap.errors import InputError
+from pendmap.model import quantities
+from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
+from pendmap.model.units import Units
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from pendmap.model.effects import Effect
+
+__all__ = ["COUNTERPARTS", "Rig", "without_dimensions"]
+
+COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
+    "gamma": ("c_over_m", 1),
+    "p": ("p", 0),
+    "omega": ("Omega", 1),
+    "phase": ("phi", 0),
+    "torque": ("torque", 2),
+    "theta_r": ("Tr", 2),
+    "lab_time": ("lab_time_s", -1),
+}
+"""For each parameter of a :class:`Pendulum` its name in a :class:`Rig`, and the power of ``w0``
+that makes the one the other."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rig:
+    """The parametrically excited pendulum in SI.
+
+    ``th'' + c_over_m th' + w0**2 (1 + p cos(Omega t + phi)) sin th = torque - Tr sign(th')``
+    with further terms by ``effects``. :attr:`pendulum` is the same without dimensions, with
+    ``tau = w0 t``: ``gamma = c_over_m / w0``, ``omega = Omega / w0``, ``theta_r = Tr / w0**2``.
+    :meth:`of` takes length, damping ratio, stroke and hertz instead.
+
+    Parameters
+    ----------
+    w0 : float
+        Natural frequency ``sqrt(g / l)`` of small swings, rad/s; above 0.
+    c_over_m : float
+        Viscous damping ``c / m = 2 zeta w0``, 1/s; 0 or more.
+    Tr : float
+        Coulomb friction over the moment of inertia, rad/s^2; 0 or more.
+    torque : float
+        Constant torque over the moment of inertia, rad/s^2.
+    p : float
+        Amplitude ``Y Omega**2 / g`` of the pivot's vertical acceleration over gravity, where ``Y``
+        is the amplitude of its motion: half the way from its lowest to its highest point.
+    Omega : float
+        Angular frequency of the drive, rad/s; above 0, or 0 where ``p`` is 0.
+    phi : float
+        Phase of the drive at ``t = 0``, rad.
+    lab_time_s : float
+        Time in the laboratory at ``t = 0``, s, for effects that drift.
+    gravity : float
+        Acceleration of gravity, m/s^2; above 0. It matters for stroke and length alone.
+    effects : sequence of Effect
+        Whatever else acts, parameters in SI; kept as a tuple.
+    notes : mapping
+        As of :class:`Pendulum`.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or outside its range, ``p`` has no frequency, an effect is there
+        twice, or one is given that has a parameter of its own here.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eqs. 1.1 and 2.1.
+    """
+
+    w0: float
+    c_over_m: float = 0.0
+    Tr: float = 0.0
+    torque: float = 0.0
+    p: float = 0.0
+    Omega: float = 0.0
+    phi: float = 0.0
+    lab_time_s: float = 0.0
+    gravity: float = quantities.GRAVITY
+    effects: tuple[Effect, ...] = ()
+    notes: Mapping[str, Any] = dataclasses.field(
+        default_factory=dict, repr=False, compare=False, kw_only=True
+    )
+
+    def __post_init__(self) -> None:
+        for name in self.numbers():
+            value = getattr(self, name)
+            idle = name == "Omega" and value == 0
+            number = checks.number(name, value) if idle else quantities.check(name, value)
+            object.__setattr__(self, name, number)
+        own = {bare: (si, getattr(self, si)) for bare, (si, _) in COUNTERPARTS.items()}
+        object.__setattr__(self, "effects", checked_effects(self.effects, own))
+        if self.Omega == 0 and (self.p != 0 or any(effect.drives for effect in self.effects)):
+            raise InputError("Omega is 0: allowed is a number above 0 where something is driven")
+        try:
+            _ = self.pendulum
+        except InputError as error:
+            raise InputError(f"{error} (without dimensions, w0 is {self.w0:g})") from None
+        except ArithmeticError:
+            raise InputError(
+                f"effects have powers of w0 = {self.w0:g} that are no numbers: allowed are smaller "
+                "exponents"
+            ) from None
+
+    @classmethod
+    def numbers(cls) -> tuple[str, ...]:
+        """Return the names of the parameters that are numbers."""
+        return tuple(f.name for f in dataclasses.fields(cls) if f.type == "float")
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        effects: tuple[Effect, ...] = (),
+        notes: Mapping[str, Any] | None = None,
+        **given: float,
+    ) -> Rig:
+        """Return the rig that these quantities describe.
+
+        Parameters
+        ----------
+        effects, notes
+            As for :class:`Rig`.
+        **given : float
+            ``w0`` or ``length_m`` (equivalent length ``g / w0**2``); ``c_over_m`` or ``zeta`` (the
+            damping ratio ``c_over_m / (2 w0)``, which the paper's section 2 calls gamma); ``Omega``
+            or ``frequency_hz``; ``p``, ``Y`` (amplitude of the pivot's motion, m) or ``stroke_mm``
+            (the same in mm); ``Tr``, ``torque``, ``phi``, ``lab_time_s``, ``gravity``.
+
+        Raises
+        ------
+        InputError
+            If one is not known or outside its range, or two contradict: ``p`` and ``Omega`` a
+            stroke, ``zeta`` a ``c_over_m``.
+
+        Examples
+        --------
+        >>> rig = Rig.of(length_m=0.25, zeta=0.01, stroke_mm=20, frequency_hz=1.9)
+        >>> round(rig.w0, 4), round(rig.p, 4), round(rig.pendulum.gamma, 4)
+        (6.2642, 0.2906, 0.02)
+        """
+        allowed = [*(name for ways in quantities.GROUPS.values() for name in ways)]
+        allowed += quantities.OPTIONAL
+        unknown = [name for name in given if name not in allowed]
+        if unknown:
+            raise InputError(f"{unknown[0]} is not known: allowed are {', '.join(allowed)}")
+        return cls(**quantities.resolve(given), effects=effects, notes=notes or {})
+
+    @classmethod
+    def from_pendulum(
+        cls, pendulum: Pendulum, w0: float, *, gravity: float = quantities.GRAVITY
+    ) -> Rig:
+        """Return a pendulum without dimensions in SI.
+
+        Of its notes the provenance is kept; a covariance was one of other numbers.
+
+        Parameters
+        ----------
+        pendulum : Pendulum
+            Without dimensions.
+        w0 : float
+            Natural frequency, rad/s; above 0.
+        gravity : float
+            As of :class:`Rig`.
+        """
+        checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+        units = Units(quantities.check("w0", w0), si=True)
+        numbers = {
+            si: units.given(getattr(pendulum, bare), power)
+            for bare, (si, power) in COUNTERPARTS.items()
+        }
+        effects = tuple(effect.given(units) for effect in pendulum.effects)
+        notes = _kept(pendulum.notes)
+        return cls(w0=units.w0, gravity=gravity, effects=effects, notes=notes, **numbers)
+
+    @property
+    def units(self) -> Units:
+        """What results are counted in."""
+        return Units(self.w0, si=True)
+
+    @property
+    def pendulum(self) -> Pendulum:
+        """The same without dimensions; ``omega`` is 1 where nothing is driven."""
+        units = self.units
+        numbers = {
+            bare: units.bare(getattr(self, si), power) for bare, (si, power) in COUNTERPARTS.items()
+        }
+        numbers["omega"] = numbers["omega"] or 1.0
+        effects = tuple(effect.bare(units) for effect in self.effects)
+        return Pendulum(**numbers, effects=effects, notes=_kept(self.notes))
+
+    @property
+    def zeta(self) -> float:
+        """The damping ratio ``c_over_m / (2 w0)``, half of :attr:`Pendulum.gamma`."""
+        return self.c_over_m / (2 * self.w0)
+
+    @property
+    def length_m(self) -> float:
+        """The equivalent length ``gravity / w0**2``, m."""
+        return self.gravity / self.w0**2
+
+    @property
+    def stroke_m(self) -> float:
+        """The amplitude ``Y = p gravity / Omega**2`` of the pivot's motion, m."""
+        return self.p * self.gravity / self.Omega**2 if self.p else 0.0
+
+    @property
+    def period(self) -> float:
+        """The unit of "periods", s: ``2 pi / Omega``, or ``2 pi / w0`` without drive."""
+        return float(self.units.given(self.pendulum.period, -1))
+
+    @property
+    def attributes(self) -> dict[str, float | str]:
+        """The parameters as a dataset's attributes, in SI; effects as JSON.
+
+        ``gamma``, ``omega``, ``phase`` and ``theta_r``, which have no dimensions whatever the
+        units, stand there too.
+        """
+        numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
+        pendulum = self.pendulum
+        bare = {n: getattr(pendulum, n) for n in ("gamma", "omega", "phase", "theta_r")}
+        return {"units": self.units.name} | numbers | bare | {"effects": effects_json(self.effects)}
+
+    @property
+    def title(self) -> str:
+        """The parameters in one line, zeros left out."""
+        shown = [f"w0 = {self.w0:g} rad/s", f"c/m = {self.c_over_m:g} 1/s", f"p = {self.p:g}"]
+        if self.Omega != 0:
+            shown.append(f"\N{GREEK CAPITAL LETTER OMEGA} = {self.Omega:g} rad/s")
+        others = (
+            (f"\N{GREEK SMALL LETTER PHI} = {self.phi:g}", self.phi),
+            (f"torque = {self.torque:g} rad/s\N{SUPERSCRIPT TWO}", self.torque),
+            (f"Tr = {self.Tr:g} rad/s\N{SUPERSCRIPT TWO}", self.Tr),
+            (f"lab time = {self.lab_time_s:g} s", self.lab_time_s),
+        )
+        shown += [text for text, value in others if value != 0]
+        return ", ".join([*shown, *(effect.title for effect in self.effects)])
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Rig:
+        """Read a model file in SI; see :func:`pendmap.load_model`.
+
+        Raises
+        ------
+        InputError
+            If it is no model file, or one without dimensions.
+        OSError
+            If it cannot be read.
+        """
+        from pendmap.model.files import load_model  # noqa: PLC0415 (files are made of models)
+
+        model = load_model(path)
+        if not isinstance(model, cls):
+            raise InputError(
+                f"{path}: has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum "
+                "puts it in SI with its w0"
+            )
+        return model
+
+
+def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:
+    """Return a model as the kernel takes it, and the units that its results are wanted in.
+
+    Raises
+    ------
+    InputError
+        If it is no model.
+    """
+    if isinstance(model, Rig):
+        return model.pendulum, model.units
+    checks.of_type("pendulum", model, Pendulum, "Pendulum(p=0.6)")
+    return model, model.units
+
+
+def _kept(notes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of a file's notes holds in other units too."""
+    return {name: table for name, table in notes.items() if name != "covariance"}

@@ -1,0 +1,464 @@
+"""Model files: they read back as what was written, and say on one line what is wrong with them."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import math
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import pendmap
+from pendmap import Effect, InputError, Pendulum, Rig, load_model, save_model
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+EXAMPLE = """\
+format_version = 1
+
+[pendulum]
+w0 = 6.2
+c_over_m = 0.05
+Tr = 0.08
+stroke_mm = 20      # half of the pivot's way
+frequency_hz = 1.9
+phi = 0.3
+lab_time_s = 150.0
+
+[[effect]]
+name = "quadratic_drag"
+parameters = { q = 0.012 }
+ci95 = { q = [0.011, 0.013] }
+probability = 0.97
+approximate = false
+
+[[effect]]
+name = "bearing_harmonic"
+[effect.parameters]
+n = 4
+amplitude = 0.6
+psi = 0.1
+
+[covariance]
+names = ["w0", "c_over_m"]
+matrix = [[1e-8, 0.0], [0.0, 2e-8]]
+
+[provenance]
+command = "pendmap identify lab"
+made = 2024-05-01T12:00:00Z
+records = [{ file = "run_00.csv", sha256 = "00ff" }]
+"""
+
+
+def written(folder: Path, text: str | bytes) -> Path:
+    """A file with this text."""
+    path = folder / "model.toml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_everything_in_a_file_in_si(tmp_path: Path) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    assert isinstance(rig, Rig)
+    assert (rig.w0, rig.c_over_m, rig.Tr, rig.phi, rig.lab_time_s) == (6.2, 0.05, 0.08, 0.3, 150)
+    assert rig.Omega == pytest.approx(2 * math.pi * 1.9, rel=1e-15)
+    assert rig.p == pytest.approx(0.02 * rig.Omega**2 / 9.81, rel=1e-15)
+    drag, harmonic = rig.effects
+    assert drag == Effect("quadratic_drag", {"q": 0.012}, {"q": (0.011, 0.013)}, 0.97, False)  # noqa: FBT003
+    assert harmonic.values == [0.6, 4.0, 0.1]
+    assert harmonic.ci95 == {}
+    assert Rig.from_toml(tmp_path / "model.toml") == rig
+
+
+def test_what_was_fitted_is_written_back_unchanged(tmp_path: Path) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    path = save_model(rig, tmp_path / "again.toml")
+    assert load_model(path) == rig
+    before, after = (tomllib.loads(text) for text in (EXAMPLE, path.read_text(encoding="utf-8")))
+    for table in ("covariance", "provenance"):
+        assert after[table] == before[table]
+    assert after["provenance"]["made"] == dt.datetime(2024, 5, 1, 12, tzinfo=dt.UTC)
+    assert after["effect"][0] == before["effect"][0]
+    assert after["format_version"] == 1
+    # Once more gives the same bytes.
+    assert save_model(load_model(path), tmp_path / "third.toml").read_bytes() == path.read_bytes()
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+small = st.floats(-1e6, 1e6)
+notes = st.dictionaries(
+    st.sampled_from(["covariance", "provenance"]),
+    st.dictionaries(st.text(st.characters(codec="utf-8")), finite | st.text() | st.booleans()),
+)
+
+
+@st.composite
+def effects(draw: st.DrawFn) -> tuple[Effect, ...]:
+    q, width = draw(small), draw(st.floats(0, 10))
+    drag = Effect(
+        "quadratic_drag",
+        {"q": q},
+        ci95=draw(st.sampled_from([{}, {"q": (q - width, q + width)}])),
+        probability=draw(st.none() | st.floats(0, 1)),
+        approximate=draw(st.none() | st.booleans()),
+    )
+    n = draw(st.floats(0, 1000))
+    bump = Effect("bearing_harmonic", {"amplitude": draw(small), "n": n, "psi": draw(small)})
+    return tuple(draw(st.lists(st.sampled_from([drag, bump]), unique=True)))
+
+
+@given(
+    numbers=st.fixed_dictionaries(
+        {"gamma": st.floats(0, 1e300), "theta_r": st.floats(0, 1e300)}
+        | dict.fromkeys(("p", "phase", "torque", "lab_time"), finite)
+        | {"omega": st.floats(5e-324, 1e300)}
+    ),
+    acting=effects(),
+    notes=notes,
+)
+@settings(
+    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_a_pendulum_reads_back_as_it_was_written(
+    tmp_path: Path, numbers: dict[str, float], acting: tuple[Effect, ...], notes: dict[str, Any]
+) -> None:
+    model = Pendulum(**numbers, effects=acting, notes=notes)
+    back = load_model(save_model(model, tmp_path / "model.toml"))
+    assert back == model
+    assert back.notes == notes
+    assert Pendulum.from_toml(tmp_path / "model.toml") == model
+
+
+@given(
+    numbers=st.fixed_dictionaries(
+        {name: st.floats(0, 1e6) for name in ("c_over_m", "Tr")}
+        | dict.fromkeys(("p", "phi", "torque", "lab_time_s"), small)
+        | {"w0": st.floats(1e-3, 1e3), "Omega": st.floats(1e-3, 1e6), "gravity": st.floats(1, 30)}
+    ),
+    acting=effects(),
+    notes=notes,
+)
+@settings(
+    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_a_rig_reads_back_as_it_was_written(
+    tmp_path: Path, numbers: dict[str, float], acting: tuple[Effect, ...], notes: dict[str, Any]
+) -> None:
+    model = Rig(**numbers, effects=acting, notes=notes)
+    back = load_model(save_model(model, tmp_path / "model.toml"))
+    assert back == model
+    assert back.notes == notes
+
+
+def test_a_rig_without_drive_reads_back(tmp_path: Path) -> None:
+    assert load_model(save_model(Rig(w0=6.2), tmp_path / "model.toml")) == Rig(w0=6.2)
+
+
+def test_a_file_in_si_and_one_without_dimensions_mean_the_same(tmp_path: Path) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    assert isinstance(rig, Rig)
+    bare = load_model(save_model(rig.pendulum, tmp_path / "bare.toml"))
+    assert bare == rig.pendulum
+    assert bare.effects[1].values == pytest.approx([0.6 / 6.2**2, 4, 0.1], rel=1e-15)
+    assert "covariance" not in bare.notes
+
+
+@pytest.mark.parametrize(
+    ("text", "gamma"), [("gamma = 0.2", 0.2), ("zeta = 0.1", 0.2), ("zeta = 0.1\ngamma = 0.2", 0.2)]
+)
+def test_without_dimensions_zeta_is_half_of_gamma(tmp_path: Path, text: str, gamma: float) -> None:
+    assert Pendulum.from_toml(written(tmp_path, f"[pendulum]\n{text}\n")).gamma == gamma
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"\xef\xbb\xbf[pendulum]\ngamma = 0.2\n",
+        b"[pendulum]\r\ngamma = 0.2\r\n",
+        b"pendulum = { gamma = 0.2 }",
+        b"[pendulum]\ngamma = 0.2\n[provenance]\n",
+    ],
+    ids=["with a mark", "of Windows", "inline", "empty table"],
+)
+def test_odd_files_that_are_right(tmp_path: Path, text: bytes) -> None:
+    assert load_model(written(tmp_path, text)) == Pendulum(gamma=0.2, p=0, omega=1)
+
+
+ALLOWED = "allowed are gamma, p, omega, phase, torque, theta_r, lab_time, zeta, or in SI w0, length"
+VISCOUS = '[[effect]]\nname = "viscous_damping"\nparameters = { gamma = 0.2 }\n'
+COULOMB = '[[effect]]\nname = "coulomb_friction"\nparameters = { theta_r = 0.2 }\n'
+EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "has no table [pendulum]"),
+        ("pendulum = 3", "has no table [pendulum]"),
+        ("[[pendulum]]\n", "has no table [pendulum]"),
+        ("gamma: 0.1", "not a TOML file: "),
+        ("\x00", "not a TOML file: "),
+        (b"\xff\xfe[\x00", "not a TOML file: "),
+        (b"x = " + b"[" * 100_000, "not a TOML file: "),
+        ("[pendulum]\ngamma = 1\ngamma = 2\n", "not a TOML file: "),
+        ("[pendulum]\ngamma = 0.1\n[rig]\nw0 = 6\n", "[rig] is not known: allowed are [pendulum]"),
+        ("gamma = 1\n[pendulum]\n", "gamma is not known: allowed are [pendulum], [[effect]]"),
+        ("format_version = 2\n[pendulum]\n", "format_version is 2: allowed is a whole number"),
+        ("covariance = 1\n[pendulum]\n", "covariance is 1: allowed is a table [covariance]"),
+        # keys
+        (
+            "[pendulum]\nc_over_n = 1\nw0 = 6\n",
+            "c_over_n is not known: allowed is c_over_m, in 1/s",
+        ),
+        ("[pendulum]\nlength_cm = 25\n", "length_cm is not known: allowed is length_m, in m"),
+        ("[pendulum]\nlength = 0.25\n", "length is not known: allowed is length_m, in m"),
+        ("[pendulum]\nstroke = 20\n", "stroke is not known: allowed is stroke_mm, in mm"),
+        ("[pendulum]\nfrequency_rpm = 9\n", "allowed is frequency_hz, in Hz"),
+        ("[pendulum]\nw0_hz = 1\n", "w0_hz is not known: allowed is w0, in rad/s"),
+        ("[pendulum]\nTr_Nm = 1\n", "Tr_Nm is not known: allowed is Tr, in rad/s^2"),
+        ("[pendulum]\nlab_time_h = 1\n", "allowed is lab_time_s, in s"),
+        ("[pendulum]\ngama = 1\n", f"gama is not known: allowed is perhaps gamma: {ALLOWED[8:]}"),
+        ("[pendulum]\nxyzzy = 1\n", f"xyzzy is not known: {ALLOWED}"),
+        ('[pendulum]\n"a\\nb" = 1\n', r"'a\nb' is not known"),
+        # both kinds
+        (
+            "[pendulum]\nw0 = 6\ngamma = 0.1\n",
+            "gamma has no dimensions and w0 is in SI: allowed is one kind; gamma is c_over_m in",
+        ),
+        ("[pendulum]\nw0 = 6\nomega = 2\n", "omega is Omega in SI"),
+        ("[pendulum]\nw0 = 6\nlab_time = 2\n", "lab_time is lab_time_s in SI"),
+        ("[pendulum]\nTr = 1\ntheta_r = 2\n", "theta_r is Tr in SI"),
+        # numbers
+        ("[pendulum]\ngamma = 'x'\n", "gamma is 'x': allowed is a number"),
+        ("[pendulum]\ngamma = '0.1'\n", "gamma is '0.1': allowed is a number"),
+        ("[pendulum]\ngamma = nan\n", "gamma is nan: allowed is any finite number"),
+        ("[pendulum]\np = -inf\nomega = 1\n", "p is -inf: allowed is any finite number"),
+        ("[pendulum]\ngamma = [0.1]\n", "gamma is [0.1]: allowed is a number"),
+        ("[pendulum]\ngamma = true\n", "gamma is True: allowed is a number"),
+        ("[pendulum]\ngamma = { value = 1 }\n", "allowed is a number"),
+        (
+            "[pendulum]\ngamma = 2024-05-01\n",
+            "gamma is datetime.date(2024, 5, 1): allowed is a num",
+        ),
+        ("[pendulum]\ngamma = -1\n", "gamma is -1: allowed is 0 or more"),
+        ("[pendulum]\nomega = 0\n", "omega is 0: allowed is a number above 0"),
+        ("[pendulum]\np = 1\n", "p without omega: a drive needs a frequency above 0"),
+        ("[pendulum]\np = 'x'\n", "p is 'x': allowed is a number"),
+        ("[pendulum]\nw0 = '6.2 rad/s'\n", "w0 is '6.2 rad/s': allowed is a number"),
+        ("[pendulum]\nw0 = nan\n", "w0 is nan: allowed is any finite number"),
+        ("[pendulum]\nw0 = 6\nTr = inf\n", "Tr is inf: allowed is any finite number"),
+        ("[pendulum]\nw0 = 6\nY = [1]\n", "Y is [1]: allowed is a number"),
+        ("[pendulum]\nc_over_m = 1\n", "w0 is missing: a model in SI needs w0 in rad/s, or length"),
+        ("[pendulum]\nzeta = '1'\n", "zeta is '1': allowed is a number"),
+        # what contradicts
+        (
+            "[pendulum]\ngamma = 0.1\nzeta = 0.1\n",
+            "gamma is 0.1, but 0.2 by 2 zeta of zeta = 0.1: they contradict, allowed is one",
+        ),
+        (
+            "[pendulum]\nw0 = 6\nc_over_m = 0.6\nzeta = 0.1\n",
+            "c_over_m is 0.6, but 1.2 by 2 zeta w0 of zeta = 0.1: they contradict",
+        ),
+        (
+            "[pendulum]\nw0 = 6\np = 0.5\nOmega = 12\nY = 0.02\n",
+            "p is 0.5, but 0.293578 by Y Omega^2/g of Y = 0.02, Omega = 12 and gravity = 9.81: ",
+        ),
+        # effects
+        ("[pendulum]\n[effect]\n", "effect is {}: allowed is [[effect]], one table each"),
+        ("effect = [1]\n[pendulum]\n", "[[effect]] 1: 1: allowed is a table"),
+        ("[pendulum]\n[[effect]]\n", '[[effect]] 1: name is missing: allowed is like name = "quad'),
+        (EFFECT, "[[effect]] 1: parameters is missing: allowed is like parameters = { q = 0.01 }"),
+        (EFFECT + "q = 0.1\n", "[[effect]] 1: q is not known: allowed are name, parameters, ci95"),
+        (EFFECT + "parameters = 1\n", "quadratic_drag: parameters is 1: allowed is a mapping of q"),
+        (EFFECT + "parameters = {}\n", "quadratic_drag: q is missing: it needs q (1/rad)"),
+        (EFFECT + "parameters = { q = nan }\n", "quadratic_drag: q is nan: allowed is any finite"),
+        (EFFECT + "parameters = { k = 1 }\n", "parameters: 'k' is not known: allowed are q"),
+        (EFFECT + "parameters = { q = 1 }\nci95 = { q = 1 }\n", "ci95 of q is 1: allowed is [low"),
+        (
+            EFFECT + "parameters = { q = 1 }\n" + EFFECT[11:] + "parameters = { q = 2 }\n",
+            "quadratic_drag and quadratic_drag: allowed is one of them",
+        ),
+        (
+            '[pendulum]\n[[effect]]\nname = "magnetism"\nparameters = {}\n',
+            "[[effect]] 1: name is 'magnetism': allowed is an effect of the library",
+        ),
+        (
+            "[pendulum]\ngamma = 0.1\n" + VISCOUS,
+            "gamma is 0.1 beside the effect viscous_damping: they are the same, allowed is one",
+        ),
+        (
+            "[pendulum]\nw0 = 6\nTr = 0.1\n" + COULOMB,
+            "Tr is 0.1 beside the effect coulomb_friction: they are the same, allowed is one",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_on_one_line(
+    tmp_path: Path, text: str | bytes, complaint: str
+) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(InputError) as error:
+        load_model(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert complaint in str(error.value)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+def test_each_kind_reads_its_own(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"is in SI: Rig\.from_toml reads it"):
+        Pendulum.from_toml(written(tmp_path, EXAMPLE))
+    with pytest.raises(InputError, match=r"has no dimensions: Pendulum\.from_toml reads it"):
+        Rig.from_toml(written(tmp_path, "[pendulum]\ngamma = 0.1\n"))
+    with pytest.raises(FileNotFoundError):
+        load_model(tmp_path / "absent.toml")
+    with pytest.raises(IsADirectoryError):
+        load_model(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("notes", "complaint"),
+    [
+        ({"rig": {}}, "'rig' is not known: allowed are covariance, provenance"),
+        ({"covariance": [1]}, r"covariance is \[1\]: allowed is a table"),
+        ({"covariance": {"a": None}}, "NoneType"),
+        ({"covariance": {"a": 1j}}, "complex"),
+        ([1], r"notes is \[1\]: allowed is a mapping"),
+    ],
+)
+def test_notes_that_are_no_tables_are_not_written(
+    tmp_path: Path,
+    notes: Any,  # noqa: ANN401
+    complaint: str,
+) -> None:
+    with pytest.raises(InputError, match=complaint):
+        save_model(Pendulum(notes=notes), tmp_path / "model.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_only_models_are_written_and_only_as_toml(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="model is 3: allowed is a Pendulum"):
+        save_model(3, tmp_path / "model.toml")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"suffix '\.json', allowed are \.toml"):
+        save_model(Pendulum(), tmp_path / "model.json")
+    with pytest.raises(FileNotFoundError):
+        save_model(Pendulum(), tmp_path / "no" / "model.toml")
+
+
+# The command line
+
+
+def test_the_command_takes_and_returns_si(tmp_path: Path, pendmap_command: Run) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    end = pendmap.simulate(rig, 1.2, 2.0, 12.5)
+    run = pendmap_command(
+        *("simulate", "--model", "model.toml", "--theta", 1.2, "--velocity", 2),
+        *("--until", 12.5, "--json", "--out", "run.nc"),
+    )
+    assert run.returncode == 0, run.stderr
+    got = json.loads(run.stdout)
+    assert got["units"] == "SI"
+    assert got["t"] == 12.5
+    assert got["theta"] == float(end.theta[-1])
+    assert got["velocity"] == float(end.velocity[-1])
+    stored = pendmap.load(tmp_path / "run.nc")
+    assert stored.velocity.attrs["units"] == "rad/s"
+    assert float(stored.time[-1]) == pytest.approx(12.5)
+
+
+def test_maps_from_the_command_are_in_rad_per_second(tmp_path: Path, pendmap_command: Run) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    assert isinstance(rig, Rig)
+    run = pendmap_command(
+        "basins", "--model", "model.toml", "--grid", 10, "--json", "--out", "m.nc"
+    )
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["units"] == "SI"
+    stored = pendmap.load(tmp_path / "m.nc")
+    assert stored.velocity.attrs["high"] == pytest.approx(3 * 6.2)
+    window = ("--theta=-1:1:5", "--velocity=-2:2:5")
+    run = pendmap_command("basins", "--model", "model.toml", *window, "--json", "--out", "m.nc")
+    assert run.returncode == 0, run.stderr
+    assert pendmap.load(tmp_path / "m.nc").velocity.attrs["high"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("words", "numbers"),
+    [
+        ((), {}),
+        (("--gamma", 0.1), {"c_over_m": 0.62}),
+        (("--theta-r", 0.01), {"Tr": 0.01 * 6.2**2}),
+        (("--torque", 0.01), {"torque": 0.01 * 6.2**2}),
+        (("--phase", 1), {"phi": 1.0}),
+        (("--p", 0.5), {"p": 0.5}),
+        (("--stroke-mm", 10), {"p": 0.01 * (2 * math.pi * 1.9) ** 2 / 9.81}),
+        (
+            ("--frequency-hz", 2),
+            {"Omega": 4 * math.pi, "p": 0.02 * (4 * math.pi) ** 2 / 9.81},
+        ),
+        (("--omega", 2), {"Omega": 12.4, "p": 0.02 * 12.4**2 / 9.81}),
+        (("--stroke-mm", 10, "--frequency-hz", 2), {"p": 0.01 * (4 * math.pi) ** 2 / 9.81}),
+    ],
+)
+def test_what_is_typed_counts_instead_of_the_file(
+    tmp_path: Path, pendmap_command: Run, words: tuple[Any, ...], numbers: dict[str, float]
+) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    run = pendmap_command(
+        "simulate", "--model", "model.toml", *words, "--until", 1, "--json", "--out", "run.nc"
+    )
+    assert run.returncode == 0, run.stderr
+    attrs = pendmap.load(tmp_path / "run.nc").attrs
+    if "--frequency-hz" in words:
+        numbers |= {"Omega": 4 * math.pi}
+    for name in Rig.numbers():
+        wanted = numbers.get(name, getattr(rig, name))
+        assert attrs[name] == pytest.approx(wanted, rel=1e-14), name
+    assert "quadratic_drag" in attrs["effects"]
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--stroke-mm", 20), "--stroke-mm: allowed with --model of a file in SI; here --p"),
+        (
+            ("--frequency-hz", 2),
+            "--frequency-hz: allowed with --model of a file in SI; here --omega",
+        ),
+        (
+            ("--model", "model.toml", "--stroke-mm", 2, "--p", 1),
+            "--stroke-mm and --p: allowed is one",
+        ),
+        (
+            ("--model", "model.toml", "--frequency-hz", 2, "--omega", 1),
+            "--frequency-hz and --omega: allowed is one of them",
+        ),
+        (("--model", "model.toml", "--stroke-mm=-2"), "'--stroke-mm': -2: allowed is 0 or more"),
+        (
+            ("--model", "model.toml", "--frequency-hz", 0),
+            "'--frequency-hz': 0: allowed is a number",
+        ),
+        (("--model", "model.toml", "--gamma=-2"), "'--gamma': -2: allowed is 0 or more"),
+        (("--model", "model.toml", "--preset", "fig2a"), "--model and --preset: allowed is one"),
+        (("--model", "bare.toml", "--stroke-mm", 2), "bare.toml: has no dimensions: stroke_mm is"),
+        (("--model", "bare.toml", "--p", 2), "bare.toml: p without omega"),
+        (("--model", "absent.toml"), "absent.toml: No such file"),
+        (("--model", "."), ": Is a directory"),
+    ],
+)
+def test_the_command_refuses_on_one_line(
+    tmp_path: Path, pendmap_command: Run, words: tuple[Any, ...], complaint: str
+) -> None:
+    written(tmp_path, EXAMPLE)
+    (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
+    run = pendmap_command("simulate", *words)
+    assert run.returncode == 2
+    assert complaint in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bare.toml", "model.toml"]
