@@ -111,8 +111,8 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
                         let way = velocities[$j].scale_add(A[$i][$j], way);
                         let gain = accelerations[$j].scale_add(A[$i][$j], gain);
                     )*
-                    theta = way * h + theta0;
-                    velocity = gain * h + velocity0;
+                    theta = way.mul_add(h, theta0);
+                    velocity = gain.mul_add(h, velocity0);
                 }};
             }
             match i {

@@ -80,6 +80,16 @@ impl<L: Lane, const N: usize> Neg for Tangent<L, N> {
 
 impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     #[inline(always)]
+    fn mul_add(mut self, a: Self, b: Self) -> Self {
+        for i in 0..N {
+            let rest = self.value.mul_add(a.slope[i], b.slope[i]);
+            self.slope[i] = self.slope[i].mul_add(a.value, rest);
+        }
+        self.value = self.value.mul_add(a.value, b.value);
+        self
+    }
+
+    #[inline(always)]
     fn scale_add(mut self, factor: f64, addend: Self) -> Self {
         for i in 0..N {
             self.slope[i] = self.slope[i].scale_add(factor, addend.slope[i]);

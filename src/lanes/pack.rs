@@ -77,13 +77,22 @@ impl<S: Isa, const N: usize> Neg for Bundle<S, N> {
     #[inline(always)]
     fn neg(mut self) -> Self {
         for a in &mut self.0 {
-            a.value = a.isa.neg_f64s(a.value);
+            // As a difference the compiler sees through it, and joins it with sums and products.
+            a.value = a.isa.sub_f64s(a.isa.splat_f64s(-0.0), a.value);
         }
         self
     }
 }
 
 impl<S: Isa, const N: usize> Real for Bundle<S, N> {
+    #[inline(always)]
+    fn mul_add(mut self, a: Self, b: Self) -> Self {
+        for i in 0..N {
+            self.0[i] = self.0[i].mul_add(a.0[i], b.0[i]);
+        }
+        self
+    }
+
     #[inline(always)]
     fn scale_add(mut self, factor: f64, addend: Self) -> Self {
         let factor = self.0[0].constant(factor);
@@ -183,14 +192,6 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
         for (value, pack) in whole.iter_mut().zip(&self.0) {
             *value = pack.value;
         }
-    }
-
-    #[inline(always)]
-    fn mul_add(mut self, a: Self, b: Self) -> Self {
-        for i in 0..N {
-            self.0[i] = self.0[i].mul_add(a.0[i], b.0[i]);
-        }
-        self
     }
 
     #[inline(always)]

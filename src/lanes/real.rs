@@ -21,6 +21,9 @@ pub trait Real:
     /// The constant `value`, in the shape of `self`.
     #[must_use]
     fn like(self, value: f64) -> Self;
+    /// `self * a + b`, fused where the instruction set can.
+    #[must_use]
+    fn mul_add(self, a: Self, b: Self) -> Self;
     /// `self * factor + addend`, fused where the instruction set can.
     #[must_use]
     fn scale_add(self, factor: f64, addend: Self) -> Self;
@@ -62,7 +65,7 @@ pub trait Lane: Real {
     type Token: Copy;
     /// Number of trajectories side by side.
     const WIDTH: usize;
-    /// Whether [`Lane::mul_add`] rounds once.
+    /// Whether [`Real::mul_add`] rounds once.
     const FUSED: bool;
 
     /// Does `work` in a function of its own, compiled for the instruction set of these lanes.
@@ -73,9 +76,6 @@ pub trait Lane: Real {
     fn load(token: Self::Token, source: &[f64]) -> Self;
     /// Writes [`Lane::WIDTH`] values to the front of `target`.
     fn store(self, target: &mut [f64]);
-    /// `self * a + b`, fused where the instruction set can.
-    #[must_use]
-    fn mul_add(self, a: Self, b: Self) -> Self;
     /// The smaller of two values, lane by lane.
     #[must_use]
     fn min(self, other: Self) -> Self;
@@ -111,6 +111,10 @@ pub(super) const INTEGER_OFFSET: f64 = 4_503_599_627_370_496.0 + 1023.0;
 macro_rules! scalar_lane {
     ($type:ty, $get:expr, $make:expr, $fused:expr, $mul_add:expr) => {
         impl Real for $type {
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                $make($mul_add($get(self), $get(a), $get(b)))
+            }
             #[inline(always)]
             fn scale_add(self, factor: f64, addend: Self) -> Self {
                 $make($mul_add($get(self), factor, $get(addend)))
@@ -174,10 +178,6 @@ macro_rules! scalar_lane {
             #[inline(always)]
             fn store(self, target: &mut [f64]) {
                 target[0] = $get(self);
-            }
-            #[inline(always)]
-            fn mul_add(self, a: Self, b: Self) -> Self {
-                $make($mul_add($get(self), $get(a), $get(b)))
             }
             #[inline(always)]
             fn min(self, other: Self) -> Self {

@@ -154,8 +154,7 @@ impl<R: Real> Equation<R> {
     pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
         let bias = Kind::BiasTorque.torque(&Self::only(self.torque), at);
-        let gravity = -(forcing.vertical * at.sine);
-        self.extra(forcing, at) + gravity + bias + damping
+        (-forcing.vertical).mul_add(at.sine, self.extra(forcing, at) + bias + damping)
     }
 
     /// What acts besides gravity, the constant torque, viscous damping and friction.
@@ -200,7 +199,7 @@ impl<R: Real> Equation<R> {
     /// `th''` while moving in the sense of `at`.
     #[inline(always)]
     pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        self.load(forcing, at) - self.friction(at) * at.sense
+        (-self.friction(at)).mul_add(at.sense, self.load(forcing, at))
     }
 
     #[inline(always)]
