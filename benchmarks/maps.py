@@ -25,6 +25,7 @@ class Map:
 
 MAPS = (
     Map(("--p", "1"), "aim 2 s, at most 4 s, under 45 periods"),
+    Map(("--p", "1", "--theta-r", "0.05"), "at most 3 times the map without friction"),
     Map(("--p", "1.7"), "at most 15 s"),
     Map(("--p", "0.6"), ""),
     Map(("--p", "1.7", "--omega", "0.87"), ""),

@@ -2,12 +2,70 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pendmap import Pendulum, basins, figures
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+from scipy.integrate import solve_ivp
+
+from pendmap import Pendulum, basins, figures, simulate
+from pendmap.figures import style
+
+if TYPE_CHECKING:
+    import numpy as np
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)
+# Stick and slip under drive, then rest: a start of tests/truths.json.
+STICKING = Pendulum(gamma=0.1, p=1.5, omega=0.87, theta_r=0.2)
+START, UNTIL = (-0.43, 1.03), 60.0
+WIDTHS = {0.1: ("#D55E00", "--"), 0.01: ("#009E73", "-.")}
 
-figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
-figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
+
+def smoothed(width: float, times: np.ndarray) -> tuple[np.ndarray, int]:
+    """Angles where friction is theta_r tanh(v / width), and the evaluations that it took."""
+    q = STICKING
+
+    def rhs(tau: float, state: np.ndarray) -> list[float]:
+        theta, velocity = state
+        pull = (1.0 + q.p * math.cos(q.omega * tau)) * math.sin(theta)
+        rubbing = q.theta_r * math.tanh(velocity / width)
+        return [velocity, -q.gamma * velocity - pull - rubbing]
+
+    run = solve_ivp(rhs, (0.0, UNTIL), START, "LSODA", times, rtol=1e-9, atol=1e-12)
+    return run.y[0], run.nfev
+
+
+def friction() -> None:
+    """Exact stick and slip against smoothed friction."""
+    run = simulate(STICKING, *START, UNTIL, tol=1e-12, samples=400)
+    tau, theta = run["time"].values, run["theta"].values
+    with mpl.rc_context(style.RC):
+        figure, axis = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
+        kinds, times = run["event_kind"].values, run["event_time"].values
+        begin = None
+        for kind, time in zip(kinds, times, strict=True):
+            if kind in {"stick", "stuck for ever"}:
+                begin = time if begin is None else begin
+            elif kind == "release" and begin is not None:
+                axis.axvspan(begin, time, color="0.88", lw=0)
+                begin = None
+        axis.axvspan(begin, UNTIL, color="0.88", lw=0, label="stuck")
+        axis.plot(tau, theta, color="#0072B2", lw=2, label="exact (pendmap)")
+        for width, (color, dashes) in WIDTHS.items():
+            angles, _ = smoothed(width, tau)
+            label = f"tanh(v / {width:g})"
+            axis.plot(tau, angles, color=color, ls=dashes, lw=1.4, label=label)
+        axis.set_xlabel("time \N{GREEK SMALL LETTER TAU}")
+        axis.set_ylabel("angle \N{GREEK SMALL LETTER THETA} (rad)")
+        axis.set_xlim(0, UNTIL)
+        axis.legend(loc="upper right", ncols=2, frameon=True, framealpha=1.0)
+        figure.savefig(HERE / "friction.png", dpi=110)
+
+
+if __name__ == "__main__":
+    figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
+    figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
+    friction()

@@ -37,6 +37,13 @@ pub enum Error {
         /// What it repeats.
         other: &'static str,
     },
+    /// A map cannot have the effect.
+    NotMappable {
+        /// The effect.
+        effect: &'static str,
+        /// Why not.
+        why: &'static str,
+    },
     /// Arrays that belong together have different lengths.
     Lengths {
         /// What was given.
@@ -76,6 +83,9 @@ impl fmt::Display for Error {
             }
             Self::Twice { name, other } => {
                 write!(f, "{name} and {other}: allowed is one of them, they are the same effect")
+            }
+            Self::NotMappable { effect, why } => {
+                write!(f, "{effect}: allowed in one trajectory, not in maps: {why}")
             }
             Self::Lengths { given, names } => write!(
                 f,

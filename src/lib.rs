@@ -1,8 +1,9 @@
 //! Basin maps, attractors and damping identification of parametrically excited pendulums.
 //!
 //! The model is eq. 1.2 of Horton, Wiercigroch & Xu, "Transient tumbling chaos and damping
-//! identification for parametric pendulum", Phil. Trans. R. Soc. A (2008), with a constant torque:
-//! `th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque`.
+//! identification for parametric pendulum", Phil. Trans. R. Soc. A (2008), with a constant torque,
+//! Coulomb friction (their eq. 2.1) and a library of effects:
+//! `th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque - theta_r sign(th') + ...`.
 //!
 //! Which module answers which question:
 //!

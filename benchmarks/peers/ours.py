@@ -28,9 +28,21 @@ class Pendmap:
 
     label = "pendmap"
 
-    def __init__(self, case: Case, steps: int, *, torque: float = 0.0, threads: int = 1) -> None:
+    def __init__(
+        self,
+        case: Case,
+        steps: int,
+        *,
+        torque: float = 0.0,
+        theta_r: float = 0.0,
+        threads: int = 1,
+    ) -> None:
         """Choose the steps a forcing period (2 pi where p = 0) and the threads."""
-        self.case, self.steps, self.torque, self.threads = case, steps, torque, threads
+        self.case, self.steps, self.threads = case, steps, threads
+        pendulum = importlib.import_module("pendmap").Pendulum
+        self.parameters = pendulum(
+            gamma=case.gamma, p=case.p, omega=case.omega, torque=torque, theta_r=theta_r
+        ).parameters
 
     @property
     def setting(self) -> str:
@@ -39,10 +51,8 @@ class Pendmap:
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
         """Return wrapped angle and velocity, shape (N,), after whole forcing periods."""
-        case = self.case
-        parameters = (case.gamma, case.p, case.omega, 0.0, self.torque)
         theta, velocity, _ = _core().advance(
-            parameters, theta, velocity, periods, self.steps, self.threads
+            self.parameters, theta, velocity, periods, self.steps, self.threads
         )
         return theta, velocity
 

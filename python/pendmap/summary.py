@@ -86,11 +86,11 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
         row = {key: dataset[key].values[k] for key in ("fraction", "stderr", "twin", "exponent")}
         twin = int(row["twin"])
         mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
-        known = math.isfinite(row["exponent"])  # a rest held by friction has none
-        exponent = f", exponent {row['exponent']:.4f}{unit}" if known else ""
+        held = not math.isfinite(row["exponent"])
+        rate = "held by friction" if held else f"exponent {row['exponent']:.4f}{unit}"
         lines.append(
-            f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts"
-            f"{exponent}{mirror}."
+            f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
+            f"{rate}{mirror}."
         )
     if not lines:
         lines.append("No attractor was found.")

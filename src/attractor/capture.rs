@@ -285,7 +285,7 @@ impl<'a> Watch<'a> {
         };
         let equation = &self.job.strobe.equation;
         let excess = equation.excess(theta);
-        let limit = equation.load_at_rest(0.0, theta).1;
+        let limit = equation.hold(theta);
         let creeps = tenant.held.is_some_and(|(clock, before)| {
             clock + 1 == self.clock && excess < before && excess < CREEPING * limit
         });

@@ -12,6 +12,9 @@ use crate::model::Pendulum;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::rotation::Rotation;
 
+/// Mean angles of sampled sets that differ by less are the same.
+const SAME_LEAN: f64 = 0.1;
+
 /// An attractor.
 #[derive(Clone, Debug)]
 pub struct Attractor {
@@ -138,7 +141,8 @@ impl Attractor {
             return false;
         }
         if self.n.is_none() {
-            return self.sense == -other.sense;
+            let opposite = (self.lean() + other.lean()).abs() < SAME_LEAN;
+            return self.sense == -other.sense && opposite;
         }
         let image = |p: &State| [wrapped(-p[0]), -p[1]];
         self.points.iter().all(|p| other.points.iter().any(|q| distance(image(p), *q) < 1e-7))

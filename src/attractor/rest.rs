@@ -25,7 +25,7 @@ pub fn centres(pendulum: &Pendulum) -> Vec<f64> {
 }
 
 fn centre(equation: &Equation<f64>, middle: f64) -> f64 {
-    if equation.has_closed_release() {
+    if equation.is_plain() {
         // The load torque - (1 + p cos) sin th is least in magnitude near torque = sin th.
         let theta = equation.torque.clamp(-1.0, 1.0).asin();
         return if middle == 0.0 { theta } else { PI - theta };

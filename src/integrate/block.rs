@@ -3,14 +3,14 @@
 //! Smooth motions run a bundle at a time through the whole period. With friction, or another law that
 //! changes with the sign of the velocity, all bundles take each step with the sign held; lanes whose
 //! velocity passed zero go into a queue that runs in lanes itself, each with its own phase and step
-//! ([`super::event`]). Lanes that are held fast wait for their release.
+//! ([`super::ticket`]). Lanes that are held fast wait for their release.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
-use super::event::Ticket;
 use super::runner::Runner;
 use super::stroboscopic::Strobe;
+use super::ticket::Ticket;
 use crate::lanes::sine::wrap;
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
 use crate::model::pendulum::Route;

@@ -4,14 +4,16 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::tangent::{Number, Tangent};
-use crate::model::effects::Action;
 use crate::model::recorded::Recorded;
+use crate::model::rest::Load;
 use crate::model::{Equation, Pendulum};
 
-/// The longest step over `tolerance^(1/8) / rate`, where `rate` is the greatest frequency of small
-/// motions or of the drive: about what the error of a linear oscillator allows. Without it a state
-/// at rest would be crossed in steps too long for its derivatives.
-const LONGEST_STEP: f64 = 9.0;
+/// The longest step is this times a power of the tolerance, over the greatest rate of small motions
+/// or of the drive. At fine tolerances that is what the error of a linear oscillator allows: a state
+/// at rest would else be crossed in steps too long for its derivatives. At coarse ones it is less,
+/// and motions smaller than the tolerance keep seven digits of their own, so that their turns are
+/// turns. It falls with the tolerance all along, so that tightening always tells.
+const LONGEST_STEP: (f64, f64) = (1.6, 1.0 / 14.0);
 /// The smallest error of a step that rounding allows to be estimated.
 pub const FINEST: f64 = 1e-15;
 /// Angles, and times of a drive's period, at which the rate is looked for.
@@ -51,7 +53,6 @@ impl<N: Number> Course<N> {
         let mut plain = pendulum.equation();
         plain.ages = ages;
         let changes = ages && pendulum.drifts();
-        let unforced = pendulum.effects.iter().all(|e| e.is(&[Action::Reading]));
         let tolerance = tolerance.max(FINEST);
         let rate = greatest_rate(pendulum).max(if pendulum.is_autonomous() {
             0.0
@@ -60,14 +61,14 @@ impl<N: Number> Course<N> {
         });
         Self {
             equation,
-            plain,
             recorded: None,
             watches: pendulum.has_events(),
             sticks: pendulum.has_friction(),
-            harmonic: unforced,
+            harmonic: plain.is_plain(),
+            plain,
             period: (!changes).then(|| pendulum.period()),
             look: pendulum.period(),
-            longest: LONGEST_STEP * tolerance.powf(0.125) / rate,
+            longest: LONGEST_STEP.0 * tolerance.powf(LONGEST_STEP.1) / rate,
             tolerance,
         }
     }
@@ -80,6 +81,7 @@ impl<N: Number> Course<N> {
         self.harmonic = false;
         self.period = None;
         self.look = self.look.min(8.0 * recorded.spacing());
+        self.longest /= (1.0 + recorded.greatest()).sqrt();
         self.recorded = Some(recorded);
         self
     }
@@ -105,26 +107,6 @@ impl<N: Number> Course<N> {
         self.equation.acceleration(&forcing, &at)
     }
 
-    /// By how much the load at rest exceeds what holds the pendulum against moving in the sense
-    /// `sense`; it stays at rest while this is not positive for either sense.
-    #[must_use]
-    pub fn excess(&self, tau: f64, theta: f64, sense: f64) -> f64 {
-        let mut forcing = self.plain.forcing(tau);
-        if let Some(recorded) = &self.recorded {
-            let [up, side] = recorded.acceleration(tau);
-            forcing.vertical += up;
-            forcing.lateral += side;
-        }
-        let at = self.plain.point(&forcing, theta, 0.0, sense);
-        sense * self.plain.load(&forcing, &at) - self.plain.friction(&at)
-    }
-
-    /// The equation with plain numbers.
-    #[must_use]
-    pub fn plain(&self) -> &Equation<f64> {
-        &self.plain
-    }
-
     /// Whether the equation changes where the velocity passes zero, or turns are wanted anyhow.
     #[must_use]
     pub fn watches(&self) -> bool {
@@ -135,25 +117,6 @@ impl<N: Number> Course<N> {
     #[must_use]
     pub fn sticks(&self) -> bool {
         self.sticks
-    }
-
-    /// Whether nothing acts on a pendulum at rest but gravity, the harmonic drive, a constant torque
-    /// and constant friction: then its release has a closed form.
-    #[must_use]
-    pub fn is_harmonic(&self) -> bool {
-        self.harmonic
-    }
-
-    /// The time after which the equation repeats; `None` if it does not.
-    #[must_use]
-    pub fn period(&self) -> Option<f64> {
-        self.period
-    }
-
-    /// The time scale of what acts on a pendulum at rest.
-    #[must_use]
-    pub fn time_scale(&self) -> f64 {
-        self.look
     }
 
     /// The longest step.
@@ -169,19 +132,46 @@ impl<N: Number> Course<N> {
     }
 }
 
-/// The greatest frequency of small motions about any angle at any time, at least 1.
+impl<N> Load for Course<N> {
+    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
+        let mut forcing = self.plain.forcing(tau);
+        if let Some(recorded) = &self.recorded {
+            let [up, side] = recorded.acceleration(tau);
+            forcing.vertical += up;
+            forcing.lateral += side;
+        }
+        let at = self.plain.point(&forcing, theta, 0.0, 1.0);
+        [self.plain.load(&forcing, &at), self.plain.friction(&at).max(0.0)]
+    }
+    fn equation(&self) -> &Equation<f64> {
+        &self.plain
+    }
+    fn has_closed_release(&self) -> bool {
+        self.harmonic
+    }
+    fn period(&self) -> Option<f64> {
+        self.period
+    }
+    fn time_scale(&self) -> f64 {
+        self.look
+    }
+}
+
+/// The greatest frequency or rate of decay of small motions about any angle at any time, at least 1.
 fn greatest_rate(pendulum: &Pendulum) -> f64 {
-    let equation = Equation::lift(pendulum, |_, value| Tangent::<f64, 1> { value, slope: [0.0] });
-    let mut stiffness = 1_f64;
+    let equation = Equation::lift(pendulum, |_, value| Tangent::<f64, 2>::constant(value));
+    let (mut stiffness, mut damping) = (1_f64, 0_f64);
     for k in 0..LOOKS[1] {
         let tau = pendulum.period() * k as f64 / LOOKS[1] as f64;
         let forcing = equation.forcing(Tangent::constant(tau));
         for i in 0..LOOKS[0] {
             let theta = PI * (2.0 * i as f64 / LOOKS[0] as f64 - 1.0);
-            let (zero, one) = (Tangent::constant(0.0), Tangent::constant(1.0));
-            let at = equation.point(&forcing, Tangent::seeded(theta, 0), zero, one);
-            stiffness = stiffness.max(equation.acceleration(&forcing, &at).slope[0].abs());
+            let (theta, velocity) = (Tangent::seeded(theta, 0), Tangent::seeded(0.0, 1));
+            let at = equation.point(&forcing, theta, velocity, Tangent::constant(1.0));
+            let [by_theta, by_velocity] = equation.acceleration(&forcing, &at).slope;
+            stiffness = stiffness.max(by_theta.abs());
+            damping = damping.max(by_velocity.abs());
         }
     }
-    stiffness.sqrt()
+    stiffness.sqrt().max(damping)
 }

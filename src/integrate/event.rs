@@ -1,310 +1,38 @@
-//! Turns, sticks and releases of one trajectory within one step of the block that it belongs to.
-//!
-//! A [`Ticket`] asks for integrations from where its trajectory last was on an analytic piece of the
-//! motion, over lengths of its own; [`super::block`] runs those of many tickets in lanes. From their
-//! ends it finds the first zero of the velocity, to rounding, and what comes after it.
+//! What happens to a trajectory where its velocity is zero.
 
-use crate::model::Equation;
-use crate::model::rest::Standstill;
-
-/// Integrations after which a ticket gives up; its trajectory counts as failed.
-const MOST_ROUNDS: u32 = 400;
-/// A zero is found when Newton's step falls below this part of the way to it: with the change of the
-/// acceleration along it taken into account, what is left is of its third power.
-const CLOSE: f64 = 1e-5;
-/// Steps of Newton's method that a root may take before the bracket is halved.
-const MOST_NEWTON: u32 = 8;
-/// Where the velocity's least value, as its cubic gives it, is below this part of its change over the
-/// piece, the integration decides.
-const GRAZING: f64 = 0.1;
-/// Steps of Newton's method on the cubic.
-const POLISHINGS: usize = 4;
-/// A first guess is at least this part of the piece.
-const LEAST_GUESS: f64 = 1e-6;
-/// After a release the next one is at least this part of the period away: at the stick's edge a slip
-/// may be shorter than rounding can tell.
-const LEAST_SLIP: f64 = 1e-7;
-
-/// What a ticket waits for.
-#[derive(Clone, Copy, Debug)]
-enum Stage {
-    /// The end of the piece.
-    Whole,
-    /// The velocity's least value, which may lie on the other side of zero.
-    Dip,
-    /// A zero of the velocity between the two times.
-    Root { low: f64, high: f64, tries: u32 },
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// The velocity passed zero.
+    Turn,
+    /// The velocity became zero, and friction holds.
+    Stick,
+    /// The load overcame the friction.
+    Release,
+    /// It never will.
+    StuckForEver,
 }
 
-/// The end of an integration, as the lanes return it.
-#[derive(Clone, Copy, Debug)]
-pub struct Reached {
-    /// Angle, rad.
+impl EventKind {
+    /// The words for it.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Turn => "turn",
+            Self::Stick => "stick",
+            Self::Release => "release",
+            Self::StuckForEver => "stuck for ever",
+        }
+    }
+}
+
+/// What happened, when and where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// When.
+    pub tau: f64,
+    /// What.
+    pub kind: EventKind,
+    /// At which angle, rad, not wrapped.
     pub theta: f64,
-    /// Velocity.
-    pub velocity: f64,
-    /// Acceleration at the begin and at the end.
-    pub acceleration: [f64; 2],
-}
-
-/// How a ticket stands after an integration.
-#[derive(Clone, Copy, Debug)]
-pub enum Progress {
-    /// It asks for another one.
-    Asks,
-    /// The step's end is reached.
-    Arrived {
-        /// Angle, rad.
-        theta: f64,
-        /// Velocity.
-        velocity: f64,
-    },
-    /// It has stopped and is held beyond the step's end.
-    Held {
-        /// Angle, rad.
-        theta: f64,
-        /// Time of the release.
-        until: f64,
-        /// Sense of the motion then.
-        sense: f64,
-    },
-}
-
-/// A trajectory whose velocity passes zero, or may do so, within a step.
-#[derive(Clone, Copy, Debug)]
-pub struct Ticket {
-    /// Its place in the block.
-    pub lane: usize,
-    /// Angle where the piece begins, rad.
-    pub theta: f64,
-    /// Velocity there.
-    pub velocity: f64,
-    /// Sense of the motion on the piece.
-    pub sense: f64,
-    /// When the piece begins.
-    pub begin: f64,
-    /// The length asked for.
-    pub length: f64,
-    end: f64,
-    stage: Stage,
-    /// What the whole piece gave.
-    whole: Option<Reached>,
-    rounds: u32,
-}
-
-impl Ticket {
-    /// A trajectory that moves from `theta` in the sense `sense` between `begin` and `end`.
-    #[must_use]
-    pub fn new(lane: usize, state: [f64; 2], sense: f64, begin: f64, end: f64) -> Self {
-        Self {
-            lane,
-            theta: state[0],
-            velocity: state[1],
-            sense,
-            begin,
-            length: end - begin,
-            end,
-            stage: Stage::Whole,
-            whole: None,
-            rounds: 0,
-        }
-    }
-
-    /// The same where the end of the piece is known already.
-    #[must_use]
-    pub fn known(
-        lane: usize,
-        state: [f64; 2],
-        sense: f64,
-        [begin, end]: [f64; 2],
-        whole: &Reached,
-    ) -> Option<Self> {
-        let mut ticket = Self::new(lane, state, sense, begin, end);
-        matches!(ticket.ended(whole), Progress::Asks).then_some(ticket)
-    }
-
-    /// Takes the end of the integration that it asked for.
-    #[must_use]
-    pub fn take(&mut self, reached: &Reached, equation: &Equation<f64>, period: f64) -> Progress {
-        self.rounds += 1;
-        if self.rounds > MOST_ROUNDS || !reached.velocity.is_finite() {
-            return Progress::Arrived { theta: f64::NAN, velocity: f64::NAN };
-        }
-        match self.stage {
-            Stage::Whole => self.ended(reached),
-            Stage::Dip => self.dipped(reached),
-            Stage::Root { low, high, tries } => {
-                self.narrowed(reached, [low, high], tries, equation, period)
-            }
-        }
-    }
-
-    /// Velocity and acceleration in the sense of the motion at both ends of the whole piece.
-    fn ends(&self, whole: &Reached) -> [f64; 4] {
-        // A piece that begins at rest begins in its sense, whatever rounding says.
-        let [first, last] = whole.acceleration.map(|a| self.sense * a);
-        let first = if self.velocity == 0.0 { first.max(0.0) } else { first };
-        [self.sense * self.velocity, self.sense * whole.velocity, first, last]
-    }
-
-    fn ended(&mut self, whole: &Reached) -> Progress {
-        self.whole = Some(*whole);
-        let [u0, u1, b0, b1] = self.ends(whole);
-        let h = self.length;
-        if u1 < 0.0 {
-            self.seek(h);
-            return Progress::Asks;
-        }
-        if u0 > 0.0 && b0 < 0.0 && b1 > 0.0 {
-            let cubic = Cubic::new(self.ends(whole), h);
-            let at = cubic.lowest();
-            if cubic.at(at) < GRAZING * (b1 - b0) * h {
-                self.stage = Stage::Dip;
-                self.length = at * h;
-                return Progress::Asks;
-            }
-        }
-        Progress::Arrived { theta: whole.theta, velocity: whole.velocity }
-    }
-
-    /// The least velocity is on the other side of zero, or above it: then the piece goes on.
-    fn dipped(&mut self, reached: &Reached) -> Progress {
-        let high = self.length;
-        if self.sense * reached.velocity < 0.0 {
-            self.whole = Some(*reached);
-            self.seek(high);
-            return Progress::Asks;
-        }
-        match self.whole {
-            Some(whole) => Progress::Arrived { theta: whole.theta, velocity: whole.velocity },
-            None => Progress::Arrived { theta: f64::NAN, velocity: f64::NAN },
-        }
-    }
-
-    /// Asks for the state at the first zero of the cubic over a piece of length `h`.
-    fn seek(&mut self, h: f64) {
-        let guess = self.whole.map_or(0.5, |w| Cubic::new(self.ends(&w), h).zero());
-        self.length = guess.clamp(LEAST_GUESS, 1.0) * h;
-        self.stage = Stage::Root { low: 0.0, high: h, tries: 0 };
-    }
-
-    fn narrowed(
-        &mut self,
-        reached: &Reached,
-        [mut low, mut high]: [f64; 2],
-        tries: u32,
-        equation: &Equation<f64>,
-        period: f64,
-    ) -> Progress {
-        let t = self.length;
-        let (u, b) = (self.sense * reached.velocity, self.sense * reached.acceleration[1]);
-        if u >= 0.0 {
-            low = t;
-        } else {
-            high = t;
-        }
-        // After a reversal the begin is a zero itself, and is divided out.
-        let slope = if self.velocity == 0.0 { b - u / t } else { b };
-        let step = if u == 0.0 { 0.0 } else { -u / slope };
-        if step.abs() <= CLOSE * t || high - low <= 1e-15 * self.end.abs().max(period) {
-            let [first, last] = reached.acceleration;
-            let step = if u != 0.0 && step.abs() <= CLOSE * t {
-                let step = -reached.velocity / last;
-                step - 0.5 * (last - first) / (t * last) * step * step
-            } else {
-                0.0
-            };
-            let theta = reached.theta + step * (reached.velocity + 0.5 * step * last);
-            return self.stopped(theta, self.begin + t + step, equation, period);
-        }
-        let mut next = t + step;
-        if !(next > low && next < high) || tries >= MOST_NEWTON {
-            next = 0.5 * (low + high);
-        }
-        self.length = next;
-        self.stage = Stage::Root { low, high, tries: (tries + 1) % (2 * MOST_NEWTON) };
-        Progress::Asks
-    }
-
-    /// The velocity is zero at `tau`: what comes next.
-    fn stopped(&mut self, theta: f64, tau: f64, equation: &Equation<f64>, period: f64) -> Progress {
-        let released = self.velocity == 0.0 && tau - self.begin < LEAST_SLIP * period;
-        match equation.standstill(tau, theta) {
-            Standstill::Moves(sense) if !released || sense * self.sense < 0.0 => {
-                if tau >= self.end {
-                    // The rest of the step is lost in rounding: the motion goes on in its sense.
-                    return Progress::Arrived { theta, velocity: sense * f64::MIN_POSITIVE };
-                }
-                *self = Self {
-                    rounds: self.rounds,
-                    ..Self::new(self.lane, [theta, 0.0], sense, tau, self.end)
-                };
-                Progress::Asks
-            }
-            state => {
-                // A slip too short to be told from rounding: held until the load rises again.
-                let again = released.then(|| equation.release(tau + LEAST_SLIP * period, theta));
-                let (until, sense) = match (again, state) {
-                    (Some(found), _) => found.unwrap_or((f64::INFINITY, 1.0)),
-                    (None, Standstill::Held { until, sense }) => (until, sense),
-                    (None, Standstill::Moves(sense)) => (tau, sense),
-                };
-                if until >= self.end {
-                    return Progress::Held { theta, until, sense };
-                }
-                *self = Self {
-                    rounds: self.rounds,
-                    ..Self::new(self.lane, [theta, 0.0], sense, until, self.end)
-                };
-                Progress::Asks
-            }
-        }
-    }
-}
-
-/// The velocity over a piece as a cubic of the time in pieces, from both ends.
-struct Cubic([f64; 4]);
-
-impl Cubic {
-    fn new([u0, u1, b0, b1]: [f64; 4], h: f64) -> Self {
-        let (d0, d1, rise) = (b0 * h, b1 * h, u1 - u0);
-        Self([u0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise])
-    }
-
-    fn at(&self, x: f64) -> f64 {
-        let [a, b, c, d] = self.0;
-        a + x * (b + x * (c + x * d))
-    }
-
-    /// Where it is least, inside.
-    fn lowest(&self) -> f64 {
-        let [_, b, c, d] = self.0;
-        // b + 2 c x + 3 d x^2 = 0 with rising slope, without cancellation.
-        let root = (c * c - 3.0 * b * d).max(0.0).sqrt();
-        let x = if c >= 0.0 { -b / (c + root) } else { (root - c) / (3.0 * d) };
-        if (0.0..=1.0).contains(&x) { x } else { 0.5 }
-    }
-
-    /// Its passage from above to below zero, which its ends promise: near enough to begin Newton's
-    /// method on the motion itself.
-    fn zero(&self) -> f64 {
-        // After a reversal the begin is a zero itself, and is divided out.
-        let [a, b, c, d] = match self.0 {
-            [0.0, b, c, d] => [b, c, d, 0.0],
-            whole => whole,
-        };
-        let (mut low, mut high) = (0.0, 1.0);
-        let mut x = a / (a - (a + b + c + d));
-        for _ in 0..POLISHINGS {
-            let value = a + x * (b + x * (c + x * d));
-            if value < 0.0 {
-                high = x;
-            } else {
-                low = x;
-            }
-            let next = x - value / (b + x * (2.0 * c + 3.0 * d * x));
-            x = if next > low && next < high { next } else { 0.5 * (low + high) };
-        }
-        x
-    }
 }

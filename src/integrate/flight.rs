@@ -8,9 +8,11 @@
 
 use super::course::Course;
 use super::dense::Leap;
-use super::stick::{Release, release};
+use super::event::{Event, EventKind};
+use crate::model::rest::{Release, release};
+
 use super::tangent::Number;
-use super::turning;
+use super::turning::{self, Turning};
 
 /// A step is at most so much longer than the one before it, and at least so much shorter.
 const CHANGE: [f64; 2] = [1.0 / 3.0, 6.0];
@@ -20,47 +22,12 @@ const SAFETY: f64 = 0.9;
 const FIRST_STEP: f64 = 0.5;
 /// Steps shorter than this part of the time leave no trace in it.
 const SHORTEST: f64 = 1e-15;
+/// Below this part of the longest step a curve is as good as rounding lets it be.
+const FINE: f64 = 1e-4;
 /// Turns closer than this, so often in a row, are a state on the edge that rounding decides.
 const CROWDED: (f64, u32) = (1e-10, 20);
 /// The rest given to such a state; it doubles each time.
 const PAUSE: f64 = 1e-9;
-
-/// What happened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EventKind {
-    /// The velocity passed zero.
-    Turn,
-    /// The velocity became zero, and friction holds.
-    Stick,
-    /// The load overcame the friction.
-    Release,
-    /// It never will.
-    StuckForEver,
-}
-
-impl EventKind {
-    /// The words for it.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Turn => "turn",
-            Self::Stick => "stick",
-            Self::Release => "release",
-            Self::StuckForEver => "stuck for ever",
-        }
-    }
-}
-
-/// What happened, when and where.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
-    /// When.
-    pub tau: f64,
-    /// What.
-    pub kind: EventKind,
-    /// At which angle, rad, not wrapped.
-    pub theta: f64,
-}
 
 /// A piece of a trajectory.
 #[derive(Debug)]
@@ -198,43 +165,51 @@ impl<'a, N: Number> Flight<'a, N> {
     }
 
     fn leap(&mut self, sense: f64, first: N) -> Option<Piece<N>> {
+        let (course, shortest) = (self.course, SHORTEST * self.tau.abs().max(1.0));
         let mut growth = CHANGE[1];
-        let mut leap = loop {
+        loop {
             let rest = self.until - self.tau;
             // No crumb is left for the step after this one.
             let length = if self.step > 0.99 * rest { rest } else { self.step };
-            let leap = Leap::new(self.course, self.tau, self.state, first, sense, length);
+            if length < shortest && length < rest {
+                self.lose();
+                return None;
+            }
+            let mut leap = Leap::new(course, self.tau, self.state, first, sense, length);
             self.steps += 1;
-            let error = leap.error(self.course.tolerance());
-            if error.is_nan() || length < SHORTEST * self.tau.abs() {
-                if length < SHORTEST * self.tau.abs().max(1.0) {
-                    self.mode = Mode::Lost;
-                    self.state = self.state.map(|x| x.reset(f64::NAN, 1.0));
-                    return None;
-                }
-                self.step = CHANGE[0] * length;
+            let error = leap.error(course.tolerance());
+            if error.is_nan() {
+                (self.step, growth) = (CHANGE[0] * length, 1.0);
                 continue;
             }
             let factor = (SAFETY * error.powf(-0.125)).clamp(CHANGE[0], growth);
-            let next = (factor * length).min(self.course.longest_step());
-            if error <= 1.0 {
-                // A step that the end cut short says little about the next one.
-                self.step = if length < self.step { self.step.max(next) } else { next };
-                break leap;
+            let next = (factor * length).min(course.longest_step());
+            if error > 1.0 {
+                (self.step, growth) = (next.min(0.99 * length), 1.0);
+                continue;
             }
-            (self.step, growth) = (next.min(0.99 * length), 1.0);
-        };
-        if self.course.watches()
-            && let Some(turned) = turning::first(self.course, &mut leap)
-        {
-            leap = turned;
-            self.arrive(&leap);
-            self.turn(sense, leap.last().value());
-        } else {
+            let turning =
+                if course.watches() { turning::first(course, &mut leap) } else { Turning::None };
+            if matches!(turning, Turning::Unclear) && length > FINE * course.longest_step() {
+                (self.step, growth) = (0.5 * length, 1.0);
+                continue;
+            }
+            // A step that the end cut short says little about the next one.
+            self.step = if length < self.step { self.step.max(next) } else { next };
+            if let Turning::At(turned) = turning {
+                self.arrive(&turned);
+                self.turn(sense, turned.last().value());
+                return Some(Piece::Leap(turned));
+            }
             self.arrive(&leap);
             self.mode = Mode::Moving(sense, leap.last());
+            return Some(Piece::Leap(Box::new(leap)));
         }
-        Some(Piece::Leap(Box::new(leap)))
+    }
+
+    fn lose(&mut self) {
+        self.mode = Mode::Lost;
+        self.state = self.state.map(|x| x.reset(f64::NAN, 1.0));
     }
 
     fn arrive(&mut self, leap: &Leap<N>) {
@@ -247,11 +222,10 @@ impl<'a, N: Number> Flight<'a, N> {
     fn turn(&mut self, sense: f64, before: f64) {
         let theta = self.state[0].value();
         let goes_on = if self.course.sticks() {
-            release(self.course, self.tau, theta, self.until)
+            self.uncrowded(release(self.course, self.tau, theta, self.until))
         } else {
             Release::Now(-sense)
         };
-        let goes_on = self.uncrowded(goes_on);
         let Release::Now(next) = goes_on else {
             self.settle(goes_on);
             return;
@@ -276,7 +250,7 @@ impl<'a, N: Number> Flight<'a, N> {
         let close = self.tau - last < CROWDED.0;
         self.crowd = (self.tau, if close { count + 1 } else { 0 });
         match wait {
-            Release::Now(sense) if self.crowd.1 > CROWDED.1 => {
+            Release::Now(sense) | Release::At(_, sense) if self.crowd.1 > CROWDED.1 => {
                 self.pause *= 2.0;
                 Release::At(self.tau + self.pause, sense)
             }

@@ -1,61 +1,45 @@
 //! One step of the Runge-Kutta method of order 8 for any number type: for torques that depend on the
 //! velocity, and for steps of a length that each trajectory has for itself.
 
+use std::ops::Range;
+
 use super::dop853::{A, B, C, STAGES};
-use crate::lanes::Real;
+use crate::lanes::{Real, Work};
 use crate::model::Pendulum;
 use crate::model::equation::{Equation, Forcing};
 
-/// When the stages of a step are, and what the drive then does.
-pub trait Clock<R> {
-    /// What the drive does at `stage`; `STAGES` is the step's end.
-    fn forcing(&self, equation: &Equation<R>, stage: usize) -> Forcing<R>;
-    /// The length of the step.
-    fn length(&self) -> R;
-}
-
-/// Every trajectory at the same time.
+/// When the stages of a step are, and how long it is.
 #[derive(Clone, Copy, Debug)]
-pub struct Shared<'a, R> {
-    /// The drive at the stages and at the end.
-    pub forcing: &'a [Forcing<f64>; STAGES + 1],
-    /// The length of the step.
-    pub length: R,
+pub enum Clock<'a, R> {
+    /// Every trajectory at the same time: what the drive does at the stages and at the end.
+    Shared(&'a [Forcing<f64>; STAGES + 1], R),
+    /// Each at its own: when the step begins.
+    Own(R, R),
 }
 
-impl<R: Real> Clock<R> for Shared<'_, R> {
-    #[inline(always)]
-    fn forcing(&self, _: &Equation<R>, stage: usize) -> Forcing<R> {
-        self.forcing[stage].like(self.length)
-    }
+impl<R: Real> Clock<'_, R> {
+    /// The length of the step.
     #[inline(always)]
     fn length(&self) -> R {
-        self.length
+        match self {
+            Self::Shared(_, length) | Self::Own(_, length) => *length,
+        }
     }
-}
 
-/// Each trajectory at its own time.
-#[derive(Clone, Copy, Debug)]
-pub struct Own<R> {
-    /// When the step begins.
-    pub begin: R,
-    /// How long it is.
-    pub length: R,
-}
-
-impl<R: Real> Clock<R> for Own<R> {
+    /// What the drive does at `stage`; `STAGES` is the step's end.
     #[inline(always)]
     fn forcing(&self, equation: &Equation<R>, stage: usize) -> Forcing<R> {
-        let part = if stage == STAGES { 1.0 } else { C[stage] };
-        equation.forcing(self.length.scale_add(part, self.begin))
-    }
-    #[inline(always)]
-    fn length(&self) -> R {
-        self.length
+        match self {
+            Self::Shared(forcing, length) => forcing[stage].like(*length),
+            Self::Own(begin, length) => {
+                let part = if stage == STAGES { 1.0 } else { C[stage] };
+                equation.forcing(length.scale_add(part, *begin))
+            }
+        }
     }
 }
 
-/// A state of the general path, with the acceleration where it has been evaluated.
+/// A state of the general path.
 #[derive(Clone, Copy, Debug)]
 pub struct Running<R> {
     /// Angle, rad.
@@ -64,53 +48,80 @@ pub struct Running<R> {
     pub velocity: R,
 }
 
-impl<R: Real> Running<R> {
-    /// One step in the sense `sense`; the acceleration at its begin.
+/// All of a step but the acceleration at its end.
+pub const STEP: Range<usize> = 0..STAGES;
+/// The acceleration at the end alone, of a step that was taken.
+pub const END: Range<usize> = STAGES..STAGES + 1;
+/// Both.
+pub const WHOLE: Range<usize> = 0..STAGES + 1;
+
+/// One step, or a part of it.
+#[derive(Debug)]
+pub struct Stepping<'a, R> {
+    /// The equation of motion.
+    pub equation: &'a Equation<R>,
+    /// The times.
+    pub clock: Clock<'a, R>,
+    /// The sense of the motion, held over the step.
+    pub sense: R,
+    /// [`STEP`], [`END`] or [`WHOLE`].
+    pub part: Range<usize>,
+    /// The state at the begin, and then at the end.
+    pub state: &'a mut Running<R>,
+    /// Takes the accelerations at begin and end.
+    pub ends: &'a mut [R; 2],
+}
+
+impl<R: Real> Work for Stepping<'_, R> {
+    // The formulas of the effects stand here once, in a loop over the stages.
     #[inline(always)]
-    pub fn step<K: Clock<R>>(&mut self, equation: &Equation<R>, clock: &K, sense: R) -> R {
+    fn run(self) {
+        let Self { equation, clock, sense, part, state, ends } = self;
         let zero = sense.like(0.0);
         let h = clock.length();
         let mut velocities = [zero; STAGES];
         let mut accelerations = [zero; STAGES];
-        let mut i = 0;
-        while i < STAGES {
-            let (mut way, mut gain) = (zero, zero);
-            let mut j = 0;
-            while j < i {
-                if A[i][j] != 0.0 {
-                    way = velocities[j].scale_add(A[i][j], way);
-                    gain = accelerations[j].scale_add(A[i][j], gain);
+        let mut i = part.start;
+        while i < part.end {
+            let mut now = *state;
+            if i < STAGES {
+                let (mut way, mut gain) = (zero, zero);
+                let mut j = 0;
+                while j < i {
+                    if A[i][j] != 0.0 {
+                        way = velocities[j].scale_add(A[i][j], way);
+                        gain = accelerations[j].scale_add(A[i][j], gain);
+                    }
+                    j += 1;
                 }
-                j += 1;
+                now.theta = way * h + state.theta;
+                now.velocity = gain * h + state.velocity;
             }
-            let theta = way * h + self.theta;
-            let velocity = gain * h + self.velocity;
             let forcing = clock.forcing(equation, i);
-            let at = equation.point(&forcing, theta, velocity, sense);
-            velocities[i] = velocity;
-            accelerations[i] = equation.acceleration(&forcing, &at);
-            i += 1;
-        }
-        let (mut way, mut gain) = (zero, zero);
-        let mut j = 0;
-        while j < STAGES {
-            if B[j] != 0.0 {
-                way = velocities[j].scale_add(B[j], way);
-                gain = accelerations[j].scale_add(B[j], gain);
+            let at = equation.point(&forcing, now.theta, now.velocity, sense);
+            let acceleration = equation.acceleration(&forcing, &at);
+            if i == STAGES {
+                ends[1] = acceleration;
+                return;
             }
-            j += 1;
+            velocities[i] = now.velocity;
+            accelerations[i] = acceleration;
+            i += 1;
+            if i == STAGES {
+                let (mut way, mut gain) = (zero, zero);
+                let mut j = 0;
+                while j < STAGES {
+                    if B[j] != 0.0 {
+                        way = velocities[j].scale_add(B[j], way);
+                        gain = accelerations[j].scale_add(B[j], gain);
+                    }
+                    j += 1;
+                }
+                state.theta = way * h + state.theta;
+                state.velocity = gain * h + state.velocity;
+                ends[0] = accelerations[0];
+            }
         }
-        self.theta = way * h + self.theta;
-        self.velocity = gain * h + self.velocity;
-        accelerations[0]
-    }
-
-    /// The acceleration at the end of a step.
-    #[inline(always)]
-    pub fn acceleration<K: Clock<R>>(&self, equation: &Equation<R>, clock: &K, sense: R) -> R {
-        let forcing = clock.forcing(equation, STAGES);
-        let at = equation.point(&forcing, self.theta, self.velocity, sense);
-        equation.acceleration(&forcing, &at)
     }
 }
 

@@ -5,10 +5,9 @@
 //! - [`step`]: one step, for any number type
 //! - [`tangent`]: numbers with derivatives, for the variational equations
 //! - [`general`]: one step where torques depend on the velocity
-//! - [`block`]: a block of trajectories, one forcing period; [`event`]: turns, sticks, releases
-//!   in it
-//! - [`course`], [`dense`], [`turning`], [`stick`], [`flight`]: one trajectory of any model, adaptive,
-//!   with exact turns, sticks and releases
+//! - [`block`], [`ticket`]: a block of trajectories, one forcing period; turns, sticks, releases in it
+//! - [`course`], [`dense`], [`turning`], [`event`], [`flight`]: one trajectory of any
+//!   model, adaptive, with exact turns, sticks and releases
 //! - [`sample`], [`sensitivity`]: the same at chosen times, with derivatives by parameters and start
 //! - [`flow`]: the stroboscopic map by it, with its derivative
 //! - [`stroboscopic`]: many trajectories, one forcing period at a time
@@ -30,11 +29,11 @@ pub mod sample;
 pub mod schedule;
 pub mod sensitivity;
 pub mod step;
-pub mod stick;
 pub mod stretch;
 pub mod stroboscopic;
 pub mod tableau;
 pub mod tangent;
+pub mod ticket;
 pub mod trajectory;
 pub mod turning;
 

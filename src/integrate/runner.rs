@@ -5,15 +5,15 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
 use super::block::{Block, Held};
-use super::event::{Progress, Reached, Ticket};
-use super::general::{Own, Running, Shared};
+use super::general::{Clock, END, Running, STEP, Stepping, WHOLE};
 use super::step::{Moving, Rubbing};
 use super::stroboscopic::Strobe;
+use super::ticket::{Progress, Reached, Ticket};
 use crate::lanes::sine::{Coarse, Degree, Fine};
 use crate::lanes::{Lane, MAX_WIDTH};
 use crate::model::Equation;
 use crate::model::pendulum::Route;
-use crate::model::rest::Standstill;
+use crate::model::rest::{Release, release};
 
 /// How much further than its first acceleration takes it a velocity may go within a step.
 const REACH: f64 = 1.25;
@@ -100,11 +100,12 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 continue;
             }
             let half_turns = block.half_turns[lane];
-            let held = match self.single.standstill(0.0, half_turns * PI) {
-                Standstill::Held { until, sense } => Held { lane, half_turns, until, sense },
-                // Let go at once.
-                Standstill::Moves(sense) => Held { lane, half_turns, until: 0.0, sense },
+            let (until, sense) = match release(&self.single, 0.0, half_turns * PI, self.length) {
+                Release::Now(sense) => (0.0, sense),
+                Release::At(time, sense) => (time, sense),
+                Release::Later | Release::Never => (f64::INFINITY, 1.0),
             };
+            let held = Held { lane, half_turns, until, sense };
             if held.until > 0.0 {
                 block.held_at[lane] = half_turns;
             }
@@ -170,7 +171,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let token = self.tokens.1;
         let scale = self.strobe.schedule.kick;
         let one = Q::splat(token, 1.0);
-        let clock = Shared { forcing: &table.steps()[k], length: Q::splat(token, table.length) };
+        let clock = Clock::Shared(&table.steps()[k], Q::splat(token, table.length));
         let mut at = 0;
         while at < block.kick.len() {
             let half_turns = Q::load(token, &block.half_turns[at..]);
@@ -179,7 +180,8 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
             let mut lanes =
                 Running { theta: half_turns.scale(PI), velocity: kick.scale(1.0 / scale) };
             let before = lanes.velocity * sense;
-            let first = lanes.step(&self.equation, &clock, sense);
+            let mut ends = [sense; 2];
+            self.carry(STEP, clock, sense, &mut lanes, &mut ends);
             let after = Moving {
                 half_turns: lanes.theta.scale(FRAC_1_PI),
                 kick: lanes.velocity.scale(scale),
@@ -189,21 +191,35 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
             if self.strobe.events {
                 // The end's acceleration costs a stage: it is asked for only where the begin's is against
                 // the motion and strong enough to stop it within the step.
-                let b0 = first * sense;
+                let b0 = ends[0] * sense;
                 let reach = b0.scale_add(REACH * table.length, before);
                 let passed = (lanes.velocity * sense).signs();
                 let moving = !(before - before.like(f64::MIN_POSITIVE)).signs();
                 let flags = moving & (passed | (b0.signs() & reach.signs()));
                 if flags != 0 {
-                    let last = lanes.acceleration(&self.equation, &clock, sense);
+                    self.carry(END, clock, sense, &mut lanes, &mut ends);
                     let gain = scale * table.length;
-                    let ends = [first.scale(gain), last.scale(gain)];
+                    let ends = [ends[0].scale(gain), ends[1].scale(gain)];
                     let before = Moving { half_turns, kick };
                     self.flagged(block, at, flags, [before, after], ends, time);
                 }
             }
             at += Q::WIDTH;
         }
+    }
+
+    /// A part of a step of the general method.
+    #[inline(always)]
+    fn carry(
+        &self,
+        part: Range<usize>,
+        clock: Clock<'_, Q>,
+        sense: Q,
+        state: &mut Running<Q>,
+        ends: &mut [Q; 2],
+    ) {
+        let equation = &self.equation;
+        Q::apart(self.tokens.1, Stepping { equation, clock, sense, part, state, ends });
     }
 
     #[inline(always)]
@@ -262,14 +278,13 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                     velocity: Q::load(token, &asked[1]),
                 };
                 let sense = Q::load(token, &asked[2]);
-                let clock =
-                    Own { begin: Q::load(token, &asked[3]), length: Q::load(token, &asked[4]) };
-                let begin = lanes.step(&self.equation, &clock, sense);
-                let end = lanes.acceleration(&self.equation, &clock, sense);
+                let clock = Clock::Own(Q::load(token, &asked[3]), Q::load(token, &asked[4]));
+                let mut ends = [sense; 2];
+                self.carry(WHOLE, clock, sense, &mut lanes, &mut ends);
                 lanes.theta.store(&mut asked[0]);
                 lanes.velocity.store(&mut asked[1]);
-                begin.store(&mut asked[2]);
-                end.store(&mut asked[3]);
+                ends[0].store(&mut asked[2]);
+                ends[1].store(&mut asked[3]);
                 self.answer(block, first, count);
                 first += count;
             }

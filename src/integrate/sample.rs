@@ -1,7 +1,8 @@
 //! A trajectory at chosen times.
 
 use super::course::Course;
-use super::flight::{Event, Flight, Piece};
+use super::event::Event;
+use super::flight::{Flight, Piece};
 use super::tangent::Number;
 
 /// States at chosen times, and what happened in between.

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::course::Course;
-use super::flight::Event;
+use super::event::Event;
 use super::sample::{Sampled, sample};
 use super::stroboscopic::State;
 use super::tangent::Tangent;

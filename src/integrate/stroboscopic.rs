@@ -36,7 +36,8 @@ pub struct Strobe {
     pub events: bool,
     /// Whether friction can hold the pendulum fast.
     pub friction: bool,
-    /// Whether torques of angle and time act besides gravity and the constant one.
+    /// Whether something of angle and time acts besides gravity, the constant torque and Coulomb
+    /// friction.
     pub extra: bool,
     /// The drive at the stages of the general method; empty on other routes.
     pub timetable: Timetable,
@@ -61,7 +62,7 @@ impl Strobe {
             route,
             events: pendulum.has_events(),
             friction: pendulum.has_friction(),
-            extra: pendulum.has_extra_torque(),
+            extra: pendulum.has_extra_load(),
             timetable: Timetable::new(pendulum, general),
             equation: pendulum.equation(),
         }

@@ -128,6 +128,12 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     }
 
     #[inline(always)]
+    fn wrapped(mut self) -> Self {
+        self.value = self.value.wrapped();
+        self
+    }
+
+    #[inline(always)]
     fn exponential(mut self) -> Self {
         self.value = self.value.exponential();
         for slope in &mut self.slope {

@@ -1,11 +1,13 @@
 //! One trajectory, sampled at equal times.
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accuracy::{PERIODS, TOLERANCES};
 use super::course::{Course, FINEST};
-use super::flight::{Event, Flight};
+use super::event::Event;
+use super::flight::Flight;
 use super::sample::{Sampled, sample};
 use super::stroboscopic::State;
 use super::tangent::{Number, Tangent};
@@ -18,6 +20,8 @@ const FIRST_TRY: f64 = 0.1;
 const TIGHTENING: f64 = 16.0;
 /// Errors below this may be those of rounding, amplified by the motion.
 const ROUNDING: f64 = 1e-7;
+/// Angles beyond this are taken a number of whole turns nearer.
+const FAR: f64 = 100.0;
 /// Batches whose spread gives the standard error of an exponent.
 const BATCHES: usize = 20;
 /// The part of a trajectory that turns the tangent into the direction of growth.
@@ -75,6 +79,23 @@ pub fn simulate(
     cancel: &AtomicBool,
 ) -> Result<Trajectory, Error> {
     check(request)?;
+    // Far from 0 the angle's last place would be all that steps can resolve: whole turns wait outside.
+    let far = request.start[0].abs() > FAR && pendulum.check_mappable().is_ok();
+    let turns = if far { TAU * (request.start[0] / TAU).round() } else { 0.0 };
+    let start = [request.start[0] - turns, request.start[1]];
+    let mut trajectory = from(pendulum, &Request { start, ..*request }, cancel)?;
+    if far {
+        for theta in &mut trajectory.theta {
+            *theta += turns;
+        }
+        for event in &mut trajectory.events {
+            event.theta += turns;
+        }
+    }
+    Ok(trajectory)
+}
+
+fn from(pendulum: &Pendulum, request: &Request, cancel: &AtomicBool) -> Result<Trajectory, Error> {
     let (tolerance, reached_error) = choose(pendulum, request, cancel)?;
     let interval = pendulum.period() / request.samples as f64;
     let time = times(request.until, interval);

@@ -13,6 +13,8 @@ use super::tangent::Number;
 const DEGREE: usize = 7;
 /// What rounding may add to a coefficient, over the sum of the polynomial's coefficients.
 const ROUNDING: f64 = 1e-15;
+/// A velocity so much smaller than those of the step is zero: a contact, if not a passage.
+const CLOSE: f64 = 1e-12;
 const MOST_HALVINGS: i32 = 50;
 /// Newton's steps; two are common.
 const MOST_STEPS: usize = 8;
@@ -36,16 +38,26 @@ const CHOOSE: [[f64; DEGREE + 1]; DEGREE + 1] = {
 /// A polynomial over `[0, 1]` by its Bernstein coefficients.
 type Bernstein = [f64; DEGREE + 1];
 
-/// The step that ends where the velocity of `leap` first passes zero, if it does: located by
-/// integrating again from the step's start. The velocity there is 0 to rounding and not yet reset.
-pub fn first<N: Number>(course: &Course<N>, leap: &mut Leap<N>) -> Option<Leap<N>> {
+/// What the velocity does within a step.
+#[derive(Debug)]
+pub enum Turning<N> {
+    /// It keeps its sense.
+    None,
+    /// It passes zero at the end of this shorter step, where it is 0 to rounding and not yet reset.
+    At(Box<Leap<N>>),
+    /// The curve has a zero that the motion has not: the step is too long for its curve.
+    Unclear,
+}
+
+/// The first zero of the velocity of `leap`, located by integrating again from the step's start.
+pub fn first<N: Number>(course: &Course<N>, leap: &mut Leap<N>) -> Turning<N> {
     if leap.surely_keeps_sense() {
-        return None;
+        return Turning::None;
     }
-    let curve = leap.curve(course);
-    let part = first_below_zero(&forward(&curve, leap.sense))?;
-    let (start, first, sense) = (leap.start, leap.first(), leap.sense);
-    let shortened = |length: f64| Leap::new(course, leap.tau, start, first, sense, length);
+    let curve = forward(&leap.curve(course), leap.sense);
+    let Some(part) = first_below_zero(&curve) else { return Turning::None };
+    let shortened =
+        |length: f64| Leap::new(course, leap.tau, leap.start, leap.first(), leap.sense, length);
     let mut length = part * leap.length;
     let mut best = shortened(length);
     for _ in 0..MOST_STEPS {
@@ -60,9 +72,12 @@ pub fn first<N: Number>(course: &Course<N>, leap: &mut Leap<N>) -> Option<Leap<N
         }
         (best, length) = (trial, next);
     }
-    // A zero of the curve that the motion does not have is within the error of the step.
-    let allowed = 10.0 * course.tolerance().max(ROUNDING);
-    (best.end[1].value().abs() <= allowed).then_some(best)
+    let size: f64 = curve.iter().map(|c| c.abs()).sum();
+    if best.end[1].value().abs() <= CLOSE * size {
+        Turning::At(Box::new(best))
+    } else {
+        Turning::Unclear
+    }
 }
 
 /// The velocity in the sense of the motion.

@@ -20,6 +20,10 @@ pub trait Isa: Simd {
     fn multiply_add(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s;
     /// Moves the lowest bit of each number to its sign and clears the others.
     fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s;
+    /// Moves the lowest 12 bits of each number to its sign and exponent and clears the others.
+    fn lowest_bits_to_exponent(self, bits: Self::u64s) -> Self::u64s;
+    /// The inverse.
+    fn exponent_to_lowest_bits(self, bits: Self::u64s) -> Self::u64s;
     /// A bit for each number whose sign bit is set, the first one's lowest.
     fn sign_bits(self, values: Self::f64s) -> u8;
 }
@@ -37,6 +41,14 @@ impl Isa for Scalar {
     #[inline(always)]
     fn lowest_bit_to_sign(self, bits: u64) -> u64 {
         bits << 63
+    }
+    #[inline(always)]
+    fn lowest_bits_to_exponent(self, bits: u64) -> u64 {
+        bits << 52
+    }
+    #[inline(always)]
+    fn exponent_to_lowest_bits(self, bits: u64) -> u64 {
+        bits >> 52
     }
     #[inline(always)]
     fn sign_bits(self, value: f64) -> u8 {
@@ -65,6 +77,14 @@ mod x86 {
             cast(self.sse2._mm_slli_epi64::<63>(cast(bits)))
         }
         #[inline(always)]
+        fn lowest_bits_to_exponent(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.sse2._mm_slli_epi64::<52>(cast(bits)))
+        }
+        #[inline(always)]
+        fn exponent_to_lowest_bits(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.sse2._mm_srli_epi64::<52>(cast(bits)))
+        }
+        #[inline(always)]
         fn sign_bits(self, values: Self::f64s) -> u8 {
             self.sse2._mm_movemask_pd(cast(values)) as u8
         }
@@ -85,6 +105,14 @@ mod x86 {
             cast(self.avx2._mm256_slli_epi64::<63>(cast(bits)))
         }
         #[inline(always)]
+        fn lowest_bits_to_exponent(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.avx2._mm256_slli_epi64::<52>(cast(bits)))
+        }
+        #[inline(always)]
+        fn exponent_to_lowest_bits(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.avx2._mm256_srli_epi64::<52>(cast(bits)))
+        }
+        #[inline(always)]
         fn sign_bits(self, values: Self::f64s) -> u8 {
             self.avx._mm256_movemask_pd(cast(values)) as u8
         }
@@ -103,6 +131,14 @@ mod x86 {
         #[inline(always)]
         fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
             cast(self.avx512f._mm512_slli_epi64::<63>(cast(bits)))
+        }
+        #[inline(always)]
+        fn lowest_bits_to_exponent(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.avx512f._mm512_slli_epi64::<52>(cast(bits)))
+        }
+        #[inline(always)]
+        fn exponent_to_lowest_bits(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.avx512f._mm512_srli_epi64::<52>(cast(bits)))
         }
         #[inline(always)]
         fn sign_bits(self, values: Self::f64s) -> u8 {

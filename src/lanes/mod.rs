@@ -15,7 +15,7 @@ pub mod sine;
 
 pub use dispatch::{Job, Path};
 pub use isa::Isa;
-pub use real::{Lane, Real};
+pub use real::{Lane, Real, Work};
 
 /// No bundle is wider than this.
 pub const MAX_WIDTH: usize = 96;

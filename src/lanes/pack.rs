@@ -2,9 +2,11 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use pulp::{Simd, WithSimd};
+
 use super::elementary;
 use super::isa::Isa;
-use super::real::{EXPONENT_BITS, INTEGER_BITS, INTEGER_OFFSET, Lane, ROOT_BITS, Real};
+use super::real::{EXPONENT_BITS, INTEGER_BITS, INTEGER_OFFSET, Lane, ROOT_BITS, Real, Work};
 use super::sine::{self, Degree};
 
 /// One vector register of the instruction set `S`.
@@ -32,6 +34,16 @@ impl<S: Isa> Pack<S> {
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         Self::new(self.isa, self.isa.multiply_add(self.value, a.value, b.value))
+    }
+}
+
+struct Apart<W>(W);
+
+impl<W: Work> WithSimd for Apart<W> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<T: Simd>(self, _: T) {
+        self.0.run();
     }
 }
 
@@ -108,6 +120,11 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
     }
 
     #[inline(always)]
+    fn wrapped(self) -> Self {
+        sine::wrap(self).0
+    }
+
+    #[inline(always)]
     fn exponential(self) -> Self {
         elementary::exponential(self)
     }
@@ -135,6 +152,11 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
     type Token = S;
     const WIDTH: usize = N * S::F64_LANES;
     const FUSED: bool = S::FUSED;
+
+    #[inline(always)]
+    fn apart<W: Work>(isa: S, work: W) {
+        isa.vectorize(Apart(work));
+    }
 
     #[inline(always)]
     fn splat(isa: S, value: f64) -> Self {
@@ -209,9 +231,7 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
     fn add_to_exponent(mut self, count: Self) -> Self {
         for (a, c) in self.0.iter_mut().zip(&count.0) {
             let isa = a.isa;
-            let mask = isa.splat_u64s(EXPONENT_BITS);
-            let shifted = isa.rotate_right_u64s(isa.transmute_u64s_f64s(c.value), 12);
-            let shifted = isa.and_u64s(shifted, mask);
+            let shifted = isa.lowest_bits_to_exponent(isa.transmute_u64s_f64s(c.value));
             let bits = isa.add_u64s(isa.transmute_u64s_f64s(a.value), shifted);
             a.value = isa.transmute_f64s_u64s(bits);
         }
@@ -229,7 +249,7 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
             let one = isa.splat_u64s(1023 << 52);
             let bits = isa.add_u64s(isa.sub_u64s(bits, part), one);
             mantissa.0[i].value = isa.transmute_f64s_u64s(bits);
-            let integer = isa.rotate_left_u64s(part, 12);
+            let integer = isa.exponent_to_lowest_bits(part);
             let integer = isa.or_u64s(integer, isa.splat_u64s(INTEGER_BITS));
             let offset = isa.splat_f64s(INTEGER_OFFSET);
             exponent.0[i].value = isa.sub_f64s(isa.transmute_f64s_u64s(integer), offset);

@@ -36,6 +36,9 @@ pub trait Real:
     /// `cos(pi self)`, to the precision of `D`: the angle is in half turns.
     #[must_use]
     fn cosine<D: Degree>(self) -> Self;
+    /// An angle in half turns less its whole turns, in [-1, 1].
+    #[must_use]
+    fn wrapped(self) -> Self;
     /// `exp self`, held to the range of normal numbers.
     #[must_use]
     fn exponential(self) -> Self;
@@ -47,6 +50,12 @@ pub trait Real:
     fn magnitude(self) -> Self;
 }
 
+/// Work of several places that is compiled once, apart from all of them.
+pub trait Work {
+    /// The work; mark the implementation `#[inline(always)]`, and all that it calls.
+    fn run(self);
+}
+
 /// A [`Real`] without derivatives: it can be stored, compared and reduced modulo a turn.
 pub trait Lane: Real {
     /// What an instruction set needs to make a value; a marker without size.
@@ -56,6 +65,8 @@ pub trait Lane: Real {
     /// Whether [`Lane::mul_add`] rounds once.
     const FUSED: bool;
 
+    /// Does `work` in a function of its own, compiled for the instruction set of these lanes.
+    fn apart<W: Work>(token: Self::Token, work: W);
     /// The same constant in every lane.
     fn splat(token: Self::Token, value: f64) -> Self;
     /// The first [`Lane::WIDTH`] values of `source`.
@@ -121,6 +132,10 @@ macro_rules! scalar_lane {
                 sine::cosine::<D, Self>(self)
             }
             #[inline(always)]
+            fn wrapped(self) -> Self {
+                sine::wrap(self).0
+            }
+            #[inline(always)]
             fn exponential(self) -> Self {
                 elementary::exponential(self)
             }
@@ -143,6 +158,11 @@ macro_rules! scalar_lane {
             const WIDTH: usize = 1;
             const FUSED: bool = $fused;
 
+            #[inline(always)]
+            fn apart<W: Work>((): (), work: W) {
+                // One number knows no instruction set: only within its caller it is the caller's.
+                work.run();
+            }
             #[inline(always)]
             fn splat((): (), value: f64) -> Self {
                 $make(value)

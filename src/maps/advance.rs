@@ -14,8 +14,8 @@ const STRETCH: usize = 64;
 /// Advances every start by `periods` forcing periods, in place; the net turns come back.
 ///
 /// # Errors
-/// [`Error::Lengths`] if the slices differ in length, [`Error::Interrupted`] after
-/// [`Control::cancel`].
+/// [`Error::Lengths`] if the slices differ in length, [`Error::NotMappable`] for effects that a map
+/// cannot have, [`Error::Interrupted`] after [`Control::cancel`].
 pub fn advance(
     strobe: &Strobe,
     theta: &mut [f64],
@@ -28,6 +28,7 @@ pub fn advance(
         let given = (theta.len(), velocity.len());
         return Err(Error::Lengths { given, names: ("theta", "velocity") });
     }
+    strobe.pendulum.check_mappable()?;
     control.begin(theta.len());
     let first = theta.to_vec();
     let mut turns = vec![0.0; theta.len()];

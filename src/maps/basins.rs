@@ -135,6 +135,7 @@ impl BasinMap {
 /// The basins of attraction of `pendulum` over `starts`.
 ///
 /// # Errors
+/// [`Error::NotMappable`] for effects that a map cannot have,
 /// [`Error::Range`] and [`Error::Tolerance`] for requests that cannot be met,
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn basins(
@@ -143,6 +144,7 @@ pub fn basins(
     options: &Options,
     control: &Control,
 ) -> Result<BasinMap, Error> {
+    pendulum.check_mappable()?;
     let path = Path::choose()?;
     if starts.is_empty() {
         return Err(Error::Range { name: "starts", value: 0.0, allowed: "1 or more" });
@@ -220,7 +222,10 @@ fn to_capture(
 ) -> Result<(Labels, u32), Error> {
     let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
     let bound = |catalogue: &Catalogue| {
-        if catalogue.has_chaos() && options.max_periods.is_none() {
+        if catalogue.has_chaos() && catalogue.longest_settle == 0 && options.max_periods.is_none() {
+            // Several chaotic sets and nothing else: no settling to measure patience by.
+            SEARCH_BOUND
+        } else if catalogue.has_chaos() && options.max_periods.is_none() {
             (PATIENCE * catalogue.longest_settle).clamp(LEAST_BOUND, max_periods)
         } else {
             max_periods

@@ -88,10 +88,7 @@ impl<R: Real> Equation<R> {
         let (mut torques, mut frictions) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         for effect in &pendulum.effects {
-            let mut parameters = [zero; MOST_PARAMETERS];
-            for (slot, value) in effect.values().iter().enumerate() {
-                parameters[slot] = next(*value);
-            }
+            let parameters = effect.lift(&mut next);
             match effect.kind.definition().action {
                 Action::Position | Action::Velocity | Action::Kinked => {
                     torques.push((effect.kind, parameters));
@@ -99,7 +96,8 @@ impl<R: Real> Equation<R> {
                 Action::Friction | Action::SlidingFriction => {
                     frictions.push((effect.kind, parameters));
                 }
-                Action::Drive => {
+                Action::Drive => effect.kind.drive(&parameters, &mut motion),
+                Action::FurtherDrive => {
                     effect.kind.drive(&parameters, &mut motion);
                     (sideways, plain) = (true, false);
                 }
@@ -169,7 +167,7 @@ impl<R: Real> Equation<R> {
     /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at
     /// rest, against a constant friction.
     #[must_use]
-    pub fn has_closed_release(&self) -> bool {
+    pub fn is_plain(&self) -> bool {
         self.plain && !self.sideways && self.torques.is_empty() && self.frictions.is_empty()
     }
 

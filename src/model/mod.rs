@@ -3,6 +3,7 @@
 pub mod drive;
 pub mod effects;
 pub mod equation;
+pub mod observation;
 pub mod pendulum;
 pub mod recorded;
 pub mod rest;
@@ -11,5 +12,6 @@ mod spline;
 pub use drive::HarmonicDrive;
 pub use effects::{Effect, Kind};
 pub use equation::Equation;
+pub use observation::Observation;
 pub use pendulum::Pendulum;
 pub use recorded::Recorded;

@@ -36,6 +36,9 @@ pub enum Route {
 }
 
 impl Pendulum {
+    /// How many parameters it has besides those of its effects.
+    pub const OWN_PARAMETERS: usize = 6;
+
     /// Without friction and effects. Checks the ranges: all finite, gamma not negative, omega
     /// positive.
     ///
@@ -105,7 +108,7 @@ impl Pendulum {
     /// them.
     #[must_use]
     pub fn parameters(&self) -> Vec<(String, f64)> {
-        let own = [
+        let own: [_; Self::OWN_PARAMETERS] = [
             ("gamma", self.gamma),
             ("theta_r", self.theta_r),
             ("torque", self.torque),
@@ -202,10 +205,25 @@ impl Pendulum {
         self.has_friction() || self.effects.iter().any(|e| e.is(&[Action::Kinked]))
     }
 
-    /// Whether a torque of angle and time acts besides gravity and the constant torque.
+    /// Whether something of angle and time acts besides gravity, the constant torque and Coulomb
+    /// friction.
     #[must_use]
-    pub fn has_extra_torque(&self) -> bool {
-        self.motion().lateral != 0.0 || self.effects.iter().any(|e| e.is(&[Action::Position]))
+    pub fn has_extra_load(&self) -> bool {
+        let position = |e: &Effect| e.is(&[Action::Position, Action::Friction]);
+        self.motion().lateral != 0.0 || self.effects.iter().any(position)
+    }
+
+    /// Whether a map over initial conditions can have all its effects.
+    ///
+    /// # Errors
+    /// [`Error::NotMappable`] for the first that it cannot have.
+    pub fn check_mappable(&self) -> Result<(), Error> {
+        for effect in &self.effects {
+            if let Some(why) = effect.kind.bars_maps(&effect.parameters) {
+                return Err(Error::NotMappable { effect: effect.kind.definition().name, why });
+            }
+        }
+        Ok(())
     }
 
     /// Whether an effect changes with the time in the laboratory.

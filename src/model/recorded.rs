@@ -98,6 +98,13 @@ impl Recorded {
         [self.times[0], self.times[self.times.len() - 1]]
     }
 
+    /// The greatest acceleration at a sample, in either component.
+    #[must_use]
+    pub fn greatest(&self) -> f64 {
+        let all = self.times.iter().flat_map(|time| self.acceleration(*time));
+        all.fold(0.0, |most, a| a.abs().max(most))
+    }
+
     /// The mean time between samples.
     #[must_use]
     pub fn spacing(&self) -> f64 {

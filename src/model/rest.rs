@@ -1,137 +1,230 @@
-//! The pendulum at rest under friction: what holds it, and when it is let go.
+//! The pendulum at rest under friction: whether it lasts, and when it ends.
 //!
-//! Stuck now: `|load| <= friction` at `th' = 0`. Under the plain drive the load is
-//! `torque - (1 + p cos(omega tau + phase)) sin th`, and the release comes from the arc cosine;
-//! otherwise the load is followed over one period.
+//! Stuck now: `|load| <= friction` at `th' = 0`. Under the harmonic drive, with `S = sin th`, the
+//! excess of the load in the sense `s` is `s (torque - S) - s S p cos(omega tau + phase) - theta_r`, so
+//! the release has a closed form. Otherwise the excess is sampled, and looked at closely wherever it
+//! has a maximum.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-use super::equation::Equation;
+use super::equation::{Equation, Forcing};
 
-/// Samples of one period where there is no closed form.
-const SAMPLES: usize = 256;
-const BISECTIONS: usize = 64;
+/// An excess that does not pass this part of the friction counts as none: it opens a window of time
+/// so short that what moves in it, about the square of the excess, is lost in the last place of the
+/// angle.
+const EDGE: f64 = 1e-10;
+/// Samples of the excess in a period.
+const SAMPLES: usize = 96;
+/// Halvings of a bracket: its width falls below the last place of the time.
+const HALVINGS: usize = 60;
+/// Steps of the golden section.
+const SECTIONS: usize = 45;
 
-/// What becomes of a pendulum whose velocity is zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Standstill {
-    /// The load exceeds the friction: it moves on, in the sense 1 or -1.
-    Moves(f64),
-    /// It is held, until it moves in the sense 1 or -1.
-    Held {
-        /// Time of the release; infinite if it does not come within one period of the drive.
-        until: f64,
-        /// Sense of the motion after it.
-        sense: f64,
-    },
+/// What loads a pendulum at rest.
+pub trait Load {
+    /// The load at rest, and what it must exceed to move the pendulum.
+    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2];
+    /// By how much the load at rest exceeds what holds the pendulum against moving in the sense
+    /// `sense`; it stays at rest while this is not positive for either sense.
+    fn excess_toward(&self, tau: f64, theta: f64, sense: f64) -> f64 {
+        let [load, hold] = self.load_and_hold(tau, theta);
+        sense * load - hold
+    }
+    /// The equation, for the closed form.
+    fn equation(&self) -> &Equation<f64>;
+    /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at
+    /// rest, against a constant friction.
+    fn has_closed_release(&self) -> bool;
+    /// The time after which the load repeats; `None` if it does not.
+    fn period(&self) -> Option<f64>;
+    /// The time scale on which it changes.
+    fn time_scale(&self) -> f64;
+}
+
+impl Load for Equation<f64> {
+    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
+        let forcing = self.forcing(tau);
+        let at = self.point(&forcing, theta, 0.0, 1.0);
+        // A friction that its law makes negative holds nothing.
+        [self.load(&forcing, &at), self.friction(&at).max(0.0)]
+    }
+    fn equation(&self) -> &Equation<f64> {
+        self
+    }
+    fn has_closed_release(&self) -> bool {
+        self.is_plain()
+    }
+    fn period(&self) -> Option<f64> {
+        (!self.ages).then(|| self.time_scale())
+    }
+    fn time_scale(&self) -> f64 {
+        if self.is_autonomous() { TAU } else { TAU / self.motion.omega }
+    }
 }
 
 impl Equation<f64> {
-    /// The load at rest, and the friction that it must exceed.
-    #[must_use]
-    pub fn load_at_rest(&self, tau: f64, theta: f64) -> (f64, f64) {
-        let forcing = self.forcing(tau);
-        let at = self.point(&forcing, theta, 0.0, 1.0);
-        (self.load(&forcing, &at), self.friction(&at).max(0.0))
-    }
-
-    /// What becomes of the pendulum at rest at `theta` at time `tau`.
-    #[must_use]
-    pub fn standstill(&self, tau: f64, theta: f64) -> Standstill {
-        let (load, limit) = self.load_at_rest(tau, theta);
-        if load.abs() > limit {
-            return Standstill::Moves(1_f64.copysign(load));
-        }
-        let (until, sense) = self.release(tau, theta).unwrap_or((f64::INFINITY, 1.0));
-        Standstill::Held { until, sense }
-    }
-
     /// Whether the pendulum at rest at `theta` is never let go.
     #[must_use]
     pub fn holds_for_ever(&self, theta: f64) -> bool {
         self.excess(theta) <= 0.0
     }
 
+    /// What a load must exceed to move the pendulum from `theta`, at `tau = 0`.
+    #[must_use]
+    pub fn hold(&self, theta: f64) -> f64 {
+        let forcing = self.forcing(0.0);
+        self.friction(&self.point(&forcing, theta, 0.0, 1.0)).max(0.0)
+    }
+
     /// By how much the load at rest at `theta` exceeds the friction at its greatest, over the drive's
     /// period; negative where it never does.
     #[must_use]
     pub fn excess(&self, theta: f64) -> f64 {
-        let (load, limit) = self.load_at_rest(0.0, theta);
-        if self.has_closed_release() {
+        if self.is_plain() {
             // The load is linear in the cosine.
             let sine = theta.sin();
             let at = |c: f64| (self.torque - (1.0 + self.motion.p * c) * sine).abs();
-            return at(1.0).max(at(-1.0)) - limit;
+            return at(1.0).max(at(-1.0)) - self.theta_r;
         }
-        let period = TAU / self.motion.omega;
-        let over = |k: usize| {
-            let (load, limit) = self.load_at_rest(period * k as f64 / SAMPLES as f64, theta);
-            load.abs() - limit
-        };
-        (0..SAMPLES).map(over).fold(load.abs() - limit, f64::max)
+        let interval = self.time_scale() / SAMPLES as f64;
+        let at = |k: usize| greatest(self, interval * k as f64, theta).0;
+        (0..SAMPLES).map(at).fold(f64::NEG_INFINITY, f64::max)
     }
+}
 
-    /// The first time after `tau`, and within one period, at which the load begins to exceed the
-    /// friction, and its sense.
-    #[must_use]
-    pub fn release(&self, tau: f64, theta: f64) -> Option<(f64, f64)> {
-        if self.has_closed_release() {
-            self.closed_release(tau, theta)
+/// When a pendulum at rest moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Release {
+    /// At once, in this sense.
+    Now(f64),
+    /// At that time, in that sense.
+    At(f64, f64),
+    /// Not before the time asked for.
+    Later,
+    /// Never.
+    Never,
+}
+
+/// When a pendulum that is at rest at `theta` at time `tau` moves; looked for until `until` where
+/// the equation does not repeat.
+pub fn release<L: Load>(load: &L, tau: f64, theta: f64, until: f64) -> Release {
+    let [forth, back] = excesses(load, tau, theta);
+    // The load cancels in their sum.
+    let edge = EDGE * (-0.5 * (forth + back)).max(0.0);
+    if forth.max(back) > edge {
+        return Release::Now(if forth >= back { 1.0 } else { -1.0 });
+    }
+    if load.has_closed_release() {
+        return closed(load, tau, theta, edge);
+    }
+    let end = load.period().map_or(until, |period| tau + 1.1 * period);
+    match sampled(load, tau, theta, end, edge) {
+        Some((time, sense)) => Release::At(time, sense),
+        None if load.period().is_some() => Release::Never,
+        None => Release::Later,
+    }
+}
+
+/// The excess in the sense 1 and in the sense -1.
+fn excesses<L: Load>(load: &L, tau: f64, theta: f64) -> [f64; 2] {
+    let [load, hold] = load.load_and_hold(tau, theta);
+    [load - hold, -load - hold]
+}
+
+/// The greater excess of both senses, and its sense.
+fn greatest<L: Load>(load: &L, tau: f64, theta: f64) -> (f64, f64) {
+    let [forth, back] = excesses(load, tau, theta);
+    if forth >= back { (forth, 1.0) } else { (back, -1.0) }
+}
+
+/// The closed form: the excess in the sense `s` is `swing cos(angle) - limit`, where `swing >= 0`.
+fn closed<L: Load>(load: &L, tau: f64, theta: f64, edge: f64) -> Release {
+    let equation = load.equation();
+    let motion = &equation.motion;
+    let still = Forcing { vertical: 1.0, lateral: 0.0, lab: 0.0 };
+    let at = equation.point(&still, theta, 0.0, 1.0);
+    let (constant, swing) = (equation.load(&still, &at), -at.sine * motion.p);
+    let mut first = None::<(f64, f64)>;
+    for sense in [1.0, -1.0] {
+        let limit = equation.friction(&at) - sense * constant;
+        let size = swing.abs();
+        if size - limit <= edge {
+            continue;
+        }
+        // Where it is positive lies within `half` on either side of the phase 0.
+        let half = (limit / size).clamp(-1.0, 1.0).acos();
+        let turn = if sense * swing < 0.0 { PI } else { 0.0 };
+        let mut wait = (-half - (motion.omega * tau + motion.phase + turn)).rem_euclid(TAU);
+        if wait > TAU - half {
+            // At the entry, up to rounding, or within the edge behind it.
+            wait = 0.0;
+        }
+        let time = tau + wait / motion.omega;
+        if first.is_none_or(|(earlier, _)| time < earlier) {
+            first = Some((time, sense));
+        }
+    }
+    first.map_or(Release::Never, |(time, sense)| Release::At(time, sense))
+}
+
+/// The first time up to `end` at which the excess becomes positive, and the sense.
+fn sampled<L: Load>(load: &L, tau: f64, theta: f64, end: f64, edge: f64) -> Option<(f64, f64)> {
+    let interval = load.time_scale() / SAMPLES as f64;
+    let count = ((end - tau) / interval).ceil().max(1.0) as usize;
+    let time = |k: usize| tau + (k as f64 * interval).min(end - tau);
+    // The last two samples.
+    let mut before = [f64::NEG_INFINITY, greatest(load, tau, theta).0];
+    for k in 1..=count {
+        let now = greatest(load, time(k), theta).0;
+        let mut positive = (now > edge).then(|| time(k));
+        if before[1] > before[0] && before[1] >= now {
+            // A maximum lies about the sample before: it may be positive on its own.
+            let (peak, height) = highest(load, theta, time(k.saturating_sub(2)), time(k));
+            if height > edge {
+                positive = Some(peak);
+            }
+        }
+        if let Some(inside) = positive {
+            let sense = greatest(load, inside, theta).1;
+            return Some((entry(load, theta, time(k.saturating_sub(2)), inside, sense), sense));
+        }
+        before = [before[1], now];
+    }
+    None
+}
+
+/// The greatest excess between two times, by the golden section.
+fn highest<L: Load>(load: &L, theta: f64, from: f64, to: f64) -> (f64, f64) {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let value = |tau: f64| greatest(load, tau, theta).0;
+    let (mut low, mut high) = (from, to);
+    let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+    let mut values = inner.map(value);
+    for _ in 0..SECTIONS {
+        if values[0] > values[1] {
+            high = inner[1];
+            inner = [high - GOLDEN * (high - low), inner[0]];
+            values = [value(inner[0]), values[0]];
         } else {
-            self.searched_release(tau, theta)
+            low = inner[0];
+            inner = [inner[1], low + GOLDEN * (high - low)];
+            values = [values[1], value(inner[1])];
         }
     }
+    if values[0] > values[1] { (inner[0], values[0]) } else { (inner[1], values[1]) }
+}
 
-    /// `torque - (1 + p cos) sin th = +-limit`, where the load grows in magnitude.
-    fn closed_release(&self, tau: f64, theta: f64) -> Option<(f64, f64)> {
-        let (_, limit) = self.load_at_rest(tau, theta);
-        let (sine, motion) = (theta.sin(), &self.motion);
-        let pull = motion.p * sine;
-        if pull == 0.0 {
-            return None;
+/// Where the excess in the sense `sense` becomes positive, between a time at which it is not and one
+/// at which it is.
+fn entry<L: Load>(load: &L, theta: f64, from: f64, to: f64, sense: f64) -> f64 {
+    let (mut low, mut high) = (from, to);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if load.excess_toward(middle, theta, sense) > 0.0 {
+            high = middle;
+        } else {
+            low = middle;
         }
-        let candidate = |sense: f64| {
-            let cosine = ((self.torque - sense * limit) / sine - 1.0) / motion.p;
-            if cosine.abs() >= 1.0 || cosine.is_nan() {
-                return None;
-            }
-            let angle = cosine.acos().copysign(sense * pull);
-            let first = (angle - motion.phase) / motion.omega;
-            let period = TAU / motion.omega;
-            let later = first + period * ((tau - first) / period).ceil();
-            Some((if later < tau { later + period } else { later }, sense))
-        };
-        [candidate(1.0), candidate(-1.0)].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))
     }
-
-    fn searched_release(&self, tau: f64, theta: f64) -> Option<(f64, f64)> {
-        if self.is_autonomous() && !self.ages {
-            return None;
-        }
-        let step = TAU / self.motion.omega / SAMPLES as f64;
-        let over = |at: f64| {
-            let (load, limit) = self.load_at_rest(at, theta);
-            load.abs() - limit
-        };
-        let mut last = [over(tau - step), over(tau)];
-        for k in 1..=SAMPLES {
-            let at = tau + step * k as f64;
-            let now = over(at);
-            // A greatest value between the samples may pass the limit for a moment.
-            let peak = last[1] > last[0] && last[1] >= now && last[1] <= 0.0;
-            let bend = 2.0 * last[1] - last[0] - now;
-            let top = at - step + 0.5 * step * (now - last[0]) / bend.max(f64::MIN_POSITIVE);
-            let end = if peak && top > tau && over(top) > 0.0 { top } else { at };
-            if over(end) > 0.0 {
-                let (mut low, mut high) = ((end - step).max(tau), end);
-                for _ in 0..BISECTIONS {
-                    let middle = 0.5 * (low + high);
-                    if over(middle) > 0.0 { high = middle } else { low = middle }
-                }
-                return Some((high, 1_f64.copysign(self.load_at_rest(high, theta).0)));
-            }
-            last = [last[1], now];
-        }
-        None
-    }
+    high
 }

@@ -50,7 +50,7 @@ impl PoincareMap {
     /// The map of `pendulum` at `tau = 0 mod T`.
     #[must_use]
     pub fn new(pendulum: &Pendulum) -> Self {
-        let plain = pendulum.route() == Route::Smooth && !pendulum.has_extra_torque();
+        let plain = pendulum.route() == Route::Smooth && !pendulum.has_extra_load();
         let way = if plain {
             let pull = pendulum.greatest_pull().sqrt();
             let steps = (pendulum.period() * pull / STEP).ceil() as usize;

@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix2;
 
 use crate::integrate::State;
-use crate::integrate::general::{Own, Running};
+use crate::integrate::general::{Clock, Running, STEP as ALL_STAGES, Stepping};
 use crate::integrate::tangent::Tangent;
+use crate::lanes::Work;
 use crate::model::pendulum::Route;
 use crate::model::{Equation, Pendulum};
 
@@ -46,15 +47,17 @@ struct Turn {
 fn carry(
     equation: &Equation<Number>,
     sense: f64,
-    state: State,
+    start: State,
     length: f64,
 ) -> (State, Matrix2<f64>) {
     let number = |value: f64, slope: [f64; 2]| Number { value, slope };
-    let mut running =
-        Running { theta: number(state[0], [1.0, 0.0]), velocity: number(state[1], [0.0, 1.0]) };
-    let clock = Own { begin: number(0.0, [0.0; 2]), length: number(length, [0.0; 2]) };
-    running.step(equation, &clock, number(sense, [0.0; 2]));
-    let Running { theta, velocity } = running;
+    let mut state =
+        Running { theta: number(start[0], [1.0, 0.0]), velocity: number(start[1], [0.0, 1.0]) };
+    let clock = Clock::Own(number(0.0, [0.0; 2]), number(length, [0.0; 2]));
+    let sense = number(sense, [0.0; 2]);
+    let (state, ends) = (&mut state, &mut [sense; 2]);
+    Stepping { equation, clock, sense, part: ALL_STAGES, state, ends }.run();
+    let Running { theta, velocity } = *state;
     let [a, b, c, d] = [theta.slope[0], theta.slope[1], velocity.slope[0], velocity.slope[1]];
     ([theta.value, velocity.value], Matrix2::new(a, b, c, d))
 }

@@ -54,6 +54,7 @@ pub fn choose_steps(
     tol: f64,
 ) -> PyResult<(usize, f64)> {
     let pendulum = pendulum(parameters)?;
+    pendulum.check_mappable()?;
     let states: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
     let (strobe, error) = accuracy::choose(&pendulum, &states, tol, Path::choose()?)?;

@@ -122,3 +122,14 @@ fn chaos_beside_other_attractors() {
         assert_eq!(outcome.fate, Fate::Open);
     }
 }
+
+#[test]
+fn mirror_twins_of_chaos_are_known_as_twins() {
+    // Below the crisis that merges them, two mirror images librate chaotically.
+    let map = basins_on_plane(&driven(0.1, 1.0, 0.87), 30);
+    let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
+    assert_eq!(names, ["libration chaos (-)", "libration chaos (+)"]);
+    assert_eq!(map.attractors[0].twin, Some(1));
+    assert_eq!(map.attractors[1].twin, Some(0));
+    assert!(map.share(0) < 0.01, "{} undecided", map.share(0));
+}

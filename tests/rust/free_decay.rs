@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use pendmap::integrate::course::Course;
-use pendmap::integrate::flight::{Event, EventKind, Flight};
+use pendmap::integrate::event::{Event, EventKind};
+use pendmap::integrate::flight::Flight;
 use pendmap::model::Pendulum;
 use serde_json::Value;
 
@@ -20,7 +21,7 @@ fn decay(gamma: f64, theta_r: f64, theta: f64) -> Vec<Event> {
     flight.events
 }
 
-/// gamma and theta_r of an entry in SI.
+/// `gamma` and `theta_r` of an entry in SI.
 fn model(entry: &Value) -> (f64, f64) {
     (2.0 * number(&entry["zeta"]), number(&entry["Tr"]) / number(&entry["w0"]).powi(2))
 }

@@ -5,9 +5,13 @@ use std::f64::consts::{PI, TAU};
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::flow::Flow;
 use pendmap::integrate::{State, Strobe};
+use pendmap::maps::basins::{BasinMap, Options, basins};
+use pendmap::maps::control::Control;
 use pendmap::model::{Effect, Kind, Pendulum};
 
-use crate::support::{advanced, basins_on_plane, bits, columns, driven, path, paths, spread};
+use crate::support::{
+    advanced, basins_on_plane, bits, columns, driven, path, paths, plane, spread, unchecked,
+};
 use crate::truths::{list, number, truths};
 
 fn rubbing(gamma: f64, p: f64, omega: f64, theta_r: f64) -> Pendulum {
@@ -148,4 +152,51 @@ fn what_creeps_at_the_edge_is_at_rest() {
     assert!(map.share(0) < 1e-9);
     let rest = names.iter().position(|n| *n == "rest").expect("there");
     assert!(map.attractors[rest].multipliers.is_empty());
+}
+
+#[test]
+fn the_tolerance_does_not_change_labels_away_from_fractal_boundaries() {
+    let pendulum = rubbing(0.1, 0.6, 2.0, 0.03);
+    let map = |tol: f64| {
+        let options = Options { tol, ..unchecked() };
+        basins(&pendulum, &plane(60), &options, &Control::default()).expect("a map")
+    };
+    let (coarse, fine) = (map(1e-5), map(1e-9));
+    let names =
+        |map: &BasinMap| -> Vec<String> { map.attractors.iter().map(|a| a.name.clone()).collect() };
+    assert_eq!(names(&coarse), names(&fine));
+    let label = |i: i64, j: i64| fine.labels.label[(j * 60 + i.rem_euclid(60)) as usize];
+    let mut changed = 0;
+    for j in 0..60 {
+        for i in 0..60 {
+            if coarse.labels.label[(j * 60 + i) as usize] == label(i, j) {
+                continue;
+            }
+            changed += 1;
+            let around = [(-1, 0), (1, 0), (0, -1), (0, 1)];
+            let inside = around.into_iter().all(|(di, dj)| {
+                !(0..60).contains(&(j + dj)) || label(i + di, j + dj) == label(i, j)
+            });
+            assert!(!inside, "the label of cell {i}, {j} changed away from all boundaries");
+        }
+    }
+    assert!(changed <= 18, "{changed} of 3600 labels");
+}
+
+#[test]
+fn the_angle_at_which_it_stops_converges_with_the_order_of_the_method() {
+    let pendulum = Pendulum::new(0.05, 0.0, 1.0, 0.0, 0.0)
+        .and_then(|p| p.with_friction(0.05))
+        .expect("in range");
+    let start = [2.5, 0.4];
+    let truth = Flow::new(&pendulum).carry(start, 0.0, 20.0 * TAU);
+    assert!(truth.stuck_for_ever);
+    let error = |steps: usize| {
+        let end = advanced(&Strobe::new(&pendulum, steps, path()), &[start], 20)[0];
+        assert!(end[1] == 0.0, "{end:?}");
+        (end[0] - truth.state[0]).abs()
+    };
+    let errors = [24, 48, 96].map(error);
+    assert!(errors[1] < errors[0] / 60.0, "{errors:?}");
+    assert!(errors[2] < 1e-11, "{errors:?}");
 }

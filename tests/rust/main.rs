@@ -2,7 +2,10 @@
 //! and the reference values of `tests/truths.json`.
 //!
 //! - [`exact`], [`order`]: solutions in closed form, energy, order of convergence
-//! - [`sine`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
+//! - [`stick_slip`], [`free_decay`], [`edges`]: friction, event by event, and where rounding could decide
+//! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
+//! - [`effects`]: the library, each effect in every respect
+//! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
 //! - [`maps`], [`layers`], [`threads`]: whole planes
@@ -12,6 +15,9 @@
 mod attractors;
 mod bifurcations;
 mod chaos;
+mod edges;
+mod effects;
+mod elementary;
 mod exact;
 mod free_decay;
 mod friction;

@@ -4,10 +4,13 @@ use std::f64::consts::PI;
 
 use pendmap::integrate::Schedule;
 use pendmap::integrate::accuracy::distance;
+use pendmap::integrate::course::Course;
+use pendmap::integrate::dense::Leap;
+use pendmap::integrate::flight::Flight;
 use pendmap::integrate::tableau::{A, B, BP, C, ORDER, STAGES};
 use pendmap::model::Pendulum;
 
-use crate::support::{advanced, along, fine_strobe, path, spread};
+use crate::support::{advanced, along, driven, fine_strobe, path, spread};
 
 /// Root mean square over starts of the error after one period, for each number of steps.
 fn errors(pendulum: &Pendulum, steps: &[usize]) -> Vec<f64> {
@@ -74,4 +77,54 @@ fn schedules_join() {
     let end = along(&second, along(&first, [1.0, 0.5]));
     assert!(distance(end, expected) < 3e-14, "{end:?} for {expected:?}");
     assert!((second.duration() - (period - cut)).abs() < 1e-15);
+}
+
+/// Errors at the end of equal steps of the reference integrator, and the greatest one of the curves
+/// between, where a friction holds its sense throughout.
+fn equal_steps(count: usize) -> [f64; 2] {
+    let pendulum = driven(0.3, 1.1, 2.0).with_friction(0.2).expect("in range");
+    let course = Course::new(&pendulum, true, 1e-15, |_, value| value);
+    let (start, until) = ([0.4, 4.0], 2.0);
+    let exact = |tau: f64| {
+        let mut flight = Flight::new(&course, 0.0, start, tau);
+        flight.finish(|_| ());
+        assert!(flight.events.is_empty());
+        flight.state
+    };
+    let length = until / count as f64;
+    let (mut state, mut between) = (start, 0_f64);
+    for k in 0..count {
+        let tau = k as f64 * length;
+        let first = course.acceleration(tau, state[0], state[1], 1.0);
+        let mut leap = Leap::new(&course, tau, state, first, 1.0, length);
+        let middle = tau + 0.37 * length;
+        between = between.max(distance(leap.curve(&course).at(middle), exact(middle)));
+        state = leap.end;
+    }
+    [distance(state, exact(until)), between]
+}
+
+#[test]
+fn the_reference_integrator_has_order_eight_and_its_curves_seven() {
+    let counts = [4, 6, 9];
+    let errors = counts.map(equal_steps);
+    let order = |of: usize| (errors[0][of] / errors[2][of]).ln() / (9.0_f64 / 4.0).ln();
+    assert!(order(0) > 7.5, "ends: order {}, {errors:?}", order(0));
+    assert!(order(1) > 6.7, "curves: order {}, {errors:?}", order(1));
+}
+
+#[test]
+fn the_error_follows_the_tolerance_through_stick_and_slip() {
+    let pendulum = driven(0.1, 0.8, 1.2).with_friction(0.15).expect("in range");
+    let end = |tolerance: f64| {
+        let course = Course::new(&pendulum, true, tolerance, |_, value| value);
+        let mut flight = Flight::new(&course, 0.0, [2.79, 0.49], 20.0);
+        flight.finish(|_| ());
+        flight.state
+    };
+    let exact = end(1e-15);
+    for tolerance in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
+        let error = distance(end(tolerance), exact);
+        assert!(error < 30.0 * tolerance, "{tolerance:e}: {error:e}");
+    }
 }

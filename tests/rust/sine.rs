@@ -4,17 +4,9 @@ use std::f64::consts::PI;
 use std::marker::PhantomData;
 
 use pendmap::lanes::sine::{Coarse, Degree, Fine, wrap};
-use pendmap::lanes::{Isa, Job, Lane, Path, dispatch};
+use pendmap::lanes::{Lane, Path};
 
-use crate::support::{bits, paths};
-
-/// What one function of the lane arithmetic makes of many numbers.
-struct Each<'a, F>(&'a [f64], PhantomData<F>);
-
-/// A function over any lane; a trait, since a closure cannot be generic.
-trait Function {
-    fn of<L: Lane>(x: L) -> L;
-}
+use crate::support::{Function, each, paths};
 
 struct Sine<D>(PhantomData<D>);
 struct Cosine<D>(PhantomData<D>);
@@ -47,32 +39,6 @@ impl Function for Turns {
     fn of<L: Lane>(x: L) -> L {
         wrap(x).1
     }
-}
-
-impl<F: Function> Job for Each<'_, F> {
-    type Output = [Vec<f64>; 2];
-    #[inline(always)]
-    fn run<S: Isa>(self, isa: S) -> [Vec<f64>; 2] {
-        let width = S::Lanes::WIDTH;
-        let mut lanes = self.0.to_vec();
-        lanes.resize(self.0.len().next_multiple_of(width), 0.0);
-        for chunk in lanes.chunks_exact_mut(width) {
-            F::of(S::Lanes::load(isa, chunk)).store(chunk);
-        }
-        lanes.truncate(self.0.len());
-        let mut singles = self.0.to_vec();
-        for x in singles.chunks_exact_mut(1) {
-            F::of(S::Single::load((), x)).store(x);
-        }
-        [lanes, singles]
-    }
-}
-
-/// `F` of many numbers on `path`; lanes and single numbers must agree bit for bit.
-fn each<F: Function>(path: Path, numbers: &[f64]) -> Vec<f64> {
-    let [lanes, singles] = dispatch::run(path, Each::<F>(numbers, PhantomData));
-    assert!(bits(&lanes) == bits(&singles), "lanes and single numbers differ on {path}");
-    lanes
 }
 
 /// Half turns all over [-limit, limit], and the neighbours of every quarter turn in it.

@@ -136,3 +136,37 @@ fn a_weak_drive_makes_the_running_state_quasiperiodic() {
     assert_eq!(names(&mirrored), ["oscillation 1:0 (-)", "quasiperiodic rotation -"]);
     assert!((map.fractions[1] - mirrored.fractions[1]).abs() < 0.005);
 }
+
+#[test]
+fn a_start_on_an_orbit_that_does_not_attract_is_no_chaos() {
+    // Hanging rest does not attract here, yet a start exactly on it stays for want of a perturbation.
+    let pendulum = driven(0.1, 1.0, 2.0);
+    let alone = Starts::List(vec![[0.0, 0.0]]);
+    let map = basins(&pendulum, &alone, &Options::default(), &Control::default()).expect("a map");
+    assert!(map.attractors.is_empty(), "{:?}", names(&map));
+    assert_eq!(map.labels.label, [0]);
+    // On a plane it is the one start that stays undecided.
+    let map = basins_on_plane(&pendulum, 5);
+    assert!(!map.attractors.iter().any(|a| a.kind.is_chaotic()), "{:?}", names(&map));
+    let undecided = map.labels.label.iter().filter(|l| **l == 0).count();
+    assert_eq!((undecided, map.labels.label[12]), (1, 0));
+}
+
+#[test]
+fn nearly_conservative_motion_is_not_called_chaos() {
+    for gamma in [1e-6, 1e-4] {
+        let map = basins_on_plane(&driven(gamma, 1.0, 2.0), 12);
+        assert!(!map.attractors.iter().any(|a| a.kind.is_chaotic()), "gamma {gamma}");
+    }
+}
+
+#[test]
+fn whole_turns_of_the_phase_do_not_matter_however_many() {
+    let at = |phase: f64| {
+        let pendulum = Pendulum::new(0.1, 1.0, 2.0, phase, 0.0).expect("in range");
+        basins_on_plane(&pendulum, 20).labels.label
+    };
+    let far: f64 = 1e17;
+    assert_eq!(at(far), at(far % TAU));
+    assert_eq!(at(0.3 + 8.0 * TAU), at((0.3 + 8.0 * TAU) % TAU));
+}

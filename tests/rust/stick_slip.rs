@@ -1,5 +1,7 @@
 //! Friction with stick and slip, in one trajectory.
 
+use std::f64::consts::{PI, TAU};
+
 use pendmap::integrate::course::Course;
 use pendmap::integrate::flight::Flight;
 use pendmap::integrate::flow::Flow;
@@ -65,4 +67,33 @@ fn the_determinant_is_the_product_of_the_ratios() {
             state = arrival.state;
         }
     }
+}
+
+#[test]
+fn known_forced_orbits_close() {
+    let orbits = &truths()["coulomb_forced"];
+    let residual = |entry: &Value, fraction: f64, image: [f64; 2], turns: f64| {
+        let pendulum = model(entry).with_friction(number(&entry["theta_r"])).expect("in range");
+        let period = pendulum.period();
+        let arrival = Flow::new(&pendulum).carry(point(entry), 0.0, fraction * period);
+        let gap = arrival.state[0] - turns * TAU - image[0];
+        (gap.hypot(arrival.state[1] - image[1]), arrival)
+    };
+    for entry in list(&orbits["rotation"]) {
+        let (gap, arrival) = residual(entry, 1.0, point(entry), 1.0);
+        assert!(gap < 1e-12, "{entry}: {gap:e}");
+        let even = (-number(&entry["gamma"]) * PI).exp();
+        assert_eq!(arrival.product.map(|product| (product - even).abs() < 1e-15), Some(true));
+    }
+    for entry in list(&orbits["oscillation"]) {
+        let half = [number(&entry["half"][0]), number(&entry["half"][1])];
+        for (fraction, image) in [(1.0, half), (2.0, point(entry))] {
+            let (gap, _) = residual(entry, fraction, image, 0.0);
+            assert!(gap < 1e-12, "{entry}: {gap:e}");
+        }
+    }
+}
+
+fn point(entry: &Value) -> [f64; 2] {
+    [number(&entry["theta"]), number(&entry["v"])]
 }

@@ -1,14 +1,15 @@
 //! What several modules need: paths, pendulums, starts that cover a plane, whole maps.
 
 use std::f64::consts::PI;
+use std::marker::PhantomData;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use pendmap::attractor::Catalogue;
 use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::{Moving, Schedule, State, Strobe};
-use pendmap::lanes::Path;
 use pendmap::lanes::sine::Fine;
+use pendmap::lanes::{Isa, Job, Lane, Path, dispatch};
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::{Control, pool};
 use pendmap::maps::label::{Labels, label};
@@ -147,4 +148,38 @@ pub fn along(schedule: &Schedule, [theta, velocity]: State) -> State {
 /// The bits of numbers, to compare them without tolerance.
 pub fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
+}
+
+/// What one function of the lane arithmetic makes of many numbers.
+struct Each<'a, F>(&'a [f64], PhantomData<F>);
+
+/// A function over any lane; a trait, since a closure cannot be generic.
+pub trait Function {
+    fn of<L: Lane>(x: L) -> L;
+}
+
+impl<F: Function> Job for Each<'_, F> {
+    type Output = [Vec<f64>; 2];
+    #[inline(always)]
+    fn run<S: Isa>(self, isa: S) -> [Vec<f64>; 2] {
+        let width = S::Lanes::WIDTH;
+        let mut lanes = self.0.to_vec();
+        lanes.resize(self.0.len().next_multiple_of(width), 0.0);
+        for chunk in lanes.chunks_exact_mut(width) {
+            F::of(S::Lanes::load(isa, chunk)).store(chunk);
+        }
+        lanes.truncate(self.0.len());
+        let mut singles = self.0.to_vec();
+        for x in singles.chunks_exact_mut(1) {
+            F::of(S::Single::load((), x)).store(x);
+        }
+        [lanes, singles]
+    }
+}
+
+/// `F` of many numbers on `path`; lanes and single numbers must agree bit for bit.
+pub fn each<F: Function>(path: Path, numbers: &[f64]) -> Vec<f64> {
+    let [lanes, singles] = dispatch::run(path, Each::<F>(numbers, PhantomData));
+    assert!(bits(&lanes) == bits(&singles), "lanes and single numbers differ on {path}");
+    lanes
 }

@@ -1,6 +1,9 @@
 //! A torque that repeats with the angle: the poles of a motor, an oval race.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
+    Power,
+};
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 
@@ -27,7 +30,7 @@ impl Law for BearingHarmonic {
                 power: Power::Of(0),
                 range: [0.0, 1000.0],
                 typical: [1.0, 12.0],
-                meaning: "periods a turn",
+                meaning: "periods a turn; in maps a whole number",
             },
             Parameter {
                 name: "psi",
@@ -38,7 +41,6 @@ impl Law for BearingHarmonic {
                 meaning: "phase at theta = 0",
             },
         ],
-        keeps_mirror: false,
         revealed_by: "turns and large swings",
         mappable: Mappable::Yes,
     };
@@ -47,5 +49,14 @@ impl Law for BearingHarmonic {
     fn torque<R: Real>([amplitude, n, psi]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         let angle = *n * at.theta + *psi;
         *amplitude * angle.scale(std::f64::consts::FRAC_1_PI).sine::<Fine>()
+    }
+
+    fn keeps_mirror([amplitude, _, psi]: &[f64; MOST_PARAMETERS]) -> bool {
+        // Half a turn of psi only changes the sign.
+        *amplitude == 0.0 || psi.sin().abs() < 1e-15
+    }
+
+    fn bars_maps([amplitude, n, _]: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
+        (*amplitude != 0.0 && n.fract() != 0.0).then_some(NOT_PERIODIC)
     }
 }

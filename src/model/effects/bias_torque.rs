@@ -1,6 +1,8 @@
 //! A constant torque: a motor's, a tilted magnet's, a twisted cable's.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
 use crate::lanes::Real;
 
 pub struct BiasTorque;
@@ -19,7 +21,6 @@ impl Law for BiasTorque {
             typical: [-0.3, 0.3],
             meaning: "torque over m l^2 w0^2",
         }],
-        keeps_mirror: false,
         revealed_by: "any record whose zero is known; equal to an asymmetric friction while sliding",
         mappable: Mappable::Yes,
     };
@@ -27,5 +28,9 @@ impl Law for BiasTorque {
     #[inline(always)]
     fn torque<R: Real>([torque, ..]: &[R; MOST_PARAMETERS], _: &Point<R>) -> R {
         *torque
+    }
+
+    fn keeps_mirror([torque, ..]: &[f64; MOST_PARAMETERS]) -> bool {
+        *torque == 0.0
     }
 }

@@ -1,6 +1,8 @@
 //! Dry friction of constant magnitude, the paper's `theta_r = Tr / w0^2`.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
 use crate::lanes::Real;
 
 pub struct CoulombFriction;
@@ -19,7 +21,6 @@ impl Law for CoulombFriction {
             typical: [1e-4, 0.3],
             meaning: "friction torque over m l^2 w0^2; in SI Tr",
         }],
-        keeps_mirror: true,
         revealed_by: "the last swings of a decay, which it ends in a finite time",
         mappable: Mappable::Yes,
     };

@@ -7,6 +7,10 @@ use crate::model::drive::Motion;
 /// No effect has more parameters.
 pub const MOST_PARAMETERS: usize = 3;
 
+/// Why a map cannot have a torque that differs from turn to turn.
+pub const NOT_PERIODIC: &str =
+    "it does not repeat every turn, and a map takes whole turns off the angle";
+
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
@@ -47,8 +51,10 @@ pub enum Action {
     Friction,
     /// The same, and depending on the velocity besides.
     SlidingFriction,
-    /// Another motion of the pivot.
+    /// Another amplitude, phase or frequency of the harmonic drive.
     Drive,
+    /// The pivot moves in another way besides.
+    FurtherDrive,
     /// Another reading; no torque.
     Reading,
 }
@@ -60,6 +66,8 @@ pub enum Mappable {
     Yes,
     /// With time in the laboratory held at a stated value.
     Frozen,
+    /// It cannot; [`Law::bars_maps`] says why.
+    No,
 }
 
 impl Mappable {
@@ -69,6 +77,7 @@ impl Mappable {
         match self {
             Self::Yes => "yes",
             Self::Frozen => "frozen",
+            Self::No => "no",
         }
     }
 }
@@ -113,8 +122,6 @@ pub struct Definition {
     pub formula: &'static str,
     /// Its parameters, in order.
     pub parameters: &'static [Parameter],
-    /// Whether it maps mirrored motions, `(th, v) -> (-th, -v)`, to mirrored motions.
-    pub keeps_mirror: bool,
     /// Which data show it.
     pub revealed_by: &'static str,
     /// Whether maps can have it.
@@ -144,6 +151,13 @@ impl<R: Real> Point<R> {
     #[must_use]
     pub fn cosine(&self) -> R {
         self.theta.scale(std::f64::consts::FRAC_1_PI).cosine::<Fine>()
+    }
+
+    /// The angle less its whole turns, in [-pi, pi].
+    #[inline(always)]
+    #[must_use]
+    pub fn wrapped(&self) -> R {
+        self.theta.scale(std::f64::consts::FRAC_1_PI).wrapped().scale(std::f64::consts::PI)
     }
 
     /// `|velocity|`, smooth across zero while the sense is held.
@@ -177,6 +191,9 @@ pub trait Law {
 
     /// The magnitude of a friction, `th'' = ... - friction sign(th')`; at rest its value at `th' = 0`
     /// is what a load must exceed to move the pendulum.
+    ///
+    /// It may be negative, and then drives the motion. Where the sum of all frictions is negative at
+    /// rest it holds nothing: the pendulum moves in the sense of the load, however small.
     #[inline(always)]
     fn friction<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         at.constant(0.0)
@@ -190,5 +207,19 @@ pub trait Law {
     #[inline(always)]
     fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R) -> R {
         theta
+    }
+
+    /// Whether the mirrored motion, `(th, v) -> (-th, -v)` at the same phase of the drive, is a
+    /// motion too.
+    #[must_use]
+    fn keeps_mirror(_: &[f64; MOST_PARAMETERS]) -> bool {
+        true
+    }
+
+    /// Why a map over initial conditions cannot have the effect with these parameters; nothing
+    /// where it can.
+    #[must_use]
+    fn bars_maps(_: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
+        None
     }
 }

@@ -65,6 +65,22 @@ macro_rules! library {
                     $(Self::$law => $module::$law::reading(parameters, theta),)*
                 }
             }
+
+            /// [`Law::keeps_mirror`].
+            #[must_use]
+            pub fn keeps_mirror(self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
+                match self {
+                    $(Self::$law => $module::$law::keeps_mirror(parameters),)*
+                }
+            }
+
+            /// [`Law::bars_maps`].
+            #[must_use]
+            pub fn bars_maps(self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
+                match self {
+                    $(Self::$law => $module::$law::bars_maps(parameters),)*
+                }
+            }
         }
     };
 }
@@ -73,8 +89,25 @@ library! {
     viscous_damping::ViscousDamping,
     coulomb_friction::CoulombFriction,
     quadratic_drag::QuadraticDrag,
+    cubic_damping::CubicDamping,
+    power_law_drag::PowerLawDrag,
+    stribeck_friction::StribeckFriction,
+    load_dependent_friction::LoadDependentFriction,
+    asymmetric_viscous::AsymmetricViscous,
+    coulomb_drift::CoulombDrift,
+    viscous_drift::ViscousDrift,
     bias_torque::BiasTorque,
     bearing_harmonic::BearingHarmonic,
+    magnet::Magnet,
+    elastic_restoring::ElasticRestoring,
+    drive_amplitude::DriveAmplitude,
+    drive_phase::DrivePhase,
+    drive_frequency::DriveFrequency,
+    drive_second_harmonic::DriveSecondHarmonic,
+    lateral_drive::LateralDrive,
+    encoder_offset::EncoderOffset,
+    encoder_gain::EncoderGain,
+    encoder_eccentricity::EncoderEccentricity,
 }
 
 impl Kind {
@@ -134,6 +167,12 @@ impl Effect {
         &self.parameters[..self.kind.definition().parameters.len()]
     }
 
+    /// Its parameters as numbers of another kind: `number` makes one of each value.
+    pub fn lift<R: Real>(&self, number: impl FnMut(f64) -> R) -> [R; MOST_PARAMETERS] {
+        let values: Vec<R> = self.values().iter().copied().map(number).collect();
+        std::array::from_fn(|i| values.get(i).map_or(values[0].like(0.0), |value| *value))
+    }
+
     /// Whether it acts in one of these ways.
     #[must_use]
     pub fn is(&self, actions: &[Action]) -> bool {
@@ -149,6 +188,6 @@ impl Effect {
     /// Whether it is the same for the mirrored motion, at the same phase of the drive.
     #[must_use]
     pub fn is_mirror_symmetric(&self) -> bool {
-        self.kind.definition().keeps_mirror
+        self.kind.keeps_mirror(&self.parameters)
     }
 }

@@ -1,6 +1,8 @@
 //! Drag in proportion to the square of the velocity: air at high speed.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
 use crate::lanes::Real;
 
 pub struct QuadraticDrag;
@@ -19,7 +21,6 @@ impl Law for QuadraticDrag {
             typical: [1e-4, 0.3],
             meaning: "drag coefficient over the moment of inertia",
         }],
-        keeps_mirror: true,
         revealed_by: "large amplitudes and rotation",
         mappable: Mappable::Yes,
     };

@@ -1,6 +1,8 @@
 //! Damping in proportion to the velocity, the paper's `gamma`.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
 use crate::lanes::Real;
 
 pub struct ViscousDamping;
@@ -19,7 +21,6 @@ impl Law for ViscousDamping {
             typical: [1e-3, 1.0],
             meaning: "c/(m w0), twice the damping ratio; in SI c/m",
         }],
-        keeps_mirror: true,
         revealed_by: "any decay",
         mappable: Mappable::Yes,
     };

@@ -1,0 +1,30 @@
+//! A drive whose amplitude is not what it was set to.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+use crate::model::drive::Motion;
+
+pub struct DriveAmplitude;
+
+impl Law for DriveAmplitude {
+    const DEFINITION: Definition = Definition {
+        name: "drive_amplitude",
+        group: Group::Drive,
+        action: Action::Drive,
+        formula: "p (1 + e)",
+        parameters: &[Parameter {
+            name: "e",
+            unit: "1",
+            power: Power::Of(0),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [-0.3, 0.3],
+            meaning: "error of the amplitude over it",
+        }],
+        revealed_by: "forced runs",
+        mappable: Mappable::Yes,
+    };
+
+    fn drive<R: Real>([e, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+        motion.p = motion.p + motion.p * *e;
+    }
+}

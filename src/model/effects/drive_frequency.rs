@@ -1,0 +1,30 @@
+//! A drive whose frequency is not what it was set to.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+use crate::model::drive::Motion;
+
+pub struct DriveFrequency;
+
+impl Law for DriveFrequency {
+    const DEFINITION: Definition = Definition {
+        name: "drive_frequency",
+        group: Group::Drive,
+        action: Action::Drive,
+        formula: "omega (1 + e)",
+        parameters: &[Parameter {
+            name: "e",
+            unit: "1",
+            power: Power::Of(0),
+            range: [-0.9, 10.0],
+            typical: [-0.01, 0.01],
+            meaning: "error of the frequency over it",
+        }],
+        revealed_by: "forced runs, the longer the better",
+        mappable: Mappable::Yes,
+    };
+
+    fn drive<R: Real>([e, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+        motion.omega = motion.omega + motion.omega * *e;
+    }
+}

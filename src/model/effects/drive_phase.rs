@@ -1,0 +1,30 @@
+//! A drive whose phase is not what it was taken for; the same as a trigger that comes late.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+use crate::model::drive::Motion;
+
+pub struct DrivePhase;
+
+impl Law for DrivePhase {
+    const DEFINITION: Definition = Definition {
+        name: "drive_phase",
+        group: Group::Drive,
+        action: Action::Drive,
+        formula: "phase + d",
+        parameters: &[Parameter {
+            name: "d",
+            unit: "rad",
+            power: Power::Of(0),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [-0.5, 0.5],
+            meaning: "error of the phase",
+        }],
+        revealed_by: "forced runs whose phase is known",
+        mappable: Mappable::Yes,
+    };
+
+    fn drive<R: Real>([d, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+        motion.phase = motion.phase + *d;
+    }
+}

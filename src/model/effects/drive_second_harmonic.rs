@@ -1,0 +1,40 @@
+//! A drive that is not quite harmonic: a crank of finite length, a shaker at its limit.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+use crate::model::drive::Motion;
+
+pub struct DriveSecondHarmonic;
+
+impl Law for DriveSecondHarmonic {
+    const DEFINITION: Definition = Definition {
+        name: "drive_second_harmonic",
+        group: Group::Drive,
+        action: Action::FurtherDrive,
+        formula: "a = p cos(x) + amplitude cos(2 x + phase), x the drive's phase",
+        parameters: &[
+            Parameter {
+                name: "amplitude",
+                unit: "1",
+                power: Power::Of(0),
+                range: [f64::NEG_INFINITY, f64::INFINITY],
+                typical: [1e-3, 0.3],
+                meaning: "acceleration at twice the frequency over gravity",
+            },
+            Parameter {
+                name: "phase",
+                unit: "rad",
+                power: Power::Of(0),
+                range: [f64::NEG_INFINITY, f64::INFINITY],
+                typical: [-3.15, 3.15],
+                meaning: "its phase against the drive",
+            },
+        ],
+        revealed_by: "forced runs",
+        mappable: Mappable::Yes,
+    };
+
+    fn drive<R: Real>([amplitude, phase, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+        (motion.second, motion.second_phase) = (*amplitude, *phase);
+    }
+}

@@ -1,0 +1,37 @@
+//! A cable or a spiral spring that winds up turn by turn.
+
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
+    Power,
+};
+use crate::lanes::Real;
+
+pub struct ElasticRestoring;
+
+impl Law for ElasticRestoring {
+    const DEFINITION: Definition = Definition {
+        name: "elastic_restoring",
+        group: Group::Torque,
+        action: Action::Position,
+        formula: "-k theta, theta not wrapped",
+        parameters: &[Parameter {
+            name: "k",
+            unit: "1/s^2",
+            power: Power::Of(2),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [1e-4, 0.3],
+            meaning: "stiffness over the moment of inertia",
+        }],
+        revealed_by: "many turns in one direction",
+        mappable: Mappable::No,
+    };
+
+    #[inline(always)]
+    fn torque<R: Real>([k, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        -(*k * at.theta)
+    }
+
+    fn bars_maps(_: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
+        Some(NOT_PERIODIC)
+    }
+}

@@ -1,0 +1,29 @@
+//! A sensor with a wrong scale.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+
+pub struct EncoderGain;
+
+impl Law for EncoderGain {
+    const DEFINITION: Definition = Definition {
+        name: "encoder_gain",
+        group: Group::Reading,
+        action: Action::Reading,
+        formula: "reading (1 + e) theta",
+        parameters: &[Parameter {
+            name: "e",
+            unit: "1",
+            power: Power::Of(0),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [-0.1, 0.1],
+            meaning: "error of the scale over it",
+        }],
+        revealed_by: "turns; in swings the period against the amplitude",
+        mappable: Mappable::Yes,
+    };
+
+    fn reading<R: Real>([e, ..]: &[R; MOST_PARAMETERS], theta: R) -> R {
+        theta + *e * theta
+    }
+}

@@ -1,0 +1,29 @@
+//! A sensor whose zero is not where the pendulum hangs; in one free decay equal to a tilt of the rig.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+
+pub struct EncoderOffset;
+
+impl Law for EncoderOffset {
+    const DEFINITION: Definition = Definition {
+        name: "encoder_offset",
+        group: Group::Reading,
+        action: Action::Reading,
+        formula: "reading theta + d",
+        parameters: &[Parameter {
+            name: "d",
+            unit: "rad",
+            power: Power::Of(0),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [-0.1, 0.1],
+            meaning: "reading at theta = 0",
+        }],
+        revealed_by: "decays, whose peaks then differ between the sides",
+        mappable: Mappable::Yes,
+    };
+
+    fn reading<R: Real>([d, ..]: &[R; MOST_PARAMETERS], theta: R) -> R {
+        theta + *d
+    }
+}

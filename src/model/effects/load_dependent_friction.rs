@@ -1,0 +1,37 @@
+//! Friction that grows with what the bearing carries: weight, drive and centrifugal force.
+//!
+//! That is the rod's force over the weight, `|(1 + a) cos th + v^2|` (in SI `v^2/w0^2`), without what
+//! a sideways drive adds. Hanging at rest it is 1, which Coulomb friction has already. Where it
+//! passes zero the friction has a corner that no step is fitted to.
+
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
+use crate::lanes::Real;
+
+pub struct LoadDependentFriction;
+
+impl Law for LoadDependentFriction {
+    const DEFINITION: Definition = Definition {
+        name: "load_dependent_friction",
+        group: Group::Damping,
+        action: Action::SlidingFriction,
+        formula: "-k (|(1 + a) cos(theta) + v^2/w0^2| - 1) sign(v)",
+        parameters: &[Parameter {
+            name: "k",
+            unit: "rad/s^2",
+            power: Power::Of(2),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [1e-4, 0.3],
+            meaning: "friction of the hanging weight; above theta_r the sum may be negative",
+        }],
+        revealed_by: "rotation and large swings",
+        mappable: Mappable::Yes,
+    };
+
+    #[inline(always)]
+    fn friction<R: Real>([k, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        let load = at.vertical * at.cosine() + at.velocity * at.velocity;
+        *k * (load.magnitude() - at.constant(1.0))
+    }
+}

@@ -1,0 +1,51 @@
+//! Drag with any power of the velocity, between laminar and turbulent.
+//!
+//! `|v|^n sign v` is `v (v^2 + e^2)^((n - 1)/2)` with `e = 1e-6`, far below what a sensor sees: so
+//! the derivatives by velocity and power are finite at rest too. Powers below 1/2 are refused: they
+//! are dry friction in all but name, too abrupt for steps without events of their own.
+
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
+use crate::lanes::Real;
+
+/// The square of the velocity at which the power law ends.
+const FLOOR: f64 = 1e-12;
+
+pub struct PowerLawDrag;
+
+impl Law for PowerLawDrag {
+    const DEFINITION: Definition = Definition {
+        name: "power_law_drag",
+        group: Group::Damping,
+        action: Action::Kinked,
+        formula: "-q |v|^n sign(v)",
+        parameters: &[
+            Parameter {
+                name: "q",
+                unit: "rad^(1-n) s^(n-2)",
+                power: Power::TwoMinus(1),
+                range: [f64::NEG_INFINITY, f64::INFINITY],
+                typical: [1e-4, 0.3],
+                meaning: "drag at unit velocity over the moment of inertia",
+            },
+            Parameter {
+                name: "n",
+                unit: "1",
+                power: Power::Of(0),
+                range: [0.5, 4.0],
+                typical: [1.1, 3.0],
+                meaning: "power of the velocity",
+            },
+        ],
+        revealed_by: "large amplitudes and rotation, against small ones",
+        mappable: Mappable::Yes,
+    };
+
+    #[inline(always)]
+    fn torque<R: Real>([q, n, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        let square = at.velocity * at.velocity + at.constant(FLOOR);
+        let power = (*n - at.constant(1.0)).scale(0.5);
+        -(*q * at.velocity * (power * square.logarithm()).exponential())
+    }
+}

@@ -1,0 +1,45 @@
+//! Friction that is greater at rest and falls off as the motion gets under way.
+//!
+//! The Gaussian form of Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30, 1083.
+
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
+use crate::lanes::Real;
+
+pub struct StribeckFriction;
+
+impl Law for StribeckFriction {
+    const DEFINITION: Definition = Definition {
+        name: "stribeck_friction",
+        group: Group::Damping,
+        action: Action::SlidingFriction,
+        formula: "-a exp(-(v/vs)^2) sign(v)",
+        parameters: &[
+            Parameter {
+                name: "a",
+                unit: "rad/s^2",
+                power: Power::Of(2),
+                range: [f64::NEG_INFINITY, f64::INFINITY],
+                typical: [1e-4, 0.3],
+                meaning: "friction at rest less that of fast motion; may be negative",
+            },
+            Parameter {
+                name: "vs",
+                unit: "rad/s",
+                power: Power::Of(1),
+                range: [1e-3, f64::INFINITY],
+                typical: [0.02, 1.0],
+                meaning: "velocity over which it falls off",
+            },
+        ],
+        revealed_by: "the last swings of a decay, against Coulomb friction in the earlier ones",
+        mappable: Mappable::Yes,
+    };
+
+    #[inline(always)]
+    fn friction<R: Real>([a, vs, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        let part = at.velocity / *vs;
+        *a * (-(part * part)).exponential()
+    }
+}

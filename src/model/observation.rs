@@ -1,0 +1,43 @@
+//! What the sensor makes of the angle. The motion does not depend on it, so maps leave it out.
+
+use super::effects::{Action, Kind, MOST_PARAMETERS};
+use super::pendulum::Pendulum;
+use crate::lanes::Real;
+
+/// The effects on the reading, with their parameters as numbers of some kind.
+#[derive(Clone, Debug)]
+pub struct Observation<R> {
+    readings: Vec<(Kind, [R; MOST_PARAMETERS])>,
+}
+
+impl<R: Real> Observation<R> {
+    /// Of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
+    /// them) and its value, as for [`Equation::lift`](super::Equation::lift).
+    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
+        let mut first = Pendulum::OWN_PARAMETERS;
+        let mut readings = Vec::new();
+        for effect in &pendulum.effects {
+            if effect.is(&[Action::Reading]) {
+                let mut index = first;
+                let parameters = effect.lift(|value| {
+                    index += 1;
+                    number(index - 1, value)
+                });
+                readings.push((effect.kind, parameters));
+            }
+            first += effect.values().len();
+        }
+        Self { readings }
+    }
+
+    /// The reading at the angle `theta`, rad and not wrapped: each effect in the order of the model
+    /// takes what the one before it gives.
+    #[must_use]
+    pub fn read(&self, theta: R) -> R {
+        let mut reading = theta;
+        for (kind, parameters) in &self.readings {
+            reading = kind.reading(parameters, reading);
+        }
+        reading
+    }
+}

@@ -1,0 +1,468 @@
+//! The library of effects: every effect of it, in every respect, by loops over the whole list.
+
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+use std::fs;
+
+use pendmap::error::Error;
+use pendmap::integrate::accuracy::distance;
+use pendmap::integrate::course::Course;
+use pendmap::integrate::flow::Flow;
+use pendmap::integrate::sample::sample;
+use pendmap::integrate::tangent::Tangent;
+use pendmap::integrate::{State, Strobe};
+use pendmap::maps::advance::advance;
+use pendmap::maps::basins::basins;
+use pendmap::maps::control::Control;
+use pendmap::model::effects::{
+    Action, Definition, Group, MOST_PARAMETERS, Mappable, Parameter, Power,
+};
+use pendmap::model::{Effect, Equation, Kind, Observation, Pendulum};
+
+use crate::support::{advanced, bits, columns, driven, path, paths, plane, spread, unchecked};
+
+/// Numbers between 0 and 1 that look drawn at random.
+struct Draws(u64);
+
+impl Draws {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
+        low + (high - low) * self.next()
+    }
+
+    /// The effect with typical values; one that counts periods counts whole ones.
+    fn effect(&mut self, kind: Kind) -> Effect {
+        let value = |p: &Parameter| {
+            let value = self.between(p.typical);
+            if (kind, p.name) == (Kind::BearingHarmonic, "n") { value.round() } else { value }
+        };
+        let values: Vec<f64> = kind.definition().parameters.iter().map(value).collect();
+        Effect::new(kind, &values).expect("typical values are in range")
+    }
+}
+
+fn has(pendulum: Pendulum, effect: Effect) -> Pendulum {
+    let mut pendulum = pendulum.with_effect(effect).expect("once");
+    pendulum.lab_time = 250.0;
+    pendulum
+}
+
+/// A driven pendulum with nothing but the effect.
+fn alone(effect: Effect) -> Pendulum {
+    has(Pendulum::new(0.0, 0.7, 1.3, 0.4, 0.0).expect("in range"), effect)
+}
+
+fn acts(kind: Kind) -> Action {
+    kind.definition().action
+}
+
+#[test]
+fn definitions_are_whole() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/model/effects");
+    let files: BTreeSet<String> = fs::read_dir(folder)
+        .expect("the library")
+        .map(|entry| entry.expect("a file").file_name().into_string().expect("a name"))
+        .filter(|name| !["law.rs", "mod.rs"].contains(&name.as_str()))
+        .collect();
+    let names: BTreeSet<String> =
+        Kind::ALL.iter().map(|kind| format!("{}.rs", kind.definition().name)).collect();
+    assert_eq!(names, files);
+    assert_eq!(names.len(), Kind::ALL.len(), "names are unique");
+    for kind in Kind::ALL {
+        let Definition { name, group, action, formula, parameters, revealed_by, mappable } =
+            *kind.definition();
+        assert_eq!(Kind::named(name), Ok(*kind));
+        assert!(!revealed_by.is_empty(), "{name}");
+        assert!((1..=MOST_PARAMETERS).contains(&parameters.len()), "{name}");
+        let expected = match action {
+            Action::Velocity | Action::Kinked | Action::Friction | Action::SlidingFriction => {
+                Group::Damping
+            }
+            Action::Position => Group::Torque,
+            Action::Drive | Action::FurtherDrive => Group::Drive,
+            Action::Reading => Group::Reading,
+        };
+        assert_eq!(group, expected, "{name}");
+        let words: Vec<&str> = formula.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+        for (k, parameter) in parameters.iter().enumerate() {
+            let Parameter { name: own, unit, range, typical, meaning, power } = *parameter;
+            assert!(words.contains(&own), "{name}: {formula} has no {own}");
+            assert!(parameters[..k].iter().all(|p| p.name != own), "{name}: {own} twice");
+            assert!(!unit.is_empty() && !meaning.is_empty(), "{name}.{own}");
+            assert!(range[0] < range[1] && typical[0] < typical[1], "{name}.{own}");
+            assert!(range[0] <= typical[0] && typical[1] <= range[1], "{name}.{own}");
+            assert!(typical.iter().all(|x| x.is_finite()), "{name}.{own}");
+            if let Power::TwoMinus(other) = power {
+                assert!(other < parameters.len() && other != k, "{name}.{own}");
+            }
+        }
+        let barred = kind.bars_maps(&Draws(1).effect(*kind).parameters).is_some();
+        assert_eq!(barred, mappable == Mappable::No, "{name}");
+    }
+}
+
+/// Every effect's acceleration in SI, as textbooks have it: velocities in rad/s, times in s.
+#[allow(clippy::too_many_lines)] // one line an effect
+fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64, t: f64) -> f64 {
+    let (p, omega, phase) = (0.7, 1.3 * w0, 0.4);
+    let sign = velocity.signum();
+    let speed = velocity.abs();
+    let drive = |p: f64, omega: f64, phase: f64| p * (omega * t + phase).cos();
+    let mut up = drive(p, omega, phase);
+    let mut side = 0.0;
+    let mut own = 0.0;
+    match (kind.definition().name, value) {
+        ("viscous_damping", [c_over_m]) => own = -c_over_m * velocity,
+        ("coulomb_friction", [tr]) => own = -tr * sign,
+        ("quadratic_drag", [q]) => own = -q * velocity * speed,
+        ("cubic_damping", [k3]) => own = -k3 * velocity.powi(3),
+        ("power_law_drag", [q, n]) => own = -q * speed.powf(*n) * sign,
+        ("stribeck_friction", [a, vs]) => own = -a * (-(velocity / vs).powi(2)).exp() * sign,
+        ("load_dependent_friction", [k]) => {
+            let load = (1.0 + up) * theta.cos() + (velocity / w0).powi(2);
+            own = -k * (load.abs() - 1.0) * sign;
+        }
+        ("asymmetric_viscous", [b]) => own = -b * speed,
+        ("coulomb_drift", [r]) => own = -r * lab * sign,
+        ("viscous_drift", [r]) => own = -r * lab * velocity,
+        ("bias_torque", [torque]) => own = *torque,
+        ("bearing_harmonic", [a, n, psi]) => own = a * (n * theta + psi).sin(),
+        ("magnet", [a, w]) => {
+            let x = theta - 2.0 * PI * (theta / (2.0 * PI)).round();
+            own = -a * (x / w) * (-x * x / (2.0 * w * w)).exp();
+        }
+        ("elastic_restoring", [k]) => own = -k * theta,
+        ("drive_amplitude", [e]) => up = drive(p * (1.0 + e), omega, phase),
+        ("drive_phase", [d]) => up = drive(p, omega, phase + d),
+        ("drive_frequency", [e]) => up = drive(p, omega * (1.0 + e), phase),
+        ("drive_second_harmonic", [amplitude, psi]) => {
+            up += amplitude * (2.0 * (omega * t + phase) + psi).cos();
+        }
+        ("lateral_drive", [amplitude, psi]) => {
+            side = amplitude * (omega * t + phase + psi).cos();
+        }
+        (name, _) if acts(kind) == Action::Reading => assert!(name.starts_with("encoder")),
+        (name, _) => panic!("{name} has no formula here"),
+    }
+    own - w0 * w0 * ((1.0 + up) * theta.sin() + side * theta.cos())
+}
+
+#[test]
+fn formulas_and_powers_of_w0_are_right() {
+    let mut draws = Draws(2);
+    for kind in Kind::ALL {
+        for _ in 0..200 {
+            let effect = draws.effect(*kind);
+            let pendulum = alone(effect);
+            let w0 = draws.between([0.5, 8.0]);
+            let [theta, velocity] = [draws.between([-9.0, 9.0]), draws.between([-3.0, 3.0])];
+            let tau = draws.between([0.0, 20.0]);
+            let values: Vec<f64> = effect
+                .values()
+                .iter()
+                .zip(kind.definition().parameters)
+                .map(|(value, parameter)| match parameter.power {
+                    Power::Of(k) => value * w0.powi(k),
+                    Power::TwoMinus(n) => value * w0.powf(2.0 - effect.parameters[n]),
+                })
+                .collect();
+            let (lab, t) = (pendulum.lab_time / w0, tau / w0);
+            let expected = in_si(*kind, &values, w0, theta, w0 * velocity, lab, t);
+            let found = w0 * w0 * pendulum.acceleration(tau, theta, velocity);
+            let error = (found - expected).abs() / (w0 * w0);
+            assert!(error < 1e-11, "{effect:?} at {theta} {velocity} {tau}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn readings_are_what_they_say() {
+    for (kind, values, theta, expected) in [
+        (Kind::EncoderOffset, &[0.1][..], 2.0, 2.1),
+        (Kind::EncoderGain, &[0.1], -20.0, -22.0),
+        (Kind::EncoderEccentricity, &[0.1, 0.5 * PI], 2.0 * PI, 2.0 * PI + 0.1),
+    ] {
+        let pendulum = alone(Effect::new(kind, values).expect("in range"));
+        let found = Observation::lift(&pendulum, |_, value| value).read(theta);
+        assert!((found - expected).abs() < 1e-14, "{kind:?}: {found}");
+    }
+}
+
+#[test]
+fn readings_follow_one_another_in_order() {
+    let offset = Effect::new(Kind::EncoderOffset, &[0.1]).expect("in range");
+    let gain = Effect::new(Kind::EncoderGain, &[0.5]).expect("in range");
+    for (effects, expected) in [([offset, gain], 1.5 * 1.1), ([gain, offset], 1.5 + 0.1)] {
+        let pendulum = effects.into_iter().fold(driven(0.1, 1.0, 2.0), has);
+        let found = Observation::lift(&pendulum, |_, value| value).read(1.0);
+        assert!((found - expected).abs() < 1e-14, "{effects:?}: {found}");
+    }
+}
+
+/// The effect's number of derivatives and more: its pendulum's parameters, angle and velocity.
+const MOST: usize = Pendulum::OWN_PARAMETERS + MOST_PARAMETERS + 2;
+type Dual = Tangent<f64, MOST>;
+
+/// Acceleration and reading, with derivatives where `R` has them.
+fn evaluated(pendulum: &Pendulum, tau: f64, at: State, changed: Option<(usize, f64)>) -> [f64; 2] {
+    let change = |index: usize, value: f64| match changed {
+        Some((which, h)) if which == index => value + h,
+        _ => value,
+    };
+    let count = pendulum.parameters().len();
+    let equation = Equation::lift(pendulum, change);
+    let [theta, velocity] = [change(count, at[0]), change(count + 1, at[1])];
+    let forcing = equation.forcing(tau);
+    let point = equation.point(&forcing, theta, velocity, 1_f64.copysign(at[1]));
+    let reading = Observation::lift(pendulum, change).read(theta);
+    [equation.acceleration(&forcing, &point), reading]
+}
+
+fn derivatives(pendulum: &Pendulum, tau: f64, at: State) -> [Dual; 2] {
+    let count = pendulum.parameters().len();
+    let seeded = |index: usize, value: f64| Dual::seeded(value, index);
+    let constant = |value: f64| Dual { value, slope: [0.0; MOST] };
+    let equation = Equation::lift(pendulum, seeded);
+    let [theta, velocity] = [seeded(count, at[0]), seeded(count + 1, at[1])];
+    let forcing = equation.forcing(constant(tau));
+    let point = equation.point(&forcing, theta, velocity, constant(1_f64.copysign(at[1])));
+    let reading = Observation::lift(pendulum, seeded).read(theta);
+    [equation.acceleration(&forcing, &point), reading]
+}
+
+#[test]
+fn derivatives_agree_with_differences() {
+    let mut draws = Draws(3);
+    for kind in Kind::ALL {
+        for _ in 0..100 {
+            let pendulum = alone(draws.effect(*kind));
+            let at = [draws.between([-9.0, 9.0]), draws.between([-3.0, 3.0])];
+            let tau = draws.between([0.0, 20.0]);
+            let exact = derivatives(&pendulum, tau, at);
+            for index in 0..pendulum.parameters().len() + 2 {
+                let difference = |h: f64| {
+                    let [plus, minus] =
+                        [h, -h].map(|h| evaluated(&pendulum, tau, at, Some((index, h))));
+                    [0, 1].map(|k| (plus[k] - minus[k]) / (2.0 * h))
+                };
+                // Richardson's combination of two steps leaves errors of the fourth order.
+                let (coarse, fine) = (difference(2e-4), difference(1e-4));
+                for k in 0..2 {
+                    let expected = (4.0 * fine[k] - coarse[k]) / 3.0;
+                    let error = (exact[k].slope[index] - expected).abs();
+                    // A narrow magnet has large fifth derivatives.
+                    let allowed = 1e-8 * (1.0 + 100.0 * expected.abs());
+                    // Across the corner of a load no difference tells.
+                    let corner = *kind == Kind::LoadDependentFriction && near_no_load(tau, at);
+                    let what = format!("{:?} by {index}, {at:?}", pendulum.effects);
+                    assert!(corner || error < allowed, "{what}: {error:e} of {expected}");
+                }
+            }
+        }
+    }
+}
+
+/// Whether the rod of [`alone`] carries next to nothing.
+fn near_no_load(tau: f64, [theta, velocity]: State) -> bool {
+    let up = 0.7 * (1.3 * tau + 0.4).cos();
+    ((1.0 + up) * theta.cos() + velocity * velocity).abs() < 0.01
+}
+
+#[test]
+fn derivatives_are_finite_at_rest_and_everywhere() {
+    let mut draws = Draws(4);
+    for kind in Kind::ALL {
+        let mut effect = draws.effect(*kind);
+        // The least power has the steepest torque.
+        if *kind == Kind::PowerLawDrag {
+            effect.parameters[1] = kind.definition().parameters[1].range[0];
+        }
+        let pendulum = alone(effect);
+        for theta in [0.0, PI, -PI, 1e3, 1e-300] {
+            for velocity in [0.0, -0.0, 1e-300, -1e-12, 40.0, -1e4] {
+                for number in derivatives(&pendulum, 0.3, [theta, velocity]) {
+                    let finite = number.value.is_finite()
+                        && number.slope.iter().all(|slope| slope.is_finite());
+                    assert!(finite, "{effect:?} at {theta} {velocity}: {number:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_keeps_the_mirror_image_says_so() {
+    let mut draws = Draws(5);
+    let psi = |psi: f64| Effect::new(Kind::BearingHarmonic, &[0.1, 3.0, psi]).expect("in range");
+    let mut all: Vec<Effect> = Kind::ALL.iter().map(|kind| draws.effect(*kind)).collect();
+    all.extend([psi(0.0), psi(PI), psi(-PI), psi(0.4)]);
+    all.push(Effect::new(Kind::LateralDrive, &[0.0, 0.3]).expect("in range"));
+    all.push(Effect::new(Kind::AsymmetricViscous, &[0.0]).expect("in range"));
+    for effect in all {
+        let pendulum = alone(effect);
+        let mut worst = 0_f64;
+        for state in spread(100, 9.0, 3.0) {
+            let [a, b] = [1.0, -1.0].map(|side| {
+                pendulum.acceleration(1.7 + state[0], side * state[0], side * state[1])
+            });
+            worst = worst.max((a + b).abs());
+        }
+        let claimed = pendulum.is_mirror_symmetric();
+        assert_eq!(claimed, worst < 1e-13, "{effect:?}: {worst:e}");
+        assert!(claimed || worst > 1e-5, "{effect:?}: {worst:e}");
+    }
+}
+
+/// All that a map may have, each without and with Coulomb friction.
+fn mappable() -> Vec<(Kind, Pendulum)> {
+    let mut draws = Draws(6);
+    let mut all = Vec::new();
+    for kind in Kind::ALL {
+        if kind.definition().mappable == Mappable::No {
+            continue;
+        }
+        for theta_r in [0.0, 0.05] {
+            let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
+            let effect = draws.effect(*kind);
+            let twice = match kind {
+                Kind::ViscousDamping => true,
+                Kind::CoulombFriction => theta_r > 0.0,
+                _ => false,
+            };
+            if !twice {
+                all.push((*kind, has(base, effect)));
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn one_at_a_time_gives_the_same_bits() {
+    for (_, pendulum) in mappable() {
+        for path in paths() {
+            let strobe = Strobe::new(&pendulum, 30, path);
+            let states = spread(100, PI, 3.0);
+            let run = |singly: bool| {
+                let (mut theta, mut velocity) = columns(&states);
+                let mut turns = vec![0.0; states.len()];
+                let (a, b, c) = (&mut theta[..], &mut velocity[..], &mut turns[..]);
+                if singly {
+                    strobe.advance_singly(a, b, c, 2).expect("equal lengths");
+                } else {
+                    strobe.advance(a, b, c, 2).expect("equal lengths");
+                }
+                [bits(&theta), bits(&velocity), bits(&turns)]
+            };
+            assert_eq!(run(false), run(true), "{path}, {pendulum:?}");
+        }
+    }
+}
+
+/// The median and the greatest distance from the reference integrator after three periods.
+fn errors_in_lanes(pendulum: &Pendulum, steps: usize) -> [f64; 2] {
+    let starts = spread(60, PI, 3.0);
+    let flow = Flow::new(pendulum);
+    let strobe = Strobe::new(pendulum, steps, path());
+    let ends = advanced(&strobe, &starts, 3);
+    let far = |(start, end): (&State, &State)| {
+        distance(*end, flow.carry(*start, 0.0, 3.0 * pendulum.period()).state)
+    };
+    let mut errors: Vec<f64> = starts.iter().zip(&ends).map(far).collect();
+    errors.sort_by(f64::total_cmp);
+    [errors[errors.len() / 2], errors[errors.len() - 1]]
+}
+
+#[test]
+fn lanes_agree_with_the_reference_integrator() {
+    for (kind, pendulum) in mappable() {
+        let [median, error] = errors_in_lanes(&pendulum, 120);
+        println!("{median:e} {error:e} {:?} {}", pendulum.effects, pendulum.theta_r);
+        let allowed = match kind {
+            // Its corner lies anywhere within a step.
+            Kind::LoadDependentFriction => 1e-3,
+            // After a turn its torque grows as a power of time that is not whole.
+            Kind::PowerLawDrag => 1e-7,
+            _ => 1e-9,
+        };
+        assert!(error < allowed, "{pendulum:?}: {error:e}");
+    }
+}
+
+#[test]
+fn a_friction_that_turns_negative_holds_nothing() {
+    let base = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
+    for (kind, values) in [
+        (Kind::StribeckFriction, &[-0.08, 0.5][..]),
+        (Kind::LoadDependentFriction, &[0.3]),
+        (Kind::CoulombDrift, &[-4e-4]),
+    ] {
+        let pendulum = has(base.clone(), Effect::new(kind, values).expect("in range"));
+        let [median, error] = errors_in_lanes(&pendulum, 200);
+        println!("{kind:?} {median:e} {error:e}");
+        assert!(error < 1e-3, "{kind:?}: {error:e}");
+        // At a quarter turn all three are negative, and the load is what moves it.
+        let arrival = Flow::new(&pendulum).carry([0.5 * PI, 0.0], 0.0, 0.1);
+        assert!(arrival.state[1] < -0.01 && !arrival.stuck, "{kind:?}: {arrival:?}");
+    }
+}
+
+#[test]
+fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
+    let effect = |kind, r| Effect::new(kind, &[r]).expect("in range");
+    let plain = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
+    let rougher = driven(0.1, 0.6, 2.0).with_friction(0.15).expect("in range");
+    let drifting = has(plain, effect(Kind::CoulombDrift, 4e-4));
+    let states = spread(50, PI, 3.0);
+    let [a, b] = [&rougher, &drifting].map(|p| advanced(&Strobe::new(p, 150, path()), &states, 3));
+    for (a, b) in a.iter().zip(&b) {
+        assert!(distance(*a, *b) < 1e-10, "{a:?} {b:?}");
+    }
+    for kind in [Kind::CoulombDrift, Kind::ViscousDrift] {
+        // Two stretches, one after the other, are one.
+        let early = has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind, 3e-4));
+        let mut late = early.clone();
+        late.lab_time += 5.0;
+        let end = |pendulum: &Pendulum, from: State, until: f64| {
+            let course = Course::new(pendulum, true, 1e-13, |_, value| value);
+            sample(&course, 0.0, from, &[until], |_, _| true).states[0]
+        };
+        let whole = end(&early, [2.0, 0.0], 9.0);
+        let parts = end(&late, end(&early, [2.0, 0.0], 5.0), 4.0);
+        assert!(distance(whole, parts) < 1e-11, "{kind:?}: {whole:?} {parts:?}");
+        let held = end(&early, end(&early, [2.0, 0.0], 5.0), 4.0);
+        assert!(distance(whole, held) > 1e-4, "{kind:?}: {whole:?} {held:?}");
+    }
+}
+
+#[test]
+fn maps_refuse_what_does_not_repeat_every_turn() {
+    let effect = |kind, values: &[f64]| Effect::new(kind, values).expect("in range");
+    for (effect, allowed) in [
+        (effect(Kind::ElasticRestoring, &[0.01]), false),
+        (effect(Kind::BearingHarmonic, &[0.1, 2.5, 0.0]), false),
+        (effect(Kind::BearingHarmonic, &[0.1, 2.0, 0.0]), true),
+        (effect(Kind::BearingHarmonic, &[0.0, 2.5, 0.0]), true),
+        (effect(Kind::EncoderOffset, &[0.1]), true),
+    ] {
+        let pendulum = has(driven(0.1, 0.6, 2.0), effect);
+        let map = basins(&pendulum, &plane(4), &unchecked(), &Control::default()).map(|_| ());
+        let strobe = Strobe::new(&pendulum, 20, path());
+        let moved = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default()).map(|_| ());
+        for result in [map, moved] {
+            match result {
+                Ok(()) => assert!(allowed, "{effect:?}"),
+                Err(error) => {
+                    assert!(!allowed && matches!(error, Error::NotMappable { .. }), "{error}");
+                    let line = error.to_string();
+                    assert!(line.starts_with(effect.kind.definition().name), "{line}");
+                    assert!(line.contains("every turn") && line.lines().count() == 1, "{line}");
+                }
+            }
+        }
+    }
+}
