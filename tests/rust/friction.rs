@@ -200,3 +200,15 @@ fn the_angle_at_which_it_stops_converges_with_the_order_of_the_method() {
     assert!(errors[1] < errors[0] / 60.0, "{errors:?}");
     assert!(errors[2] < 1e-11, "{errors:?}");
 }
+
+#[test]
+fn a_torque_as_great_as_the_friction_leaves_nothing_undecided() {
+    // The edge of being held for ever is then an equality, which rounding must not decide.
+    let pendulum = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.3)
+        .and_then(|p| p.with_friction(0.3))
+        .expect("in range");
+    let map = basins_on_plane(&pendulum, 40);
+    let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
+    assert_eq!(names, ["rest", "inverted rest", "rotation 1:+1"]);
+    assert!(map.share(0) < 0.01, "{} undecided", map.share(0));
+}
