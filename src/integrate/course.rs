@@ -64,7 +64,7 @@ impl<N: Number> Course<N> {
             recorded: None,
             watches: pendulum.has_events(),
             sticks: pendulum.has_friction(),
-            harmonic: plain.is_plain(),
+            harmonic: plain.has_closed_release(),
             plain,
             period: (!changes).then(|| pendulum.period()),
             look: pendulum.period(),

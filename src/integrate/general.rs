@@ -3,39 +3,57 @@
 
 use std::ops::Range;
 
-use super::dop853::{A, B, C, STAGES};
+use super::dop853::{A, C, STAGES};
 use crate::lanes::{Real, Work};
 use crate::model::Pendulum;
 use crate::model::equation::{Equation, Forcing};
 
-/// When the stages of a step are, and how long it is.
-#[derive(Clone, Copy, Debug)]
-pub enum Clock<'a, R> {
-    /// Every trajectory at the same time: what the drive does at the stages and at the end.
-    Shared(&'a [Forcing<f64>; STAGES + 1], R),
-    /// Each at its own: when the step begins.
-    Own(R, R),
+/// When the stages of a step are, and what the drive then does.
+pub trait Clock<R> {
+    /// What the drive does at `stage`; `STAGES` is the step's end.
+    fn forcing(&self, equation: &Equation<R>, stage: usize) -> Forcing<R>;
+    /// The length of the step.
+    fn length(&self) -> R;
 }
 
-impl<R: Real> Clock<'_, R> {
+/// Every trajectory at the same time.
+#[derive(Clone, Copy, Debug)]
+pub struct Shared<'a, R> {
+    /// The drive at the stages and at the end.
+    pub forcing: &'a [Forcing<f64>; STAGES + 1],
     /// The length of the step.
+    pub length: R,
+}
+
+impl<R: Real> Clock<R> for Shared<'_, R> {
+    #[inline(always)]
+    fn forcing(&self, _: &Equation<R>, stage: usize) -> Forcing<R> {
+        self.forcing[stage].like(self.length)
+    }
     #[inline(always)]
     fn length(&self) -> R {
-        match self {
-            Self::Shared(_, length) | Self::Own(_, length) => *length,
-        }
+        self.length
     }
+}
 
-    /// What the drive does at `stage`; `STAGES` is the step's end.
+/// Each trajectory at its own time.
+#[derive(Clone, Copy, Debug)]
+pub struct Own<R> {
+    /// When the step begins.
+    pub begin: R,
+    /// How long it is.
+    pub length: R,
+}
+
+impl<R: Real> Clock<R> for Own<R> {
     #[inline(always)]
     fn forcing(&self, equation: &Equation<R>, stage: usize) -> Forcing<R> {
-        match self {
-            Self::Shared(forcing, length) => forcing[stage].like(*length),
-            Self::Own(begin, length) => {
-                let part = if stage == STAGES { 1.0 } else { C[stage] };
-                equation.forcing(length.scale_add(part, *begin))
-            }
-        }
+        let part = if stage == STAGES { 1.0 } else { C[stage] };
+        equation.forcing(self.length.scale_add(part, self.begin))
+    }
+    #[inline(always)]
+    fn length(&self) -> R {
+        self.length
     }
 }
 
@@ -57,11 +75,11 @@ pub const WHOLE: Range<usize> = 0..STAGES + 1;
 
 /// One step, or a part of it.
 #[derive(Debug)]
-pub struct Stepping<'a, R> {
+pub struct Stepping<'a, R, K> {
     /// The equation of motion.
     pub equation: &'a Equation<R>,
     /// The times.
-    pub clock: Clock<'a, R>,
+    pub clock: K,
     /// The sense of the motion, held over the step.
     pub sense: R,
     /// [`STEP`], [`END`] or [`WHOLE`].
@@ -72,53 +90,59 @@ pub struct Stepping<'a, R> {
     pub ends: &'a mut [R; 2],
 }
 
-impl<R: Real> Work for Stepping<'_, R> {
-    // The formulas of the effects stand here once, in a loop over the stages.
+impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
+    // A loop over the stages, so that the formulas of the effects stand in it once; the table is
+    // written out by a macro, since looked up it takes as long as the formulas.
     #[inline(always)]
     fn run(self) {
         let Self { equation, clock, sense, part, state, ends } = self;
-        let zero = sense.like(0.0);
         let h = clock.length();
-        let mut velocities = [zero; STAGES];
-        let mut accelerations = [zero; STAGES];
+        let Running { theta: theta0, velocity: velocity0 } = *state;
+        let mut velocities = [velocity0; STAGES];
+        let mut accelerations = [velocity0; STAGES];
+        let (mut theta, mut velocity) = (theta0, velocity0);
         let mut i = part.start;
         while i < part.end {
-            let mut now = *state;
-            if i < STAGES {
-                let (mut way, mut gain) = (zero, zero);
-                let mut j = 0;
-                while j < i {
-                    if A[i][j] != 0.0 {
-                        way = velocities[j].scale_add(A[i][j], way);
-                        gain = accelerations[j].scale_add(A[i][j], gain);
-                    }
-                    j += 1;
-                }
-                now.theta = way * h + state.theta;
-                now.velocity = gain * h + state.velocity;
+            macro_rules! row {
+                ($i:literal: $($j:literal)*) => {{
+                    let way = velocities[0].scale(A[$i][0]);
+                    let gain = accelerations[0].scale(A[$i][0]);
+                    $(
+                        let way = velocities[$j].scale_add(A[$i][$j], way);
+                        let gain = accelerations[$j].scale_add(A[$i][$j], gain);
+                    )*
+                    theta = way * h + theta0;
+                    velocity = gain * h + velocity0;
+                }};
+            }
+            match i {
+                1 => row!(1:),
+                2 => row!(2: 1),
+                3 => row!(3: 2),
+                4 => row!(4: 2 3),
+                5 => row!(5: 3 4),
+                6 => row!(6: 3 4 5),
+                7 => row!(7: 3 4 5 6),
+                8 => row!(8: 3 4 5 6 7),
+                9 => row!(9: 3 4 5 6 7 8),
+                10 => row!(10: 3 4 5 6 7 8 9),
+                11 => row!(11: 3 4 5 6 7 8 9 10),
+                _ => {}
             }
             let forcing = clock.forcing(equation, i);
-            let at = equation.point(&forcing, now.theta, now.velocity, sense);
+            let at = equation.point(&forcing, theta, velocity, sense);
             let acceleration = equation.acceleration(&forcing, &at);
             if i == STAGES {
                 ends[1] = acceleration;
                 return;
             }
-            velocities[i] = now.velocity;
+            velocities[i] = velocity;
             accelerations[i] = acceleration;
             i += 1;
             if i == STAGES {
-                let (mut way, mut gain) = (zero, zero);
-                let mut j = 0;
-                while j < STAGES {
-                    if B[j] != 0.0 {
-                        way = velocities[j].scale_add(B[j], way);
-                        gain = accelerations[j].scale_add(B[j], gain);
-                    }
-                    j += 1;
-                }
-                state.theta = way * h + state.theta;
-                state.velocity = gain * h + state.velocity;
+                // The thirteenth row are the weights.
+                row!(12: 5 6 7 8 9 10 11);
+                *state = Running { theta, velocity };
                 ends[0] = accelerations[0];
             }
         }

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
 use super::block::{Block, Held};
-use super::general::{Clock, END, Running, STEP, Stepping, WHOLE};
+use super::general::{Clock, END, Own, Running, STEP, Shared, Stepping, WHOLE};
 use super::step::{Moving, Rubbing};
 use super::stroboscopic::Strobe;
 use super::ticket::{Progress, Reached, Ticket};
@@ -171,7 +171,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let token = self.tokens.1;
         let scale = self.strobe.schedule.kick;
         let one = Q::splat(token, 1.0);
-        let clock = Clock::Shared(&table.steps()[k], Q::splat(token, table.length));
+        let clock = Shared { forcing: &table.steps()[k], length: Q::splat(token, table.length) };
         let mut at = 0;
         while at < block.kick.len() {
             let half_turns = Q::load(token, &block.half_turns[at..]);
@@ -210,10 +210,10 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
 
     /// A part of a step of the general method.
     #[inline(always)]
-    fn carry(
+    fn carry<K: Clock<Q>>(
         &self,
         part: Range<usize>,
-        clock: Clock<'_, Q>,
+        clock: K,
         sense: Q,
         state: &mut Running<Q>,
         ends: &mut [Q; 2],
@@ -278,7 +278,8 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                     velocity: Q::load(token, &asked[1]),
                 };
                 let sense = Q::load(token, &asked[2]);
-                let clock = Clock::Own(Q::load(token, &asked[3]), Q::load(token, &asked[4]));
+                let clock =
+                    Own { begin: Q::load(token, &asked[3]), length: Q::load(token, &asked[4]) };
                 let mut ends = [sense; 2];
                 self.carry(WHOLE, clock, sense, &mut lanes, &mut ends);
                 lanes.theta.store(&mut asked[0]);

@@ -17,7 +17,10 @@ pub struct Pack<S: Isa> {
 }
 
 /// `N` registers side by side. One alone waits for its own results; several hide that latency.
+///
+/// In memory they begin where a line of the cache does: half of each would else lie in the next one.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 pub struct Bundle<S: Isa, const N: usize>([Pack<S>; N]);
 
 impl<S: Isa> Pack<S> {

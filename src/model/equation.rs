@@ -9,7 +9,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::drive::Motion;
-use super::effects::{Action, Kind, MOST_PARAMETERS, Point};
+use super::effects::{Action, Kind, MOST_PARAMETERS, Mappable, Point};
 use super::pendulum::Pendulum;
 use crate::lanes::Real;
 use crate::lanes::sine::{Degree, Fine};
@@ -35,6 +35,8 @@ pub struct Equation<R> {
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
     plain: bool,
+    /// Whether what friction holds changes with the drive, and with the time in the laboratory.
+    holds: [bool; 2],
 }
 
 /// What the drive does at one time.
@@ -87,13 +89,16 @@ impl<R: Real> Equation<R> {
         };
         let (mut torques, mut frictions) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
+        let mut holds = [false; 2];
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
             match effect.kind.definition().action {
                 Action::Position | Action::Velocity | Action::Kinked => {
                     torques.push((effect.kind, parameters));
                 }
-                Action::Friction | Action::SlidingFriction => {
+                Action::Friction | Action::SlidingFriction | Action::LoadedFriction => {
+                    holds[0] |= effect.is(&[Action::LoadedFriction]);
+                    holds[1] |= effect.kind.definition().mappable == Mappable::Frozen;
                     frictions.push((effect.kind, parameters));
                 }
                 Action::Drive => effect.kind.drive(&parameters, &mut motion),
@@ -106,7 +111,19 @@ impl<R: Real> Equation<R> {
         }
         let lab_time = gamma.like(pendulum.lab_time);
         let ages = false;
-        Self { gamma, theta_r, torque, motion, lab_time, ages, torques, frictions, sideways, plain }
+        Self {
+            gamma,
+            theta_r,
+            torque,
+            motion,
+            lab_time,
+            ages,
+            torques,
+            frictions,
+            sideways,
+            plain,
+            holds,
+        }
     }
 
     /// The same with sideways accelerations taken into account even where no effect makes them: for
@@ -149,7 +166,7 @@ impl<R: Real> Equation<R> {
             sum = -(forcing.lateral * at.cosine());
         }
         for (kind, parameters) in &self.torques {
-            sum = sum + kind.torque(parameters, at);
+            sum = sum + kind.torque(parameters, &at.hidden());
         }
         sum
     }
@@ -159,7 +176,7 @@ impl<R: Real> Equation<R> {
     pub fn friction(&self, at: &Point<R>) -> R {
         let mut sum = Kind::CoulombFriction.friction(&Self::only(self.theta_r), at);
         for (kind, parameters) in &self.frictions {
-            sum = sum + kind.friction(parameters, at);
+            sum = sum + kind.friction(parameters, &at.hidden());
         }
         sum
     }
@@ -169,6 +186,14 @@ impl<R: Real> Equation<R> {
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.plain && !self.sideways && self.torques.is_empty() && self.frictions.is_empty()
+    }
+
+    /// Whether a pendulum at rest is loaded by gravity under the harmonic drive and by what does not
+    /// change, against a friction that does not change.
+    #[must_use]
+    pub fn has_closed_release(&self) -> bool {
+        let [loaded, drifting] = self.holds;
+        self.plain && !self.sideways && !loaded && !(drifting && self.ages)
     }
 
     /// `th''` while moving in the sense of `at`.
@@ -220,6 +245,7 @@ impl Equation<f64> {
             frictions: Vec::new(),
             sideways: self.sideways,
             plain: self.plain,
+            holds: self.holds,
         };
         for (kind, [a, b, c]) in &self.torques {
             equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));

@@ -184,7 +184,8 @@ impl Pendulum {
     #[must_use]
     pub fn route(&self) -> Route {
         let has = |actions: &[Action]| self.effects.iter().any(|e| e.is(actions));
-        if has(&[Action::Velocity, Action::Kinked, Action::SlidingFriction]) {
+        let sliding = [Action::SlidingFriction, Action::LoadedFriction];
+        if has(&[Action::Velocity, Action::Kinked]) || has(&sliding) {
             Route::General
         } else if self.has_friction() {
             Route::Friction

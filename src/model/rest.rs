@@ -1,8 +1,9 @@
 //! The pendulum at rest under friction: whether it lasts, and when it ends.
 //!
-//! Stuck now: `|load| <= friction` at `th' = 0`. Under the harmonic drive, with `S = sin th`, the
-//! excess of the load in the sense `s` is `s (torque - S) - s S p cos(omega tau + phase) - theta_r`, so
-//! the release has a closed form. Otherwise the excess is sampled, and looked at closely wherever it
+//! Stuck now: `|load| <= friction` at `th' = 0`. Under the harmonic drive, with `S = sin th` and all
+//! torques and frictions that do not change in `torque` and `theta_r`, the excess of the load in the
+//! sense `s` is `s (torque - S) - s S p cos(omega tau + phase) - theta_r`, so the release has a closed
+//! form. Otherwise the excess is sampled, and looked at closely wherever it
 //! has a maximum.
 
 use std::f64::consts::{PI, TAU};
@@ -32,8 +33,8 @@ pub trait Load {
     }
     /// The equation, for the closed form.
     fn equation(&self) -> &Equation<f64>;
-    /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at
-    /// rest, against a constant friction.
+    /// Whether gravity under the harmonic drive and what does not change load the pendulum at rest,
+    /// against a friction that does not change.
     fn has_closed_release(&self) -> bool;
     /// The time after which the load repeats; `None` if it does not.
     fn period(&self) -> Option<f64>;
@@ -52,7 +53,7 @@ impl Load for Equation<f64> {
         self
     }
     fn has_closed_release(&self) -> bool {
-        self.is_plain()
+        Self::has_closed_release(self)
     }
     fn period(&self) -> Option<f64> {
         (!self.ages).then(|| self.time_scale())
@@ -63,6 +64,11 @@ impl Load for Equation<f64> {
 }
 
 impl Equation<f64> {
+    /// What a drive without sideways motion does where its vertical factor is known.
+    fn at_rest(&self, vertical: f64) -> Forcing<f64> {
+        Forcing { vertical, lateral: 0.0, lab: self.lab_time }
+    }
+
     /// Whether the pendulum at rest at `theta` is never let go.
     #[must_use]
     pub fn holds_for_ever(&self, theta: f64) -> bool {
@@ -80,11 +86,13 @@ impl Equation<f64> {
     /// period; negative where it never does.
     #[must_use]
     pub fn excess(&self, theta: f64) -> f64 {
-        if self.is_plain() {
+        if self.has_closed_release() {
             // The load is linear in the cosine.
-            let sine = theta.sin();
-            let at = |c: f64| (self.torque - (1.0 + self.motion.p * c) * sine).abs();
-            return at(1.0).max(at(-1.0)) - self.theta_r;
+            let load = |c: f64| {
+                let forcing = self.at_rest(1.0 + self.motion.p * c);
+                self.load(&forcing, &self.point(&forcing, theta, 0.0, 1.0)).abs()
+            };
+            return load(1.0).max(load(-1.0)) - self.hold(theta);
         }
         let interval = self.time_scale() / SAMPLES as f64;
         let at = |k: usize| greatest(self, interval * k as f64, theta).0;
@@ -141,12 +149,12 @@ fn greatest<L: Load>(load: &L, tau: f64, theta: f64) -> (f64, f64) {
 fn closed<L: Load>(load: &L, tau: f64, theta: f64, edge: f64) -> Release {
     let equation = load.equation();
     let motion = &equation.motion;
-    let still = Forcing { vertical: 1.0, lateral: 0.0, lab: 0.0 };
+    let still = equation.at_rest(1.0);
     let at = equation.point(&still, theta, 0.0, 1.0);
     let (constant, swing) = (equation.load(&still, &at), -at.sine * motion.p);
     let mut first = None::<(f64, f64)>;
     for sense in [1.0, -1.0] {
-        let limit = equation.friction(&at) - sense * constant;
+        let limit = equation.friction(&at).max(0.0) - sense * constant;
         let size = swing.abs();
         if size - limit <= edge {
             continue;

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix2;
 
 use crate::integrate::State;
-use crate::integrate::general::{Clock, Running, STEP as ALL_STAGES, Stepping};
+use crate::integrate::general::{Own, Running, STEP as ALL_STAGES, Stepping};
 use crate::integrate::tangent::Tangent;
 use crate::lanes::Work;
 use crate::model::pendulum::Route;
@@ -53,7 +53,7 @@ fn carry(
     let number = |value: f64, slope: [f64; 2]| Number { value, slope };
     let mut state =
         Running { theta: number(start[0], [1.0, 0.0]), velocity: number(start[1], [0.0, 1.0]) };
-    let clock = Clock::Own(number(0.0, [0.0; 2]), number(length, [0.0; 2]));
+    let clock = Own { begin: number(0.0, [0.0; 2]), length: number(length, [0.0; 2]) };
     let sense = number(sense, [0.0; 2]);
     let (state, ends) = (&mut state, &mut [sense; 2]);
     Stepping { equation, clock, sense, part: ALL_STAGES, state, ends }.run();

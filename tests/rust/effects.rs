@@ -79,9 +79,11 @@ fn definitions_are_whole() {
         assert!(!revealed_by.is_empty(), "{name}");
         assert!((1..=MOST_PARAMETERS).contains(&parameters.len()), "{name}");
         let expected = match action {
-            Action::Velocity | Action::Kinked | Action::Friction | Action::SlidingFriction => {
-                Group::Damping
-            }
+            Action::Velocity
+            | Action::Kinked
+            | Action::Friction
+            | Action::SlidingFriction
+            | Action::LoadedFriction => Group::Damping,
             Action::Position => Group::Torque,
             Action::Drive | Action::FurtherDrive => Group::Drive,
             Action::Reading => Group::Reading,

@@ -1,5 +1,7 @@
 //! What an effect is: its definition, and the formulas that it may have.
 
+use std::hint::black_box;
+
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 use crate::model::drive::Motion;
@@ -51,6 +53,8 @@ pub enum Action {
     Friction,
     /// The same, and depending on the velocity besides.
     SlidingFriction,
+    /// The same, and on the drive too, so that what it holds changes during a period.
+    LoadedFriction,
     /// Another amplitude, phase or frequency of the harmonic drive.
     Drive,
     /// The pivot moves in another way besides.
@@ -167,6 +171,14 @@ impl<R: Real> Point<R> {
         self.velocity * self.sense
     }
 
+    /// The same, and the compiler cannot tell: it would else compute ahead of a loop over effects
+    /// whatever cosines and logarithms any effect of the library might want.
+    #[inline(always)]
+    #[must_use]
+    pub fn hidden(&self) -> Self {
+        Self { theta: black_box(self.theta), velocity: black_box(self.velocity), ..*self }
+    }
+
     /// A constant.
     #[inline(always)]
     #[must_use]
@@ -175,13 +187,21 @@ impl<R: Real> Point<R> {
     }
 }
 
-/// An effect's definition and formulas. Parameters come in the order of the definition.
+/// An effect's definition and formulas. Parameters come in the order of the definition; torque,
+/// friction, drive and reading take them as [`Law::ready`] makes them.
 ///
 /// The formulas are written over [`Real`], so that lanes, single numbers and numbers with
 /// derivatives, by the state and by the parameters alike, run through the same lines.
 pub trait Law {
     /// Name, formula, parameters and the rest.
     const DEFINITION: Definition;
+
+    /// The parameters as the formulas below take them: what takes its time, like a reciprocal, is
+    /// done once.
+    #[must_use]
+    fn ready<R: Real>(parameters: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
+        parameters
+    }
 
     /// The torque per inertia, `th'' = ... + torque`.
     #[inline(always)]

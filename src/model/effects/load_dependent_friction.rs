@@ -15,7 +15,7 @@ impl Law for LoadDependentFriction {
     const DEFINITION: Definition = Definition {
         name: "load_dependent_friction",
         group: Group::Damping,
-        action: Action::SlidingFriction,
+        action: Action::LoadedFriction,
         formula: "-k (|(1 + a) cos(theta) + v^2/w0^2| - 1) sign(v)",
         parameters: &[Parameter {
             name: "k",

@@ -38,9 +38,13 @@ impl Law for Magnet {
         mappable: Mappable::Yes,
     };
 
+    fn ready<R: Real>([amplitude, width, rest]: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
+        [amplitude, width.like(1.0) / width, rest]
+    }
+
     #[inline(always)]
-    fn torque<R: Real>([amplitude, width, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
-        let part = at.wrapped() / *width;
+    fn torque<R: Real>([amplitude, narrowness, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        let part = at.wrapped() * *narrowness;
         -(*amplitude * part * (part * part).scale(-0.5).exponential())
     }
 }

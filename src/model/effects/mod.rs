@@ -36,6 +36,14 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::ready`].
+            #[must_use]
+            pub fn ready<R: Real>(self, parameters: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
+                match self {
+                    $(Self::$law => $module::$law::ready(parameters),)*
+                }
+            }
+
             /// [`Law::torque`].
             #[inline(always)]
             pub fn torque<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
@@ -167,10 +175,12 @@ impl Effect {
         &self.parameters[..self.kind.definition().parameters.len()]
     }
 
-    /// Its parameters as numbers of another kind: `number` makes one of each value.
+    /// Its parameters as its formulas take them, in numbers of another kind: `number` makes one of
+    /// each value.
     pub fn lift<R: Real>(&self, number: impl FnMut(f64) -> R) -> [R; MOST_PARAMETERS] {
         let values: Vec<R> = self.values().iter().copied().map(number).collect();
-        std::array::from_fn(|i| values.get(i).map_or(values[0].like(0.0), |value| *value))
+        let none = values[0].like(0.0);
+        self.kind.ready(std::array::from_fn(|i| values.get(i).map_or(none, |value| *value)))
     }
 
     /// Whether it acts in one of these ways.
@@ -182,7 +192,7 @@ impl Effect {
     /// Whether it is a friction that can hold the pendulum fast.
     #[must_use]
     pub fn rubs(&self) -> bool {
-        self.is(&[Action::Friction, Action::SlidingFriction])
+        self.is(&[Action::Friction, Action::SlidingFriction, Action::LoadedFriction])
     }
 
     /// Whether it is the same for the mirrored motion, at the same phase of the drive.

@@ -37,9 +37,13 @@ impl Law for StribeckFriction {
         mappable: Mappable::Yes,
     };
 
+    fn ready<R: Real>([a, vs, rest]: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
+        [a, vs.like(1.0) / vs, rest]
+    }
+
     #[inline(always)]
-    fn friction<R: Real>([a, vs, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
-        let part = at.velocity / *vs;
+    fn friction<R: Real>([a, slowness, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        let part = at.velocity * *slowness;
         *a * (-(part * part)).exponential()
     }
 }
