@@ -12,7 +12,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError
-from pendmap.model import PRESETS, Effect, Pendulum, Rig, load_model, save_model
+from pendmap.model import (
+    PRESETS,
+    Effect,
+    Pendulum,
+    Rig,
+    load_model,
+    save_model,
+)
+from pendmap.model.library import EffectDefinition, EffectParameter, effects
 
 if TYPE_CHECKING:
     from pendmap.grid import Axis, Grid
@@ -24,6 +32,8 @@ __all__ = [
     "PRESETS",
     "Axis",
     "Effect",
+    "EffectDefinition",
+    "EffectParameter",
     "Grid",
     "InputError",
     "Pendulum",
@@ -31,6 +41,7 @@ __all__ = [
     "advance",
     "basins",
     "basins_of",
+    "effects",
     "load",
     "load_model",
     "save",

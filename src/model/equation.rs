@@ -193,7 +193,8 @@ impl<R: Real> Equation<R> {
     #[must_use]
     pub fn has_closed_release(&self) -> bool {
         let [loaded, drifting] = self.holds;
-        self.plain && !self.sideways && !loaded && !(drifting && self.ages)
+        let holds_alike = !(loaded || drifting && self.ages);
+        self.plain && !self.sideways && holds_alike
     }
 
     /// `th''` while moving in the sense of `at`.

@@ -58,7 +58,7 @@ def test_help_imports_nothing_heavy() -> None:
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
-    for name in ("info", "simulate", "basins", "rig", "plot", "view"):
+    for name in ("info", "effects", "simulate", "basins", "rig", "plot", "view"):
         assert name in run.stdout
 
 

@@ -20,6 +20,7 @@ INTERRUPTED = 130
 
 _COMMANDS = {
     "info": "Show the version, the instruction set used, the threads.",
+    "effects": "Show the library of effects: formula, parameters, which data reveal each.",
     "simulate": "Integrate one trajectory: time history, phase plane, Poincaré section.",
     "basins": "Map the basins of attraction.",
     "rig": "Write an experiment of a virtual rig, its truth beside it.",

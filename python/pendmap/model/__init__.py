@@ -1,8 +1,8 @@
 """The models: a pendulum without dimensions, a rig in SI, their effects and their files.
 
-``effects`` reads the library, ``units`` holds the one formula of conversion, ``pendulum`` and
-``rig`` are the two kinds of model, ``quantities`` finds a rig's numbers from what was given,
-``files`` reads and writes TOML.
+``effects`` reads the library, ``library`` shows it, ``units`` holds the one formula of conversion,
+``pendulum`` and ``rig`` are the two kinds of model, ``quantities`` finds a rig's numbers from what
+was given, ``files`` reads and writes TOML.
 """
 
 from pendmap.model.effects import Effect

@@ -1,0 +1,91 @@
+"""The library of effects, for reading: what ``pendmap.effects()`` returns."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from pendmap.model.effects import library
+
+__all__ = ["EffectDefinition", "EffectParameter", "effects"]
+
+
+@dataclasses.dataclass(frozen=True)
+class EffectParameter:
+    """A parameter of an effect.
+
+    Attributes
+    ----------
+    name : str
+        Its key in model files.
+    unit : str
+        Its unit in SI.
+    power_of_w0 : int
+        Its value in SI is the one without dimensions times this power of ``w0``;
+    power_of_w0_less : str or None
+        where it names another parameter of the effect, the power is that much less.
+    range : (float, float)
+        The least and the greatest value allowed, without dimensions.
+    typical : (float, float)
+        The smallest and the largest value of interest, without dimensions.
+    meaning : str
+        What it is.
+    """
+
+    name: str
+    unit: str
+    power_of_w0: int
+    power_of_w0_less: str | None
+    range: tuple[float, float]
+    typical: tuple[float, float]
+    meaning: str
+
+
+@dataclasses.dataclass(frozen=True)
+class EffectDefinition:
+    """What the library says about an effect.
+
+    Attributes
+    ----------
+    name : str
+        The field's standard term.
+    group : str
+        Where it acts: ``damping``, ``torque``, ``drive`` or ``reading``.
+    formula : str
+        Its term on the right of ``th'' = ...``, per moment of inertia, with ``v = th'``; of a drive
+        what the pivot does, of a reading what the sensor shows.
+    parameters : tuple of EffectParameter
+        Its parameters, in order.
+    mappable : str
+        Whether a map over initial conditions can have it: ``yes``, ``frozen`` (with the time in the
+        laboratory held) or ``no``.
+    revealed_by : str
+        Which data show it.
+    """
+
+    name: str
+    group: str
+    formula: str
+    parameters: tuple[EffectParameter, ...]
+    mappable: str
+    revealed_by: str
+
+
+def effects() -> list[EffectDefinition]:
+    """Return the library of effects, in the order in which it is shown.
+
+    It is written in Rust, one file for each effect; nothing about one is written here.
+
+    >>> import pendmap
+    >>> [effect.formula for effect in pendmap.effects() if effect.name == "quadratic_drag"]
+    ['-q v |v|']
+    """
+    return [_effect(entry) for entry in library().values()]
+
+
+def _effect(entry: dict[str, Any]) -> EffectDefinition:
+    return EffectDefinition(**entry | {"parameters": tuple(map(_parameter, entry["parameters"]))})
+
+
+def _parameter(entry: dict[str, Any]) -> EffectParameter:
+    return EffectParameter(**entry | {key: tuple(entry[key]) for key in ("range", "typical")})

@@ -1,0 +1,126 @@
+"""The library of effects, in Python and on the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pty
+import subprocess
+from typing import TYPE_CHECKING
+
+import pytest
+
+import pendmap
+from conftest import COMMAND
+from pendmap import InputError, _core
+
+if TYPE_CHECKING:
+    from conftest import Run
+
+NAMES = [effect.name for effect in pendmap.effects()]
+TORQUES = [e.name for e in pendmap.effects() if e.group != "reading" and e.mappable != "no"]
+OWN = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
+
+
+def middle(name: str) -> pendmap.Effect:
+    """The effect with values from the middle of what is typical."""
+    (effect,) = (e for e in pendmap.effects() if e.name == name)
+    values = {p.name: sum(p.typical) / 2 for p in effect.parameters}
+    if name == "bearing_harmonic":
+        values["n"] = 3.0
+    return pendmap.Effect(name, values)
+
+
+def pendulum(name: str) -> pendmap.Pendulum:
+    effect = middle(name)
+    if name in OWN:
+        return pendmap.Pendulum(p=0.6, **{OWN[name]: effect.values[0]})
+    return pendmap.Pendulum(p=0.6, effects=(effect,), lab_time=100.0)
+
+
+def test_the_library_is_that_of_the_kernel() -> None:
+    assert [entry["name"] for entry in _core.effects()] == NAMES
+    assert len(set(NAMES)) == len(NAMES) >= 22
+    for effect in pendmap.effects():
+        assert effect.group in {"damping", "torque", "drive", "reading"}
+        assert effect.mappable in {"yes", "frozen", "no"}
+        for parameter in effect.parameters:
+            assert parameter.name in effect.formula
+            assert parameter.range[0] <= parameter.typical[0] < parameter.typical[1]
+            assert parameter.typical[1] <= parameter.range[1]
+            assert parameter.unit
+            assert parameter.meaning
+
+
+def test_json_has_all_of_it(pendmap_command: Run) -> None:
+    run = pendmap_command("effects", "--json")
+    assert run.returncode == 0, run.stderr
+    effects = json.loads(run.stdout, parse_constant=pytest.fail)["effects"]
+    assert [e["name"] for e in effects] == NAMES
+    keys = {"name", "group", "formula", "parameters", "mappable", "revealed_by"}
+    assert all(set(e) == keys for e in effects)
+    (drag,) = (e for e in effects if e["name"] == "power_law_drag")
+    assert drag["parameters"][0]["power_of_w0_less"] == "n"
+    assert drag["parameters"][0]["range"] == [None, None]
+    assert drag["parameters"][1]["range"] == [0.5, 4.0]
+
+
+def test_what_is_written_names_every_effect_and_parameter(pendmap_command: Run) -> None:
+    said = pendmap_command("effects").stdout
+    for effect in pendmap.effects():
+        assert f"{effect.name:<24} {effect.formula}\n" in said
+        assert all(f" {p.name}" in said and p.meaning in said for p in effect.parameters)
+    one = pendmap_command("effects", "magnet", "--json")
+    assert [e["name"] for e in json.loads(one.stdout)["effects"]] == ["magnet"]
+
+
+def test_on_a_terminal_it_is_a_table() -> None:
+    ours, theirs = pty.openpty()
+    try:
+        subprocess.run(
+            [str(COMMAND), "effects", "magnet", "stribeck_friction"],
+            stdout=theirs,
+            env=os.environ | {"COLUMNS": "200", "TERM": "xterm"},
+            check=True,
+        )
+        said = os.read(ours, 65536).decode()
+    finally:
+        os.close(theirs)
+        os.close(ours)
+    assert "revealed by" in said
+    assert "magnet" in said
+    assert "vs [rad/s]" in said
+
+
+def test_an_unknown_name_gets_one_line(pendmap_command: Run) -> None:
+    run = pendmap_command("effects", "magnett")
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert len(run.stderr.strip().splitlines()) == 1
+    assert "magnet" in run.stderr
+
+
+@pytest.mark.parametrize("name", TORQUES)
+def test_maps_and_trajectories_agree(name: str) -> None:
+    model = pendulum(name)
+    # A drift goes on in a trajectory and is held in a map: over one period it makes no difference.
+    run = pendmap.simulate(model, 1.0, 0.3, model.period, tol=1e-10)
+    theta, velocity, _ = pendmap.advance(model, [1.0], [0.3], periods=1, tol=1e-7)
+    tolerance = 1e-3 if name.endswith("drift") else 1e-6
+    difference = float(run.theta[-1]) - theta[0]
+    assert math.remainder(difference, math.tau) == pytest.approx(0, abs=tolerance)
+    assert float(run.velocity[-1]) == pytest.approx(velocity[0], abs=tolerance)
+
+
+def test_what_does_not_repeat_every_turn_is_simulated_and_not_mapped() -> None:
+    spring = pendmap.Pendulum(p=0.6, effects=(middle("elastic_restoring"),))
+    assert pendmap.simulate(spring, 1.0, 0.0, 10.0).theta.size > 1
+    uneven = pendmap.Effect("bearing_harmonic", {"amplitude": 0.1, "n": 2.5, "psi": 0.0})
+    for model in (spring, pendmap.Pendulum(p=0.6, effects=(uneven,))):
+        for ask in (
+            lambda model=model: pendmap.basins(model, pendmap.Grid.square(4)),
+            lambda model=model: pendmap.advance(model, [1.0], [0.0], periods=1),
+        ):
+            with pytest.raises(InputError, match="not in maps: it does not repeat every turn"):
+                ask()
