@@ -63,6 +63,8 @@ pub enum Error {
         /// The smallest error reached.
         reached: f64,
     },
+    /// Motions leave the range of numbers.
+    Diverges,
     /// The caller asked to stop.
     Interrupted,
     /// The thread pool could not be made.
@@ -100,6 +102,9 @@ impl fmt::Display for Error {
             Self::Tolerance { tol, reached } => write!(
                 f,
                 "tol is {tol:e}: the smallest error that steps can reach here is {reached:.1e}"
+            ),
+            Self::Diverges => f.write_str(
+                "the motion leaves the range of numbers: an effect of this model feeds it energy",
             ),
             Self::Interrupted => f.write_str("interrupted"),
             Self::Threads(why) => write!(f, "threads: {why}"),

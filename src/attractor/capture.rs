@@ -289,7 +289,7 @@ impl<'a> Watch<'a> {
         let creeps = tenant.held.is_some_and(|(clock, before)| {
             clock + 1 == self.clock && excess < before && excess < CREEPING * limit
         });
-        if excess <= 0.0 || creeps {
+        if equation.holds_for_ever(theta) || creeps {
             let end = (self.theta(lane), self.velocity(lane), self.block.turns[lane], self.clock);
             self.hand_over(tenant, Fate::Captured(rest), end);
             return true;

@@ -143,6 +143,10 @@ impl Catalogue {
     ) -> bool {
         let mut returns: Vec<(f64, State, usize)> = Vec::new();
         for track in tracks(strobe, alive) {
+            if strobe.friction && track.iter().all(|state| state[1] == 0.0) {
+                // Held at every period's end: no orbit, and every n would fit.
+                continue;
+            }
             let near = (1..=LONGEST_CYCLE)
                 .map(|n| (distance(track[n], track[0]), track[0], n))
                 .filter(|r| r.0 < NEAR);

@@ -60,7 +60,8 @@ fn after(strobe: &Strobe, starts: &[State]) -> Vec<State> {
 /// The stroboscopic map with the fewest steps a period that reach `tol`, and the error reached.
 ///
 /// # Errors
-/// [`Error::Range`] if `tol` is outside [`TOLERANCES`]; [`Error::Tolerance`] if no number of steps
+/// [`Error::Range`] if `tol` is outside [`TOLERANCES`]; [`Error::Diverges`] if most motions leave the
+/// range of numbers however many steps are taken; [`Error::Tolerance`] if no number of steps
 /// reaches it, as rounding may forbid on chaotic starts.
 pub fn choose(
     pendulum: &Pendulum,
@@ -108,5 +109,7 @@ pub fn choose(
             break;
         }
     }
-    enough.ok_or(Error::Tolerance { tol, reached: best })
+    let missed =
+        if best.is_finite() { Error::Tolerance { tol, reached: best } } else { Error::Diverges };
+    enough.ok_or(missed)
 }

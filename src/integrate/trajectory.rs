@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accuracy::{PERIODS, TOLERANCES};
 use super::course::{Course, FINEST};
-use super::event::Event;
+use super::event::{Event, EventKind};
 use super::flight::Flight;
 use super::sample::{Sampled, sample};
 use super::stroboscopic::State;
@@ -106,14 +106,19 @@ fn from(pendulum: &Pendulum, request: &Request, cancel: &AtomicBool) -> Result<T
         (Run::to(pendulum, request, &time, tolerance, cancel)?, Vec::new())
     };
     let end = run.states[run.states.len() - 1];
+    if !(end[0].is_finite() && end[1].is_finite()) {
+        return Err(Error::Diverges);
+    }
     let periods = request.until / pendulum.period();
+    // What is held for ever neither parts nor comes together any more.
+    let held = run.events.last().is_some_and(|e| e.kind == EventKind::StuckForEver);
     Ok(Trajectory {
         theta: run.states.iter().map(|state| state[0]).collect(),
         velocity: run.states.iter().map(|state| state[1]).collect(),
         reached_error,
         end_error: distance(end, coarse.states[0]),
         steps: (run.steps as f64 / periods).ceil() as usize,
-        exponent: batch_means(&growth, interval),
+        exponent: if held { None } else { batch_means(&growth, interval) },
         stuck: run.stuck,
         events: run.events,
         time,

@@ -72,7 +72,7 @@ impl Equation<f64> {
     /// Whether the pendulum at rest at `theta` is never let go.
     #[must_use]
     pub fn holds_for_ever(&self, theta: f64) -> bool {
-        self.excess(theta) <= 0.0
+        self.excess(theta) <= EDGE * self.hold(theta)
     }
 
     /// What a load must exceed to move the pendulum from `theta`, at `tau = 0`.

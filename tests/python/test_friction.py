@@ -143,3 +143,19 @@ def test_the_same_with_friction_as_without_it_where_nothing_turns() -> None:
     pushed = pendmap.simulate(Pendulum(torque=-0.05), 0, 7, 5, tol=1e-12)
     assert (rubbing.velocity.values > 0).all()
     assert rubbing.theta.values == pytest.approx(pushed.theta.values, abs=1e-12)
+
+
+def test_what_is_held_for_ever_has_no_exponent() -> None:
+    run = pendmap.simulate(
+        pendmap.Pendulum(p=1.5, omega=0.87, theta_r=0.2), 1.0, 0.0, 100.0, lyapunov=True
+    )
+    assert run.attrs["stuck"]
+    assert "exponent" not in run.attrs
+
+
+def test_a_motion_that_an_effect_feeds_is_refused_in_one_line() -> None:
+    fed = pendmap.Pendulum(effects=(pendmap.Effect("quadratic_drag", {"q": -1.0}),))
+    with pytest.raises(pendmap.InputError, match="leaves the range of numbers"):
+        pendmap.simulate(fed, 1.0, 2.0, 30.0)
+    with pytest.raises(pendmap.InputError, match="leaves the range of numbers"):
+        pendmap.basins(fed, pendmap.Grid.square(20))

@@ -1,9 +1,11 @@
 //! Coulomb friction in lanes: turns, sticks and releases, against reference values.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::atomic::AtomicBool;
 
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::flow::Flow;
+use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, Strobe};
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::Control;
@@ -199,4 +201,61 @@ fn the_angle_at_which_it_stops_converges_with_the_order_of_the_method() {
     let errors = [24, 48, 96].map(error);
     assert!(errors[1] < errors[0] / 60.0, "{errors:?}");
     assert!(errors[2] < 1e-11, "{errors:?}");
+}
+
+#[test]
+fn a_torque_as_great_as_the_friction_leaves_nothing_undecided() {
+    // The edge of being held for ever is then an equality, which rounding must not decide.
+    let pendulum = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.3)
+        .and_then(|p| p.with_friction(0.3))
+        .expect("in range");
+    let map = basins_on_plane(&pendulum, 40);
+    let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
+    assert_eq!(names, ["rest", "inverted rest", "rotation 1:+1"]);
+    assert!(map.share(0) < 0.01, "{} undecided", map.share(0));
+}
+
+/// Events of one trajectory over one period.
+fn events(pendulum: &Pendulum, start: State) -> usize {
+    let request =
+        Request { start, until: pendulum.period(), tol: 1e-12, samples: 1, lyapunov: false };
+    simulate(pendulum, &request, &AtomicBool::new(false)).expect("a trajectory").events.len()
+}
+
+#[test]
+fn a_velocity_that_only_just_touches_zero_is_not_missed() {
+    // Between a start whose velocity passes zero and one whose velocity does not lies one that
+    // grazes it: on both sides, ever nearer, lanes must do what the reference does.
+    let pendulum = rubbing(0.02, 1.0, 2.0, 0.05);
+    let flow = Flow::new(&pendulum);
+    let strobe = Strobe::new(&pendulum, 60, path());
+    let mut grazings = 0;
+    for theta in [-2.8, -2.2, -1.5, -0.6, 0.4, 1.3, 2.4] {
+        let at = |k: usize| [theta, -2.9 + 0.1 * k as f64];
+        for k in 0..58 {
+            let (mut low, mut high) = (at(k)[1], at(k + 1)[1]);
+            let few = events(&pendulum, [theta, low]);
+            if events(&pendulum, [theta, high]) == few {
+                continue;
+            }
+            for _ in 0..45 {
+                let middle = 0.5 * (low + high);
+                if events(&pendulum, [theta, middle]) == few {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            grazings += 1;
+            for offset in [1e-3, 1e-5, 1e-7, 1e-9, 1e-11] {
+                for velocity in [low - offset, high + offset] {
+                    let start = [theta, velocity];
+                    let truth = flow.carry(start, 0.0, pendulum.period()).state;
+                    let error = distance(advanced(&strobe, &[start], 1)[0], truth);
+                    assert!(error < 1e-8, "{start:?}: {error:e}");
+                }
+            }
+        }
+    }
+    assert!(grazings > 10, "{grazings}");
 }

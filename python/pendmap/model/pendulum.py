@@ -137,7 +137,7 @@ class Pendulum:
 
     @property
     def title(self) -> str:
-        """The parameters in one line, zeros left out."""
+        """The parameters in one line, zeros left out, a time that effects drift from not."""
         shown = [("\N{GREEK SMALL LETTER GAMMA}", self.gamma), ("p", self.p)]
         if self.p != 0:
             shown.append(("\N{GREEK SMALL LETTER OMEGA}", self.omega))
@@ -147,7 +147,8 @@ class Pendulum:
             ("\N{GREEK SMALL LETTER THETA}r", self.theta_r),
             ("lab time", self.lab_time),
         )
-        shown += [(name, value) for name, value in others if value != 0]
+        drifting = "lab time" if any(effect.drifts for effect in self.effects) else ""
+        shown += [(name, value) for name, value in others if value != 0 or name == drifting]
         parts = [f"{name} = {value:g}" for name, value in shown]
         return ", ".join([*parts, *(effect.title for effect in self.effects)])
 

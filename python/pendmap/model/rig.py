@@ -233,7 +233,7 @@ class Rig:
 
     @property
     def title(self) -> str:
-        """The parameters in one line, zeros left out."""
+        """The parameters in one line, zeros left out, a time that effects drift from not."""
         shown = [f"w0 = {self.w0:g} rad/s", f"c/m = {self.c_over_m:g} 1/s", f"p = {self.p:g}"]
         if self.Omega != 0:
             shown.append(f"\N{GREEK CAPITAL LETTER OMEGA} = {self.Omega:g} rad/s")
@@ -241,7 +241,10 @@ class Rig:
             (f"\N{GREEK SMALL LETTER PHI} = {self.phi:g}", self.phi),
             (f"torque = {self.torque:g} rad/s\N{SUPERSCRIPT TWO}", self.torque),
             (f"Tr = {self.Tr:g} rad/s\N{SUPERSCRIPT TWO}", self.Tr),
-            (f"lab time = {self.lab_time_s:g} s", self.lab_time_s),
+            (
+                f"lab time = {self.lab_time_s:g} s",
+                self.lab_time_s or any(effect.drifts for effect in self.effects),
+            ),
         )
         shown += [text for text, value in others if value != 0]
         return ", ".join([*shown, *(effect.title for effect in self.effects)])
