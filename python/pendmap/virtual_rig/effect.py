@@ -215,8 +215,11 @@ class Effect:
         return 0.0
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
-        """Time derivatives of the effect's own variables ``own``, shape (L, K, states)."""
-        raise NotImplementedError
+        """Time derivatives of the effect's own variables ``own``, shape (L, K, states).
+
+        Most effects have none, so that there is nothing to change.
+        """
+        return own[..., :0]
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
         """Return the drive that acts, given the one that was meant and when the runs began."""

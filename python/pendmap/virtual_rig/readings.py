@@ -38,7 +38,7 @@ class ReadingEffect(Effect):
 
     def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
         """Return what is read, rad, for true angles in order of time; shapes (N,)."""
-        raise NotImplementedError
+        return angle
 
 
 def read(path: Path, time: Floats, effects: list[ReadingEffect]) -> Floats:
