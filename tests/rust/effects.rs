@@ -4,25 +4,17 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::fs;
 
-use pendmap::error::Error;
-use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::flow::Flow;
-use pendmap::integrate::sample::sample;
+use pendmap::integrate::State;
 use pendmap::integrate::tangent::Tangent;
-use pendmap::integrate::{State, Strobe};
-use pendmap::maps::advance::advance;
-use pendmap::maps::basins::basins;
-use pendmap::maps::control::Control;
 use pendmap::model::effects::{
     Action, Definition, Group, MOST_PARAMETERS, Mappable, Parameter, Power,
 };
 use pendmap::model::{Effect, Equation, Kind, Observation, Pendulum};
 
-use crate::support::{advanced, bits, columns, driven, path, paths, plane, spread, unchecked};
+use crate::support::{driven, spread};
 
 /// Numbers between 0 and 1 that look drawn at random.
-struct Draws(u64);
+pub struct Draws(pub u64);
 
 impl Draws {
     fn next(&mut self) -> f64 {
@@ -30,12 +22,12 @@ impl Draws {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
+    pub fn between(&mut self, [low, high]: [f64; 2]) -> f64 {
         low + (high - low) * self.next()
     }
 
     /// The effect with typical values; one that counts periods counts whole ones.
-    fn effect(&mut self, kind: Kind) -> Effect {
+    pub fn effect(&mut self, kind: Kind) -> Effect {
         let value = |p: &Parameter| {
             let value = self.between(p.typical);
             if (kind, p.name) == (Kind::BearingHarmonic, "n") { value.round() } else { value }
@@ -45,7 +37,8 @@ impl Draws {
     }
 }
 
-fn has(pendulum: Pendulum, effect: Effect) -> Pendulum {
+/// The pendulum with the effect, 250 into the laboratory's time.
+pub fn has(pendulum: Pendulum, effect: Effect) -> Pendulum {
     let mut pendulum = pendulum.with_effect(effect).expect("once");
     pendulum.lab_time = 250.0;
     pendulum
@@ -316,155 +309,5 @@ fn what_keeps_the_mirror_image_says_so() {
         let claimed = pendulum.is_mirror_symmetric();
         assert_eq!(claimed, worst < 1e-13, "{effect:?}: {worst:e}");
         assert!(claimed || worst > 1e-5, "{effect:?}: {worst:e}");
-    }
-}
-
-/// All that a map may have, each without and with Coulomb friction.
-fn mappable() -> Vec<(Kind, Pendulum)> {
-    let mut draws = Draws(6);
-    let mut all = Vec::new();
-    for kind in Kind::ALL {
-        if kind.definition().mappable == Mappable::No {
-            continue;
-        }
-        for theta_r in [0.0, 0.05] {
-            let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
-            let effect = draws.effect(*kind);
-            let twice = match kind {
-                Kind::ViscousDamping => true,
-                Kind::CoulombFriction => theta_r > 0.0,
-                _ => false,
-            };
-            if !twice {
-                all.push((*kind, has(base, effect)));
-            }
-        }
-    }
-    all
-}
-
-#[test]
-fn one_at_a_time_gives_the_same_bits() {
-    for (_, pendulum) in mappable() {
-        for path in paths() {
-            let strobe = Strobe::new(&pendulum, 30, path);
-            let states = spread(100, PI, 3.0);
-            let run = |singly: bool| {
-                let (mut theta, mut velocity) = columns(&states);
-                let mut turns = vec![0.0; states.len()];
-                let (a, b, c) = (&mut theta[..], &mut velocity[..], &mut turns[..]);
-                if singly {
-                    strobe.advance_singly(a, b, c, 2).expect("equal lengths");
-                } else {
-                    strobe.advance(a, b, c, 2).expect("equal lengths");
-                }
-                [bits(&theta), bits(&velocity), bits(&turns)]
-            };
-            assert_eq!(run(false), run(true), "{path}, {pendulum:?}");
-        }
-    }
-}
-
-/// The median and the greatest distance from the reference integrator after three periods.
-fn errors_in_lanes(pendulum: &Pendulum, steps: usize) -> [f64; 2] {
-    let starts = spread(60, PI, 3.0);
-    let flow = Flow::new(pendulum);
-    let strobe = Strobe::new(pendulum, steps, path());
-    let ends = advanced(&strobe, &starts, 3);
-    let far = |(start, end): (&State, &State)| {
-        distance(*end, flow.carry(*start, 0.0, 3.0 * pendulum.period()).state)
-    };
-    let mut errors: Vec<f64> = starts.iter().zip(&ends).map(far).collect();
-    errors.sort_by(f64::total_cmp);
-    [errors[errors.len() / 2], errors[errors.len() - 1]]
-}
-
-#[test]
-fn lanes_agree_with_the_reference_integrator() {
-    for (kind, pendulum) in mappable() {
-        let [median, error] = errors_in_lanes(&pendulum, 120);
-        println!("{median:e} {error:e} {:?} {}", pendulum.effects, pendulum.theta_r);
-        let allowed = match kind {
-            // Its corner lies anywhere within a step.
-            Kind::LoadDependentFriction => 1e-3,
-            // After a turn its torque grows as a power of time that is not whole.
-            Kind::PowerLawDrag => 1e-7,
-            _ => 1e-9,
-        };
-        assert!(error < allowed, "{pendulum:?}: {error:e}");
-    }
-}
-
-#[test]
-fn a_friction_that_turns_negative_holds_nothing() {
-    let base = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
-    for (kind, values) in [
-        (Kind::StribeckFriction, &[-0.08, 0.5][..]),
-        (Kind::LoadDependentFriction, &[0.3]),
-        (Kind::CoulombDrift, &[-4e-4]),
-    ] {
-        let pendulum = has(base.clone(), Effect::new(kind, values).expect("in range"));
-        let [median, error] = errors_in_lanes(&pendulum, 200);
-        println!("{kind:?} {median:e} {error:e}");
-        assert!(error < 1e-3, "{kind:?}: {error:e}");
-        // At a quarter turn all three are negative, and the load is what moves it.
-        let arrival = Flow::new(&pendulum).carry([0.5 * PI, 0.0], 0.0, 0.1);
-        assert!(arrival.state[1] < -0.01 && !arrival.stuck, "{kind:?}: {arrival:?}");
-    }
-}
-
-#[test]
-fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
-    let effect = |kind, r| Effect::new(kind, &[r]).expect("in range");
-    let plain = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
-    let rougher = driven(0.1, 0.6, 2.0).with_friction(0.15).expect("in range");
-    let drifting = has(plain, effect(Kind::CoulombDrift, 4e-4));
-    let states = spread(50, PI, 3.0);
-    let [a, b] = [&rougher, &drifting].map(|p| advanced(&Strobe::new(p, 150, path()), &states, 3));
-    for (a, b) in a.iter().zip(&b) {
-        assert!(distance(*a, *b) < 1e-10, "{a:?} {b:?}");
-    }
-    for kind in [Kind::CoulombDrift, Kind::ViscousDrift] {
-        // Two stretches, one after the other, are one.
-        let early = has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind, 3e-4));
-        let mut late = early.clone();
-        late.lab_time += 5.0;
-        let end = |pendulum: &Pendulum, from: State, until: f64| {
-            let course = Course::new(pendulum, true, 1e-13, |_, value| value);
-            sample(&course, 0.0, from, &[until], |_, _| true).states[0]
-        };
-        let whole = end(&early, [2.0, 0.0], 9.0);
-        let parts = end(&late, end(&early, [2.0, 0.0], 5.0), 4.0);
-        assert!(distance(whole, parts) < 1e-11, "{kind:?}: {whole:?} {parts:?}");
-        let held = end(&early, end(&early, [2.0, 0.0], 5.0), 4.0);
-        assert!(distance(whole, held) > 1e-4, "{kind:?}: {whole:?} {held:?}");
-    }
-}
-
-#[test]
-fn maps_refuse_what_does_not_repeat_every_turn() {
-    let effect = |kind, values: &[f64]| Effect::new(kind, values).expect("in range");
-    for (effect, allowed) in [
-        (effect(Kind::ElasticRestoring, &[0.01]), false),
-        (effect(Kind::BearingHarmonic, &[0.1, 2.5, 0.0]), false),
-        (effect(Kind::BearingHarmonic, &[0.1, 2.0, 0.0]), true),
-        (effect(Kind::BearingHarmonic, &[0.0, 2.5, 0.0]), true),
-        (effect(Kind::EncoderOffset, &[0.1]), true),
-    ] {
-        let pendulum = has(driven(0.1, 0.6, 2.0), effect);
-        let map = basins(&pendulum, &plane(4), &unchecked(), &Control::default()).map(|_| ());
-        let strobe = Strobe::new(&pendulum, 20, path());
-        let moved = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default()).map(|_| ());
-        for result in [map, moved] {
-            match result {
-                Ok(()) => assert!(allowed, "{effect:?}"),
-                Err(error) => {
-                    assert!(!allowed && matches!(error, Error::NotMappable { .. }), "{error}");
-                    let line = error.to_string();
-                    assert!(line.starts_with(effect.kind.definition().name), "{line}");
-                    assert!(line.contains("every turn") && line.lines().count() == 1, "{line}");
-                }
-            }
-        }
     }
 }

@@ -17,6 +17,7 @@ mod bifurcations;
 mod chaos;
 mod edges;
 mod effects;
+mod effects_in_lanes;
 mod elementary;
 mod exact;
 mod free_decay;
