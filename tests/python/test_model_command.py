@@ -1,0 +1,128 @@
+"""Model files on the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import pendmap
+from models import EXAMPLE, written
+from pendmap import Rig, load_model
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+
+def test_the_command_takes_and_returns_si(tmp_path: Path, pendmap_command: Run) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    end = pendmap.simulate(rig, 1.2, 2.0, 12.5)
+    run = pendmap_command(
+        *("simulate", "--model", "model.toml", "--theta", 1.2, "--velocity", 2),
+        *("--until", 12.5, "--json", "--out", "run.nc"),
+    )
+    assert run.returncode == 0, run.stderr
+    got = json.loads(run.stdout)
+    assert got["units"] == "SI"
+    assert got["t"] == 12.5
+    assert got["theta"] == float(end.theta[-1])
+    assert got["velocity"] == float(end.velocity[-1])
+    stored = pendmap.load(tmp_path / "run.nc")
+    assert stored.velocity.attrs["units"] == "rad/s"
+    assert float(stored.time[-1]) == pytest.approx(12.5)
+
+
+def test_maps_from_the_command_are_in_rad_per_second(tmp_path: Path, pendmap_command: Run) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    assert isinstance(rig, Rig)
+    run = pendmap_command(
+        "basins", "--model", "model.toml", "--grid", 10, "--json", "--out", "m.nc"
+    )
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["units"] == "SI"
+    stored = pendmap.load(tmp_path / "m.nc")
+    assert stored.velocity.attrs["high"] == pytest.approx(3 * 6.2)
+    window = ("--theta=-1:1:5", "--velocity=-2:2:5")
+    run = pendmap_command("basins", "--model", "model.toml", *window, "--json", "--out", "m.nc")
+    assert run.returncode == 0, run.stderr
+    assert pendmap.load(tmp_path / "m.nc").velocity.attrs["high"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("words", "numbers"),
+    [
+        ((), {}),
+        (("--gamma", 0.1), {"c_over_m": 0.62}),
+        (("--theta-r", 0.01), {"Tr": 0.01 * 6.2**2}),
+        (("--torque", 0.01), {"torque": 0.01 * 6.2**2}),
+        (("--phase", 1), {"phi": 1.0}),
+        (("--p", 0.5), {"p": 0.5}),
+        (("--stroke-mm", 10), {"p": 0.01 * (2 * math.pi * 1.9) ** 2 / 9.81}),
+        (
+            ("--frequency-hz", 2),
+            {"Omega": 4 * math.pi, "p": 0.02 * (4 * math.pi) ** 2 / 9.81},
+        ),
+        (("--omega", 2), {"Omega": 12.4, "p": 0.02 * 12.4**2 / 9.81}),
+        (("--stroke-mm", 10, "--frequency-hz", 2), {"p": 0.01 * (4 * math.pi) ** 2 / 9.81}),
+    ],
+)
+def test_what_is_typed_counts_instead_of_the_file(
+    tmp_path: Path, pendmap_command: Run, words: tuple[Any, ...], numbers: dict[str, float]
+) -> None:
+    rig = load_model(written(tmp_path, EXAMPLE))
+    run = pendmap_command(
+        "simulate", "--model", "model.toml", *words, "--until", 1, "--json", "--out", "run.nc"
+    )
+    assert run.returncode == 0, run.stderr
+    attrs = pendmap.load(tmp_path / "run.nc").attrs
+    if "--frequency-hz" in words:
+        numbers |= {"Omega": 4 * math.pi}
+    for name in Rig.numbers():
+        wanted = numbers.get(name, getattr(rig, name))
+        assert attrs[name] == pytest.approx(wanted, rel=1e-14), name
+    assert "quadratic_drag" in attrs["effects"]
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--stroke-mm", 20), "--stroke-mm: allowed with --model of a file in SI; here --p"),
+        (
+            ("--frequency-hz", 2),
+            "--frequency-hz: allowed with --model of a file in SI; here --omega",
+        ),
+        (
+            ("--model", "model.toml", "--stroke-mm", 2, "--p", 1),
+            "--stroke-mm and --p: allowed is one",
+        ),
+        (
+            ("--model", "model.toml", "--frequency-hz", 2, "--omega", 1),
+            "--frequency-hz and --omega: allowed is one of them",
+        ),
+        (("--model", "model.toml", "--stroke-mm=-2"), "'--stroke-mm': -2: allowed is 0 or more"),
+        (
+            ("--model", "model.toml", "--frequency-hz", 0),
+            "'--frequency-hz': 0: allowed is a number",
+        ),
+        (("--model", "model.toml", "--gamma=-2"), "'--gamma': -2: allowed is 0 or more"),
+        (("--model", "model.toml", "--preset", "fig2a"), "--model and --preset: allowed is one"),
+        (("--model", "bare.toml", "--stroke-mm", 2), "bare.toml: has no dimensions: stroke_mm is"),
+        (("--model", "bare.toml", "--p", 2), "bare.toml: p without omega"),
+        (("--model", "absent.toml"), "absent.toml: No such file"),
+        (("--model", "."), ": Is a directory"),
+    ],
+)
+def test_the_command_refuses_on_one_line(
+    tmp_path: Path, pendmap_command: Run, words: tuple[Any, ...], complaint: str
+) -> None:
+    written(tmp_path, EXAMPLE)
+    (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
+    run = pendmap_command("simulate", *words)
+    assert run.returncode == 2
+    assert complaint in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bare.toml", "model.toml"]

@@ -1,0 +1,231 @@
+"""What is computed, stored and drawn in SI."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import pendmap
+from models import DRAG, SWING
+from pendmap import Effect, Grid, Pendulum, Rig, figures, viewer
+from pendmap.figures import style, trajectory
+from pendmap.pictures import layers
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def term(rig: Rig, t: float, theta: float, velocity: float) -> float:
+    """The acceleration of a rig with quadratic drag and a bearing's harmonic, in SI."""
+    drag, harmonic = (e.parameters for e in rig.effects)
+    pull = rig.w0**2 * (1 + rig.p * math.cos(rig.Omega * t + rig.phi))
+    bump = harmonic["amplitude"] * math.sin(harmonic["n"] * theta + harmonic["psi"])
+    drags = rig.c_over_m * velocity + drag["q"] * velocity * abs(velocity)
+    return rig.torque + bump - drags - pull * math.sin(theta)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("rubs", [False, True], ids=["smooth", "with friction"])
+def test_simulate_in_si_against_scipy_in_si(seed: int, *, rubs: bool) -> None:
+    draw = np.random.default_rng(seed)
+    rig = Rig(
+        w0=draw.uniform(4, 8),
+        c_over_m=draw.uniform(0.05, 0.3),
+        Tr=draw.uniform(0.5, 2.0) if rubs else 0.0,
+        torque=draw.uniform(-1, 1),
+        p=draw.uniform(0.2, 0.6),
+        Omega=draw.uniform(8, 14),
+        phi=draw.uniform(-3, 3),
+        effects=(
+            Effect("quadratic_drag", {"q": draw.uniform(0.01, 0.05)}),
+            Effect("bearing_harmonic", {"amplitude": draw.uniform(0.5, 2), "n": 3, "psi": 0.7}),
+        ),
+    )
+    start, until = (draw.uniform(-2, 2), draw.uniform(1, 5)), 3.0
+    run = pendmap.simulate(rig, *start, until, tol=1e-12)
+    theta, velocity = by_scipy(rig, start, until)
+    assert float(run.time[-1]) == pytest.approx(until, rel=1e-14)
+    assert float(run.theta[-1]) == pytest.approx(theta, abs=1e-8)
+    assert float(run.velocity[-1]) == pytest.approx(velocity, abs=1e-7)
+
+
+def by_scipy(rig: Rig, start: tuple[float, float], until: float) -> tuple[float, float]:
+    """The last state, integrated from turn to turn in SI; held wherever the load is too small."""
+    t, (theta, velocity) = 0.0, start
+
+    def load(time: float) -> float:
+        return term(rig, time, theta, 0.0)
+
+    def turn(_: float, y: Any) -> float:  # noqa: ANN401
+        return float(y[1])
+
+    turn.terminal = True  # type: ignore[attr-defined]
+    while t < until:
+        if velocity == 0 and abs(load(t)) < rig.Tr:
+            times = np.linspace(t, until, 2001)
+            free = np.flatnonzero([abs(load(x)) > rig.Tr for x in times])
+            if not free.size:
+                return theta, 0.0
+            t = brentq(
+                lambda x: abs(load(x)) - rig.Tr, *times[free[0] - 1 : free[0] + 1], xtol=1e-14
+            )
+        sense = math.copysign(1.0, velocity or load(t))
+        turn.direction = -sense  # type: ignore[attr-defined]
+
+        def slope(time: float, y: Any, rubs: float = sense * rig.Tr) -> list[float]:  # noqa: ANN401
+            return [y[1], term(rig, time, y[0], y[1]) - rubs]
+
+        piece = solve_ivp(
+            slope,
+            (t, until),
+            (theta, velocity),
+            method="DOP853",
+            rtol=1e-13,
+            atol=1e-13,
+            events=turn,
+        )
+        t, (theta, velocity) = float(piece.t[-1]), map(float, piece.y[:, -1])
+        velocity = velocity if t == until else 0.0
+    return theta, velocity
+
+
+def test_the_free_decay_with_friction_in_si(truths: dict[str, Any]) -> None:
+    case = truths["free_decay"]["nonlinear"][0]
+    rig = Rig(**{name: float(case[name]) for name in ("w0", "c_over_m", "Tr")})
+    run = pendmap.simulate(rig, float(case["theta0"]), 0.0, 90.0, tol=1e-12)
+    turns = run.event_kind.values == "turn"
+    count = 30
+    times = [float(x) for x in case["times"][1 : count + 1]]
+    peaks = [float(x) for x in case["thetas"][1 : count + 1]]
+    assert run.event_time.values[turns][:count] == pytest.approx(times, abs=1e-9)
+    assert run.event_theta.values[turns][:count] == pytest.approx(peaks, abs=1e-9)
+    assert run.attrs["stuck"] == 1
+    assert "Friction holds it since t = " in run.attrs["summary"]
+    assert run.event_time.attrs["units"] == "s"
+
+
+def test_simulate_is_the_same_in_both_units() -> None:
+    rig = SWING
+    there = pendmap.simulate(rig, 1.0, 3.1, 20.0, lyapunov=True)
+    bare = pendmap.simulate(rig.pendulum, 1.0, 0.5, 124.0, lyapunov=True)
+    assert there.theta.values == pytest.approx(bare.theta.values, abs=1e-9)
+    for name, factor in (
+        ("velocity", 6.2),
+        ("section_velocity", 6.2),
+        ("time", 1 / 6.2),
+        ("section_time", 1 / 6.2),
+        ("event_time", 1 / 6.2),
+    ):
+        assert there[name].values == pytest.approx(factor * bare[name].values, abs=1e-7), name
+    for name, factor in (("exponent", 6.2), ("exponent_stderr", 6.2), ("exponent_from", 1 / 6.2)):
+        assert there.attrs[name] == pytest.approx(factor * bare.attrs[name], rel=1e-6), name
+    units = {name: there[name].attrs["units"] for name in ("time", "velocity", "theta")}
+    assert units == {"time": "s", "velocity": "rad/s", "theta": "rad"}
+    assert "per second" in there.attrs["summary"]
+    assert "per unit of tau" in bare.attrs["summary"]
+    assert " rad/s" in there.attrs["summary"].split("\n")[0]
+
+
+def test_maps_are_the_same_in_both_units() -> None:
+    rig = Rig(w0=5.0, c_over_m=0.5, p=0.6, Omega=10.0, effects=(DRAG,))
+    there = pendmap.basins(rig, Grid.square(24, rig.w0))
+    bare = pendmap.basins(rig.pendulum, Grid.square(24))
+    assert np.array_equal(there.label.values, bare.label.values)
+    for name in ("velocity", "velocity_point", "point_velocity", "exponent"):
+        assert there[name].values == pytest.approx(5 * bare[name].values, abs=1e-8), name
+    assert there.period.values == pytest.approx(bare.period.values / 5)
+    assert there.velocity.attrs["units"] == there.point_velocity.attrs["units"] == "rad/s"
+    assert (there.velocity.attrs["low"], there.velocity.attrs["high"]) == (-15.0, 15.0)
+    assert there.exponent.attrs["units"] == "1/s"
+    assert there.period.attrs["units"] == "s"
+    starts = [0.1, 1.0, 2.5], [3.0, -10.0, 12.0]
+    lists = pendmap.basins_of(rig, *starts)
+    other = pendmap.basins_of(rig.pendulum, starts[0], [v / 5 for v in starts[1]])
+    assert np.array_equal(lists.label.values, other.label.values)
+    assert list(lists.start_velocity.values) == starts[1]
+
+
+def test_without_a_grid_a_rig_has_the_same_window() -> None:
+    assert Grid.square(10, 5.0).velocity.as_tuple == (-15.0, 15.0, 10)
+    assert Grid.square(10).velocity.as_tuple == (-3.0, 3.0, 10)
+
+
+def test_finite_time_exponents_are_per_second() -> None:
+    rig = Rig(w0=5.0)
+    there = pendmap.basins(rig, Grid.square(12, rig.w0), layer_periods=20)
+    bare = pendmap.basins(rig.pendulum, Grid.square(12), layer_periods=20)
+    values = there.finite_time_exponent.values
+    assert values == pytest.approx(5 * bare.finite_time_exponent.values, rel=1e-5)
+    assert there.finite_time_exponent.attrs["units"] == "1/s"
+
+
+def test_starts_are_advanced_in_rad_per_second() -> None:
+    rig = Rig(w0=5.0, c_over_m=0.5, p=0.6, Omega=10.0, effects=(DRAG,))
+    theta, velocity, turns = pendmap.advance(rig, [0.3, 1.0], [2.0, -20.0], 7, tol=1e-9)
+    other = pendmap.advance(rig.pendulum, [0.3, 1.0], [0.4, -4.0], 7, tol=1e-9)
+    assert theta == pytest.approx(other[0])
+    assert velocity == pytest.approx(5 * other[1])
+    assert list(turns) == list(other[2])
+
+
+def test_an_effect_changes_the_motion() -> None:
+    for run in (pendmap.simulate, lambda *a: pendmap.advance(a[0], [a[1]], [a[2]], 3)[0]):
+        ends = [run(Pendulum(effects=e), 2.0, 0.0, 20.0) for e in ((), (DRAG,))]
+        thetas = [getattr(end, "theta", end)[-1] for end in ends]
+        assert abs(float(thetas[0]) - float(thetas[1])) > 1e-4
+
+
+# Files and pictures
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
+def test_results_in_si_are_stored_and_drawn(tmp_path: Path, suffix: str) -> None:
+    results = {
+        "run": pendmap.simulate(SWING, 1.0, 3.0, 5.0),
+        "map": pendmap.basins(SWING, Grid.square(8, 6.2)),
+    }
+    for name, result in results.items():
+        back = pendmap.load(pendmap.save(result, tmp_path / f"{name}{suffix}"))
+        assert back.identical(result) or suffix == ".zarr"
+        assert back.attrs == result.attrs
+        assert back.attrs["units"] == "SI"
+        assert (back.attrs["w0"], back.attrs["Omega"]) == (6.2, 12.0)
+        assert back.attrs["gamma"] == pytest.approx(0.05 / 6.2)
+        effects = json.loads(back.attrs["effects"])
+        assert effects[0] == {"name": "quadratic_drag", "parameters": {"q": 0.01}}
+        assert "quadratic_drag (q = 0.01), bearing_harmonic" in back.attrs["title"]
+        assert "w0 = 6.2 rad/s" in back.attrs["title"]
+        assert figures.draw(back, tmp_path / f"{name}.svg").stat().st_size > 1000
+        assert viewer.record(back, tmp_path / f"{name}.rrd").stat().st_size > 1000
+
+
+def test_axes_are_named_in_the_units_of_the_result() -> None:
+    run = pendmap.simulate(SWING, 1.0, 3.0, 5.0)
+    parameters = layers.parameters(run.attrs)
+    assert parameters == (
+        "w0 = 6.2 rad/s,  c/m = 0.05 1/s,  p = 0.3,  Ω = 12 rad/s,  phase = 0.4,  "
+        "Tr = 0.08 rad/s²,  quadratic drag,  bearing harmonic"
+    )
+    for model, clock, speed in ((SWING, "t (s)", "dθ/dt (rad/s)"), (SWING.pendulum, "τ", "dθ/dτ")):
+        run = pendmap.simulate(model, 1.0, 3.0, 5.0)
+        with rc_context(style.RC):
+            sheet = trajectory.figure(run, layer=None, size=None, dpi=50.0, colormap=None)
+            sheet.canvas.draw()
+        history, phase, _ = sheet.axes
+        assert history.get_xlabel() == clock
+        assert phase.get_ylabel() == speed
+        for text in sheet.texts:
+            assert text.get_window_extent().x1 <= sheet.bbox.x1, text.get_text()
+
+
+def test_titles_leave_out_what_is_zero() -> None:
+    assert Pendulum(p=0).title == "γ = 0.1, p = 0"
+    assert Rig(w0=6.2).title == "w0 = 6.2 rad/s, c/m = 0 1/s, p = 0"
+    assert "lab time = 30 s" in Rig(w0=6.2, lab_time_s=30).title
