@@ -1,0 +1,83 @@
+"""What every method of identification gives back."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+from pendmap.model import Rig
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["Estimate", "Identification"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A number with its uncertainty.
+
+    Parameters
+    ----------
+    value : float
+        In SI.
+    stderr : float or None
+        Its standard error, where the method gives one.
+    ci95 : tuple of float or None
+        Its 95 % interval, where the method gives one; it need not be symmetric.
+    """
+
+    value: float
+    stderr: float | None = None
+    ci95: tuple[float, float] | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Identification:
+    """The damping that one method finds in a record.
+
+    Parameters
+    ----------
+    method : str
+        Its name, as in the JSON of ``pendmap identify``.
+    estimates : mapping of str to Estimate
+        By the names of :class:`pendmap.Rig` (``w0`` in rad/s, ``c_over_m`` in 1/s, ``Tr`` in
+        rad/s^2, ...) and ``offset`` (rad), whatever the method knows. ``zeta`` and ``theta_r``
+        follow from them. Empty where the method is not applicable.
+    used : str
+        Which data it used, in words.
+    warnings : tuple of str
+        What speaks against trusting it.
+    applicable : bool
+        Whether the method can be applied to the record; if not, ``warnings`` say why.
+    covariance : tuple of (tuple of str, ndarray) or None
+        Names and covariance matrix of what was fitted together.
+    """
+
+    method: str
+    estimates: Mapping[str, Estimate] = dataclasses.field(default_factory=dict)
+    used: str = ""
+    warnings: tuple[str, ...] = ()
+    applicable: bool = True
+    covariance: tuple[tuple[str, ...], NDArray[np.float64]] | None = None
+
+    def __getitem__(self, name: str) -> float:
+        """Return the value of one estimate."""
+        return self.estimates[name].value
+
+    @property
+    def rig(self) -> Rig:
+        """The pendulum that was found; what the method does not know is 0, and so is a negative
+        damping, which no pendulum has.
+        """  # noqa: D205, D400, D415 (one sentence)
+        known = {n: e.value for n, e in self.estimates.items() if n in Rig.numbers()}
+        for name in ("c_over_m", "Tr"):
+            if name in known:
+                known[name] = max(known[name], 0.0)
+        if not math.isfinite(known.get("w0", math.nan)):
+            raise ValueError(f"{self.method} found no w0")
+        return Rig(**known)
