@@ -7,9 +7,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 HERE = Path(__file__).resolve().parent
 COMMAND = Path(sys.executable).with_name("pendmap")
@@ -49,3 +52,13 @@ def pendmap_command(tmp_path: Path) -> Run:
         )
 
     return run
+
+
+@pytest.fixture
+def strict_recordings() -> Iterator[None]:
+    """Rerun raises what it would only warn of."""
+    import rerun as rr  # noqa: PLC0415 (most tests need none of it)
+
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)

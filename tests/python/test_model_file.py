@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from models import EXAMPLE, written
 from pendmap import Effect, InputError, Pendulum, Rig, load_model, save_model
 
 if TYPE_CHECKING:
