@@ -122,7 +122,8 @@ def complete(
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    dataset.attrs["summary"] = summarise(dataset, bound_was_chosen=choices["max_periods"] is None)
+    chosen = choices["max_periods"] is None
+    dataset.attrs["summary"] = summarise(dataset, bound_was_chosen=chosen, effects=model.effects)
     return dataset
 
 

@@ -9,14 +9,31 @@ from pendmap.model.units import Units
 from pendmap.words import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
 
-__all__ = ["summarise"]
+    from pendmap.model import Effect
+
+__all__ = ["of_motion", "summarise"]
 
 _NEARLY_CHANCE = 0.15
 
 
-def summarise(dataset: xr.Dataset, *, bound_was_chosen: bool) -> str:
+def of_motion(effects: Sequence[Effect], what: str) -> list[str]:
+    """Say that ``what`` is shown is the motion, where effects change its reading."""
+    names = [effect.name for effect in effects if effect.reads]
+    if not names:
+        return []
+    verb = "acts" if len(names) == 1 else "act"
+    return [
+        f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
+    ]
+
+
+def summarise(
+    dataset: xr.Dataset, *, bound_was_chosen: bool, effects: Sequence[Effect] = ()
+) -> str:
     """Return the findings of a basin map, a sentence a line.
 
     Parameters
@@ -25,6 +42,8 @@ def summarise(dataset: xr.Dataset, *, bound_was_chosen: bool) -> str:
         As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
     bound_was_chosen : bool
         Whether the bound on periods is pendmap's own choice, not the caller's.
+    effects : sequence of Effect
+        Those of the model.
     """
     plane = dataset.attrs["plane"]
     if plane == "conservative":
@@ -39,6 +58,7 @@ def summarise(dataset: xr.Dataset, *, bound_was_chosen: bool) -> str:
             bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     a = dataset.attrs
+    lines += of_motion(effects, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
         f"{counted(a['steps_per_period'], 'step')} a period, "

@@ -14,6 +14,7 @@ from pendmap.grid import starts
 from pendmap.model import Units, without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY
 from pendmap.store import FORMAT_VERSION
+from pendmap.summary import of_motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,7 +46,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     ----------
     pendulum : Pendulum or Rig
         The model. With a rig everything is in SI: times in s, velocities in rad/s, exponents in
-        1/s; only ``tol`` and the errors are of numbers without dimensions.
+        1/s; only ``tol`` and the errors are of numbers without dimensions. Effects of the group
+        ``reading`` change nothing here: angle and velocity are those of the motion, not what a
+        sensor shows of it.
     theta, velocity : float
         State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
     until : float
@@ -139,7 +142,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    dataset.attrs["summary"] = _summary(dataset, units)
+    dataset.attrs["summary"] = "\n".join(
+        [_summary(dataset, units), *of_motion(model.effects, "angle and velocity here are")]
+    )
     return dataset
 
 

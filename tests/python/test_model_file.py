@@ -178,7 +178,7 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
         ("[pendulum]\nw0_hz = 1\n", "w0_hz is not known: allowed is w0, in rad/s"),
         ("[pendulum]\nTr_Nm = 1\n", "Tr_Nm is not known: allowed is Tr, in rad/s^2"),
         ("[pendulum]\nlab_time_h = 1\n", "allowed is lab_time_s, in s"),
-        ("[pendulum]\ngama = 1\n", f"gama is not known: allowed is perhaps gamma: {ALLOWED[8:]}"),
+        ("[pendulum]\ngama = 1\n", f"gama is not known, perhaps gamma is meant: {ALLOWED}"),
         ("[pendulum]\nxyzzy = 1\n", f"xyzzy is not known: {ALLOWED}"),
         ('[pendulum]\n"a\\nb" = 1\n', r"'a\nb' is not known"),
         # both kinds

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import pendmap
 from conftest import COMMAND
 from pendmap import InputError, cli
 from pendmap.virtual_rig import EFFECTS, PRESETS, Experiment, Request, make
@@ -101,6 +102,20 @@ def test_what_is_hidden_is_not_said(rig: Run, tmp_path: Path) -> None:
     (effect,) = read_toml(tmp_path / "lab.truth.toml")["effect"]
     assert effect["name"] not in run.stdout + run.stderr
     assert rig("forced", "--duration", 2, "--out", "f", "--quiet").stdout == ""
+
+
+def test_files_have_a_table_for_each_run_and_effect(rig: Run, tmp_path: Path) -> None:
+    effects = ("--effect", "magnet", "--effect", "pivot_compliance:two_modes")
+    rig("hidden", *effects, "--duration", 2, "--out", "lab")
+    text = (tmp_path / "lab" / "experiment.toml").read_text(encoding="utf-8")
+    assert text.count("\n[[run]]\nfile = ") == 9
+    assert text.count("\ndrive = { p = ") == 4
+    text = (tmp_path / "lab.truth.toml").read_text(encoding="utf-8")
+    assert text.count("\n[[run]]\n") == 9
+    assert text.count("\n[[effect]]\nname = ") == 2
+    magnet, pivot = read_toml(tmp_path / "lab.truth.toml")["effect"]
+    assert set(magnet["parameters"]) == {"amplitude", "width"}
+    assert len(pivot["parameters"]) == len(pivot["units"]) == 6
 
 
 def test_the_same_seed_gives_the_same_bytes(rig: Run, tmp_path: Path) -> None:
@@ -205,8 +220,8 @@ def test_size_scales_and_parameters_are_taken() -> None:
     plain, twice = (short(effects=("quadratic_drag",), size=size) for size in (1.0, 2.0))
     (small,), (large,) = plain.effects, twice.effects
     assert large.q == pytest.approx(2 * small.q)  # type: ignore[attr-defined]
-    (typed,) = short(effects=("magnet:dipole,A=0.25,d=0.3",)).effects
-    assert dataclasses.asdict(typed) == {"A": 0.25, "d": 0.3}
+    (typed,) = short(effects=("magnet:dipole,amplitude=0.25,d=0.3",)).effects
+    assert dataclasses.asdict(typed) == {"amplitude": 0.25, "d": 0.3}
     assert short(w0=5.0, c_over_m=0.0, friction=0.0).parameters.w0 == 5.0
 
 
@@ -236,6 +251,16 @@ def test_the_list_names_every_effect(rig: Run) -> None:
         assert preset in rig("--help").stdout
 
 
+def test_parameters_have_the_names_and_units_that_model_files_have() -> None:
+    relative = {"drive_second_harmonic", "lateral_drive"}  # the rig's e is a share of p
+    library = {effect.name: effect for effect in pendmap.effects()}
+    for name in library.keys() & EFFECTS.keys() - relative:
+        ours = {f.name: f.metadata["unit"] or "1" for f in dataclasses.fields(EFFECTS[name])}
+        assert ours == {p.name: p.unit for p in library[name].parameters}, name
+    for name in relative:
+        assert {f.name for f in dataclasses.fields(EFFECTS[name])} == {"e", "phase"}
+
+
 def test_the_rig_shares_no_code_with_what_is_fitted() -> None:
     code = (
         "import sys\n"
@@ -254,9 +279,9 @@ def test_the_rig_shares_no_code_with_what_is_fitted() -> None:
         ("rig hidden", "--out"),
         ("rig hiden --out x", "hiden"),
         ("rig hidden --out x --effect quadratic_drga", "quadratic_drag"),
-        ("rig hidden --out x --effect magnet,B=1", "B"),
+        ("rig hidden --out x --effect magnet,A=1", "amplitude, width"),
         ("rig hidden --out x --effect magnet,A", "NAME=VALUE"),
-        ("rig hidden --out x --effect magnet,A=nan", "finite"),
+        ("rig hidden --out x --effect magnet,amplitude=nan", "finite"),
         ("rig hidden --out x --effect pivot_compliance,mu=2", "0 to 0.3"),
         ("rig hidden --out x --effect magnet --effect magnet:dipole", "twice"),
         ("rig hidden --out x --effect none --effect magnet", "none"),
@@ -267,6 +292,10 @@ def test_the_rig_shares_no_code_with_what_is_fitted() -> None:
         ("rig hidden --out x --counts=-4", "-4"),
         ("rig hidden --out x --rate 0", "0"),
         ("rig hidden --out x --size 0", "0"),
+        ("rig forced --out x --size 1e6", "no size of an effect is drawn here"),
+        ("rig hidden --out x --effect none --size 2", "no size of an effect is drawn here"),
+        ("rig hidden --out x --effect impulses,J=0.02 --size 2", "no size of an effect is drawn"),
+        ("rig hidden --out x --noise 0 --correlation 0.5", "without noise"),
         ("rig hidden --out x --dropouts 0.9", "0.5"),
         ("rig hidden --out x --free 0 --forced 0", "1 to 99"),
         ("rig hidden --out x --duration 0", "3600"),

@@ -24,7 +24,7 @@ __all__ = ["command"]
     multiple=True,
     metavar="NAME",
     help="Effect to hide, more than once for several: a name of --list, also with its parameters"
-    " (magnet:dipole,A=0.1,d=0.2), any (the seed chooses) or none.  [default: any for hidden]",
+    " (magnet:dipole,amplitude=0.1,d=0.2), any (the seed chooses) or none.  [default: hidden: any]",
 )
 @click.option("--size", type=NUMBER, default=1.0, help="Scales drawn effects.  [default: 1]")
 @click.option("--noise", type=NUMBER, help="Degrees.  [default: 0.1; hidden: 0.05 to 0.5]")

@@ -121,6 +121,11 @@ class Effect:
         return bool(definition(self.name)["group"] == "drive")
 
     @property
+    def reads(self) -> bool:
+        """Whether it changes the sensor's reading alone, not the motion."""
+        return bool(definition(self.name)["group"] == "reading")
+
+    @property
     def drifts(self) -> bool:
         """Whether it changes with the time in the laboratory; maps hold that still."""
         return bool(definition(self.name)["mappable"] == "frozen")

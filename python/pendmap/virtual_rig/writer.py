@@ -11,10 +11,8 @@ import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import tomli_w
-
 from pendmap.errors import InputError
-from pendmap.files import held_interrupts
+from pendmap.files import held_interrupts, toml_text
 
 if TYPE_CHECKING:
     import os
@@ -99,10 +97,8 @@ def write(experiment: Experiment, where: Places) -> None:
                 raise type(error)(error.errno, error.strerror, str(folder)) from error
             for k, run in enumerate(experiment.runs):
                 _write_run(part / _file(k), run)
-            with (part / "experiment.toml").open("wb") as file:
-                tomli_w.dump(_description(experiment), file)
-            with truth_part.open("wb") as file:
-                tomli_w.dump(_truth(experiment), file)
+            _write_toml(part / "experiment.toml", _description(experiment))
+            _write_toml(truth_part, _truth(experiment))
             if folder.exists():
                 folder.rename(old)
             try:
@@ -127,6 +123,10 @@ def _write_run(path: Path, run: Run) -> None:
     rows = zip(run.time.tolist(), run.angle.tolist(), strict=True)
     lines = ["t_s,theta_rad", *(f"{time:.6f},{angle:.12g}" for time, angle in rows)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _write_toml(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(toml_text(content), encoding="utf-8", newline="\n")
 
 
 def _description(experiment: Experiment) -> dict[str, Any]:
