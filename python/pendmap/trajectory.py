@@ -26,6 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["advance", "simulate"]
 
 _SAMPLES = 64
+"""Samples a period, where nothing asks for more."""
+_APART = 0.1
+"""Angle between two samples, rad, that looks smooth in the phase plane."""
+_SMOOTH_SAMPLES = 200_000
+"""Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
 _MOST_SAMPLES = 2_000_000
 _ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
 
@@ -59,7 +64,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         more; then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
         ``reached_error``, the difference at the end in ``end_error``.
     samples : int, optional
-        Samples a period; 64 by default, fewer where that would be more than two million in all.
+        Samples a period. By default 64, in a quick motion as many as a smooth picture needs, as
+        long as that is up to 200,000 in all; fewer than 64 where that would be more than two
+        million. The motion does not depend on them.
     lyapunov : bool
         Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
         standard error from the spread of 20 batches, the first tenth left out (``exponent_from``
@@ -89,7 +96,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(f"until is {until:g}: allowed is a time above 0")
     periods = until / model.period
     if samples is None:
-        samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
+        samples = _smooth(pendulum, units.bare(velocity, VELOCITY), units.bare(until, TIME))
     samples = checks.whole("samples", samples, 1, checks.MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
         raise InputError(f"until is {until:g}: {periods:.3g} periods do not fit into memory")
@@ -146,6 +153,18 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         [_summary(dataset, units), *of_motion(model.effects, "angle and velocity here are")]
     )
     return dataset
+
+
+def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
+    """Samples a period that show the motion as a curve, from a guess of its greatest speed."""
+    periods = max(until / pendulum.period, 1.0)
+    pulled = abs(velocity) + abs(pendulum.torque) * until
+    if pendulum.gamma > 0:
+        pulled = min(pulled, abs(pendulum.torque) / pendulum.gamma)
+    speed = max(abs(velocity), 2 * math.sqrt(1 + abs(pendulum.p)), pulled)
+    wanted = min(pendulum.period * speed / _APART, checks.MOST_SAMPLES, _SMOOTH_SAMPLES / periods)
+    usual = min(_SAMPLES, max(1, _MOST_SAMPLES / periods))
+    return int(max(math.ceil(wanted), usual))
 
 
 def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> dict[str, float]:

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.colors import LogNorm
 
 import motions
+import pendmap
 import synthetic
 from drawn import made, named, titles, written
 from pendmap import palette
@@ -154,6 +155,23 @@ def test_the_parts_of_a_trajectory() -> None:
         assert np.nanmax(np.abs(xy[:, 0])) <= math.pi + 1e-12
         assert np.nanmax(np.abs(np.diff(xy[:, 0]))) < 1.0, "a line crosses the plane at the wrap"
     assert points(section) == dataset.sizes["period"]
+
+
+def test_rest_is_shaded_and_named() -> None:
+    model = pendmap.Pendulum(p=2.2, omega=0.6, theta_r=0.8)
+    run = pendmap.simulate(model, 1.0, 0.0, 40.0)
+    figure = made(run)
+    (bars,) = figure.axes[0].collections
+    spans = [path.get_extents().intervalx for path in bars.get_paths()]
+    sticks = run.event_time.values[run.event_kind.values == "stick"]
+    releases = run.event_time.values[run.event_kind.values == "release"]
+    assert len(sticks) == 2
+    assert [begin for begin, _ in spans] == pytest.approx(sticks)
+    assert [end for _, end in spans] == pytest.approx([*releases, 40.0])
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["at rest"]
+    assert made(pendmap.simulate(pendmap.Pendulum(), 1.0, 0.0, 9.0)).axes[0].get_legend() is None
 
 
 def points(axes: Axes) -> int:

@@ -10,6 +10,7 @@ import pytest
 from matplotlib.text import Text
 
 import motions
+import pendmap
 import synthetic
 from drawn import made
 
@@ -34,6 +35,7 @@ VARIANTS = {
     "two chaotic": synthetic.painted(synthetic.USUAL[10:12]),
     "chaos": motions.chaotic(cells=16, periods=3),
     "trajectory": motions.swing(periods=8, steps=20),
+    "friction": pendmap.simulate(pendmap.Pendulum(p=2.2, omega=0.6, theta_r=0.8), 1.0, 0.0, 40.0),
     "torque": synthetic.painted(phase=0.25, torque=-0.5),
 }
 

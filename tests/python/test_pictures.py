@@ -34,6 +34,15 @@ def test_a_curve_is_cut_exactly_at_the_wrap() -> None:
     assert len(plane.broken_at_wrap([], [])) == 0
 
 
+def test_angles_are_wrapped_as_far_as_numbers_go() -> None:
+    far = np.array([math.pi, -math.pi, 1e16, -1e300, 1.7e308])
+    within = plane.wrapped(far)
+    assert (np.abs(within) <= math.pi).all()
+    assert within[:2].tolist() == [math.pi, math.pi]
+    curve = plane.broken_at_wrap(1e16 + np.arange(0.0, 40.0, 2.0), np.ones(20))
+    assert np.nanmax(np.abs(curve[:, 0])) <= math.pi
+
+
 @pytest.mark.parametrize(
     ("window", "labels"),
     [

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import motions
+import pendmap
 import synthetic
+from pendmap import InputError
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -84,3 +87,18 @@ def test_the_trail_ends_at_the_bob(tmp_path: Path, swing: xr.Dataset) -> None:
 def test_the_shortest_trajectories(tmp_path: Path, periods: int) -> None:
     back = recorded(motions.swing(periods=periods, steps=3, p=0.0), tmp_path)
     assert len(back.rows("/state/theta", "Scalars:scalars")) == 3 * periods + 1
+
+
+@pytest.mark.parametrize("theta", [1e16, -1e300, 1.7e308])
+def test_angles_as_large_as_numbers_get(tmp_path: Path, theta: float) -> None:
+    back = recorded(pendmap.simulate(pendmap.Pendulum(), theta, 0.0, 9.0), tmp_path)
+    now = back.rows("/phase/data/now", "Points2D:positions")
+    assert np.abs(now[:, 0]).max() <= math.pi + 1e-6
+
+
+def test_what_no_recording_holds_is_refused(tmp_path: Path) -> None:
+    run = motions.swing(periods=1, steps=3)
+    run["velocity"][1] = 1e40
+    with pytest.raises(InputError, match=r"velocity reaches 1e\+40: a recording holds"):
+        recorded(run, tmp_path)
+    assert not list(tmp_path.iterdir())
