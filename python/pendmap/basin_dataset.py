@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
+from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
@@ -123,7 +124,8 @@ def complete(
         "format_version": FORMAT_VERSION,
     }
     chosen = choices["max_periods"] is None
-    dataset.attrs["summary"] = summarise(dataset, bound_was_chosen=chosen, effects=model.effects)
+    pendulum, _ = without_dimensions(model)
+    dataset.attrs["summary"] = summarise(dataset, pendulum, bound_was_chosen=chosen)
     return dataset
 
 

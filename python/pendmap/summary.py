@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.model import Effect
+    from pendmap.model import Effect, Pendulum
 
 __all__ = ["of_motion", "summarise"]
 
@@ -31,21 +31,20 @@ def of_motion(effects: Sequence[Effect], what: str) -> list[str]:
     ]
 
 
-def summarise(
-    dataset: xr.Dataset, *, bound_was_chosen: bool, effects: Sequence[Effect] = ()
-) -> str:
+def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
     """Return the findings of a basin map, a sentence a line.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
+    pendulum : Pendulum
+        The model without dimensions.
     bound_was_chosen : bool
         Whether the bound on periods is pendmap's own choice, not the caller's.
-    effects : sequence of Effect
-        Those of the model.
     """
     plane = dataset.attrs["plane"]
+    unlimited = _unlimited(pendulum)
     if plane == "conservative":
         lines = [_conservative(dataset)]
     elif plane == "only_chaos":
@@ -56,9 +55,12 @@ def summarise(
         share = dataset.attrs[key]
         if share > 0 and plane != "conservative":
             bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
+            bound = bound.split(";")[0] if unlimited else bound  # no bound helps
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     a = dataset.attrs
-    lines += of_motion(effects, "this map is")
+    if plane != "conservative":
+        lines += unlimited
+    lines += of_motion(pendulum.effects, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
         f"{counted(a['steps_per_period'], 'step')} a period, "
@@ -66,6 +68,38 @@ def summarise(
         f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')} ({a['simd']})."
     )
     return "\n".join(lines)
+
+
+def _unlimited(pendulum: Pendulum) -> list[str]:
+    """Say so where nothing limits the speed of a rotation, so that it settles on nothing.
+
+    Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
+    grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
+    """
+    kinds = {effect.name: effect for effect in pendulum.effects if effect.brakes}
+    own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
+    added = dict.fromkeys(own.values(), 0.0)
+    for effect in pendulum.effects:
+        if effect.name in own:
+            added[own[effect.name]] = next(iter(effect.parameters.values()))
+    gamma, friction, torque = (
+        getattr(pendulum, name) + added[name] for name in ("gamma", "theta_r", "torque")
+    )
+    # Stribeck's part of friction is none at speed; all others may brake a rotation.
+    if gamma > 0 or kinds.keys() - {"coulomb_friction", "stribeck_friction", "viscous_damping"}:
+        return []
+    if torque == 0 or friction == 0 or abs(torque) < friction:
+        return []
+    way = "forward" if torque > 0 else "backward"
+    lines = [
+        f"Without viscous damping (gamma = 0) nothing limits a rotation {way}: a turn gains "
+        f"2 pi ({abs(torque):g} - {friction:g}) from torque less friction, so that it "
+        + ("speeds up for ever" if abs(torque) > friction else "keeps its energy")
+        + " and settles on nothing, whatever it looks like. A smaller --max-periods shows as much."
+    ]
+    if abs(torque) > friction + 1 + abs(pendulum.p):
+        lines.append("Friction can hold it nowhere (torque above theta_r + 1 + p): no start rests.")
+    return lines
 
 
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:

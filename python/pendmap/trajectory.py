@@ -64,9 +64,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         more; then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
         ``reached_error``, the difference at the end in ``end_error``.
     samples : int, optional
-        Samples a period. By default 64, in a quick motion as many as a smooth picture needs, as
-        long as that is up to 200,000 in all; fewer than 64 where that would be more than two
-        million. The motion does not depend on them.
+        Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
+        picture needs, up to 200,000 in all; fewer than 64 where that would be more than two
+        million. The motion does not depend on them, the batches of an exponent do.
     lyapunov : bool
         Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
         standard error from the spread of 20 batches, the first tenth left out (``exponent_from``
@@ -96,7 +96,10 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(f"until is {until:g}: allowed is a time above 0")
     periods = until / model.period
     if samples is None:
-        samples = _smooth(pendulum, units.bare(velocity, VELOCITY), units.bare(until, TIME))
+        samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
+        if not lyapunov:  # its batches are counted in samples: they stay what they are
+            speed, end = units.bare(velocity, VELOCITY), units.bare(until, TIME)
+            samples = max(samples, _smooth(pendulum, speed, end))
     samples = checks.whole("samples", samples, 1, checks.MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
         raise InputError(f"until is {until:g}: {periods:.3g} periods do not fit into memory")
@@ -162,9 +165,8 @@ def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
     if pendulum.gamma > 0:
         pulled = min(pulled, abs(pendulum.torque) / pendulum.gamma)
     speed = max(abs(velocity), 2 * math.sqrt(1 + abs(pendulum.p)), pulled)
-    wanted = min(pendulum.period * speed / _APART, checks.MOST_SAMPLES, _SMOOTH_SAMPLES / periods)
-    usual = min(_SAMPLES, max(1, _MOST_SAMPLES / periods))
-    return int(max(math.ceil(wanted), usual))
+    wanted = min(pendulum.period * speed / _APART, checks.MOST_SAMPLES)
+    return int(min(math.ceil(wanted), _SMOOTH_SAMPLES // periods))
 
 
 def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> dict[str, float]:

@@ -96,3 +96,21 @@ def test_signed_colours_are_white_at_zero_and_symmetric_in_lightness() -> None:
     assert low[2] > low[0]
     assert high[0] > high[2]
     assert (beyond == high).all()
+
+
+@pytest.mark.parametrize("name", ["oscillation {}:0", "oscillation {}:0 (+)", "rotation {0}:-{0}"])
+def test_no_two_periods_that_are_looked_for_look_the_same(name: str) -> None:
+    names = [name.format(n) for n in range(1, 33)]
+    assert len({palette.colour(one) for one in names}) == len(names)
+    for one, other in itertools.combinations(names, 2):
+        gap = float(np.linalg.norm(perceived(one, "none") - perceived(other, "none")))
+        assert gap > 1.0 or palette.lap(one) != palette.lap(other), (one, other, gap)
+
+
+def test_what_begins_again_is_darker_or_lighter() -> None:
+    assert palette.lap("oscillation 2:0") == palette.lap("rotation 5:+1") == 0
+    assert palette.lap("oscillation 14:0") == 2
+    assert palette.describe("oscillation 14:0") == "lighter yellow"
+    lightness = [perceived(f"oscillation {n}:0", "none")[0] for n in (8, 2, 14)]
+    assert lightness == sorted(lightness)
+    assert palette.colour("tumbling chaos") != palette.colour("tumbling chaos b")

@@ -121,6 +121,11 @@ class Effect:
         return bool(definition(self.name)["group"] == "drive")
 
     @property
+    def brakes(self) -> bool:
+        """Whether it is a kind of damping or friction."""
+        return bool(definition(self.name)["group"] == "damping")
+
+    @property
     def reads(self) -> bool:
         """Whether it changes the sensor's reading alone, not the motion."""
         return bool(definition(self.name)["group"] == "reading")
