@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
 
+from pendmap import cli
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -62,3 +64,19 @@ def strict_recordings() -> Iterator[None]:
     rr.set_strict_mode(True)
     yield
     rr.set_strict_mode(False)
+
+
+@pytest.fixture
+def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """`pendmap rig` with these words in `tmp_path`, within this process: a start costs most."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+        assert env is None
+        monkeypatch.setattr(sys, "argv", ["pendmap", "rig", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            cli.run()
+        out, err = capsys.readouterr()
+        return subprocess.CompletedProcess(words, int(end.value.code or 0), out, err)
+
+    return run

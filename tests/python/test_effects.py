@@ -96,7 +96,7 @@ def test_on_a_terminal_it_is_a_table() -> None:
         subprocess.run(
             [str(COMMAND), "effects", "magnet", "stribeck_friction"],
             stdout=theirs,
-            env=os.environ | {"COLUMNS": "200", "TERM": "xterm"},
+            env=os.environ | {"COLUMNS": "300", "TERM": "xterm"},
             check=True,
         )
         said = os.read(ours, 65536).decode()

@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from pendmap.virtual_rig.effect import Effect
     from pendmap.virtual_rig.experiment import Experiment, Run
 
-__all__ = ["FORMAT_VERSION", "Places", "places", "write"]
+__all__ = ["FORMAT_VERSION", "Places", "held_out", "places", "write"]
 
 FORMAT_VERSION: Final = 1
 """Version of the layout of the truth file."""
 
 _GRAVITY: Final = 9.81
+_ENOUGH: Final = 3
+"""Runs of a kind from which on one is held out."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,13 +137,27 @@ def _description(experiment: Experiment) -> dict[str, Any]:
     if experiment.sensor.counts:
         rig["encoder_counts"] = experiment.sensor.counts
     runs = []
+    held = held_out(experiment)
     for k, run in enumerate(experiment.runs):
         plan = run.plan
         entry: dict[str, Any] = {"file": _file(k), "kind": plan.kind, "lab_time_s": plan.lab_time}
+        if k in held:
+            entry["hold_out"] = True
         if plan.kind == "forced":
             entry["drive"] = _drive(run)
         runs.append(entry)
     return {"rig": rig, "run": runs}
+
+
+def held_out(experiment: Experiment) -> set[int]:
+    """Which runs are to be kept from fits, to try them on: of each kind with 3 or more, one.
+
+    It is the last but one: what is fitted has runs before and after it, quicker and slower ones.
+    """
+    kinds: dict[str, list[int]] = {}
+    for k, run in enumerate(experiment.runs):
+        kinds.setdefault(run.plan.kind, []).append(k)
+    return {runs[-2] for runs in kinds.values() if len(runs) >= _ENOUGH}
 
 
 def _drive(run: Run) -> dict[str, float]:
