@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from pendmap.model import Effect, Pendulum
 
-__all__ = ["of_motion", "summarise"]
+__all__ = ["of_motion", "summarise", "unlimited_rotation"]
 
 _NEARLY_CHANCE = 0.15
 
@@ -44,7 +44,7 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
         Whether the bound on periods is pendmap's own choice, not the caller's.
     """
     plane = dataset.attrs["plane"]
-    unlimited = _unlimited(pendulum)
+    unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
         lines = [_conservative(dataset)]
     elif plane == "only_chaos":
@@ -70,7 +70,7 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
     return "\n".join(lines)
 
 
-def _unlimited(pendulum: Pendulum) -> list[str]:
+def unlimited_rotation(pendulum: Pendulum) -> list[str]:
     """Say so where nothing limits the speed of a rotation, so that it settles on nothing.
 
     Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
@@ -93,7 +93,7 @@ def _unlimited(pendulum: Pendulum) -> list[str]:
     way = "forward" if torque > 0 else "backward"
     lines = [
         f"Without viscous damping (gamma = 0) nothing limits a rotation {way}: a turn gains "
-        f"2 pi ({abs(torque):g} - {friction:g}) from torque less friction, so that it "
+        f"2 pi ({abs(torque):g} - {friction:g}) m l^2 w0^2 by torque less friction, so that it "
         + ("speeds up for ever" if abs(torque) > friction else "keeps its energy")
         + " and settles on nothing, whatever it looks like. A smaller --max-periods shows as much."
     ]
