@@ -59,7 +59,7 @@ def _draw(effects: list[EffectDefinition]) -> None:
     table = Table("effect", "formula", "parameters", "revealed by", "maps", show_lines=True)
     for effect in effects:
         parameters = "\n".join(_parameter(parameter) for parameter in effect.parameters)
-        cells = (effect.name, effect.formula, parameters, effect.revealed_by, effect.mappable)
+        cells = (effect.name, effect.formula, parameters, effect.revealed_by, _maps(effect))
         # Not markup: a formula may have brackets.
         table.add_row(*(Text(cell) for cell in cells))
     Console().print(table)
@@ -69,9 +69,14 @@ def _write(effect: EffectDefinition) -> None:
     click.echo(f"{effect.name:<24} {effect.formula}")
     for parameter in effect.parameters:
         click.echo(f"{'':<26} {_parameter(parameter)}")
-    maps = {"frozen": "hold it at lab_time", "no": "refuse it"}.get(effect.mappable, "have it")
-    maps = "do not see it" if effect.group == "reading" else maps
-    click.echo(f"{'':<26} {effect.group}; maps {maps}; revealed by {effect.revealed_by}")
+    click.echo(f"{'':<26} {effect.group}; maps {_maps(effect)}; revealed by {effect.revealed_by}")
+
+
+def _maps(effect: EffectDefinition) -> str:
+    """What maps do with an effect, with the word maps before it."""
+    if effect.group == "reading":
+        return "do not see it"
+    return {"frozen": "hold it at lab_time", "no": "refuse it"}.get(effect.mappable, "have it")
 
 
 def _parameter(parameter: EffectParameter) -> str:
