@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
+from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
@@ -122,7 +123,9 @@ def complete(
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    dataset.attrs["summary"] = summarise(dataset, bound_was_chosen=choices["max_periods"] is None)
+    chosen = choices["max_periods"] is None
+    pendulum, _ = without_dimensions(model)
+    dataset.attrs["summary"] = summarise(dataset, pendulum, bound_was_chosen=chosen)
     return dataset
 
 

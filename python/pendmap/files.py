@@ -7,8 +7,11 @@ import errno
 import signal
 import threading
 import uuid
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
+
+import tomli_w
 
 from pendmap.errors import InputError
 
@@ -17,7 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import FrameType
 
-__all__ = ["held_interrupts", "whole_file"]
+__all__ = ["held_interrupts", "toml_text", "whole_file"]
+
+_LONGEST: Final = 100
+"""Characters of a line of TOML that a table within a table may take."""
 
 
 @contextlib.contextmanager
@@ -88,3 +94,59 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
             part.replace(target)
         finally:
             part.unlink(missing_ok=True)
+
+
+def toml_text(content: Mapping[str, Any]) -> str:
+    """Return TOML whose lists of tables are written ``[[name]]``, a line a key, as people do.
+
+    Parameters
+    ----------
+    content : mapping of str
+        Numbers, texts, lists and tables of TOML, tables in tables included.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If something in it is nothing that TOML has.
+    """
+    parts = {key: value for key, value in content.items() if _is_table(value) or _tables(value)}
+    head = {key: value for key, value in content.items() if key not in parts}
+    blocks = [tomli_w.dumps(head)] if head else []
+    for key, value in parts.items():
+        if _tables(value):
+            blocks += [_entry(key, table) for table in value]
+        else:
+            blocks.append(tomli_w.dumps({key: value}))
+    return "\n".join(blocks)
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _tables(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(map(_is_table, value))
+
+
+def _entry(name: str, table: Mapping[str, Any]) -> str:
+    """One ``[[name]]``; what is too long for a line is a table of its own after the others."""
+    lines = {key: f"{_value({key: value})[2:-2]}\n" for key, value in table.items()}
+    long = {
+        key: value
+        for key, value in table.items()
+        if _is_table(value) and len(lines[key]) > _LONGEST
+    }
+    head = "".join(line for key, line in lines.items() if key not in long)
+    further = (f"\n{tomli_w.dumps({name: {key: value}})}" for key, value in long.items())
+    return "".join([f"[[{name}]]\n", head, *further])
+
+
+def _value(value: object) -> str:
+    """A value on one line."""
+    if isinstance(value, Mapping):
+        keys = {key: tomli_w.dumps({key: 0}).removesuffix(" = 0\n") for key in value}
+        inside = ", ".join(f"{keys[key]} = {_value(part)}" for key, part in value.items())
+        return f"{{ {inside} }}" if inside else "{}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").removesuffix("\n")

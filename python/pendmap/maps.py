@@ -54,7 +54,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     ----------
     pendulum : Pendulum or Rig
         The model. With a rig velocities are in rad/s, times in s and exponents in 1/s; only ``tol``
-        and the errors are of numbers without dimensions.
+        and the errors are of numbers without dimensions. Effects of the group ``reading`` change
+        nothing: a map is of the motion, not of what a sensor shows of it.
     grid : Grid, optional
         The initial conditions at ``tau = 0``; by default 1000 x 1000 cells of
         [-pi, pi] x [-3, 3], with a rig of [-pi, pi] x [-3 w0, 3 w0].

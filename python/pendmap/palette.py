@@ -14,6 +14,7 @@ chaos                   tumbling purple; rotating wine and violet; libration pin
 no attractor            undecided light grey; failed black
 ======================  ==================================================================
 
+Beyond a family's last colour they begin again, darker, then lighter, and so on (:func:`lap`).
 Nothing here depends on which other attractors a map holds, and no drawing library is imported.
 """
 
@@ -25,7 +26,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["FAILED", "UNDECIDED", "UNNAMED", "colour", "describe", "direction", "diverging", "rgb"]
+__all__ = [
+    "FAILED",
+    "UNDECIDED",
+    "UNNAMED",
+    "colour",
+    "describe",
+    "direction",
+    "diverging",
+    "lap",
+    "rgb",
+]
 
 UNDECIDED = "#e4e4e4"
 """Cells not decided within the bound (label 0)."""
@@ -110,6 +121,16 @@ _OSCILLATION: dict[str, tuple[_Shade, ...]] = {
     ),
 }
 
+_LAPS = (
+    (0, 0.35, "darker"),
+    (255, 0.5, "lighter"),
+    (0, 0.6, "much darker"),
+    (255, 0.72, "much lighter"),
+    (0, 0.18, "slightly darker"),
+    (255, 0.25, "slightly lighter"),
+)
+"""What a family's colours are mixed with when they begin again, how much, and in words."""
+
 _KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
 _NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
 _MARK = re.compile(r"\(([+-])\)|[#\s]([b-z]|\d+)$")
@@ -165,6 +186,14 @@ def direction(name: str, kind: str | None = None) -> int:
     return _read(name, kind).direction
 
 
+def lap(name: str, kind: str | None = None) -> int:
+    """Return how often the colours of its family were used up before its own: usually 0.
+
+    ``oscillation 8:0`` has the colour of ``oscillation 2:0``, darkened, and the lap 1.
+    """
+    return _place(_read(name, kind))[1]
+
+
 def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     """Return colours for signed quantities: -1 and below dark blue, 0 white, 1 and above dark red.
 
@@ -185,16 +214,28 @@ def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
 
 
 def _shade(name: str, kind: str | None) -> _Shade:
-    read = _read(name, kind)
+    shade, round_ = _place(_read(name, kind))
+    if not round_:
+        return shade
+    ground, part, word = _LAPS[(round_ - 1) % len(_LAPS)]
+    mixed = [round((1 - part) * int(shade[0][k : k + 2], 16) + part * ground) for k in (1, 3, 5)]
+    return "#" + "".join(f"{value:02x}" for value in mixed), f"{word} {shade[1]}"
+
+
+def _place(read: _Read) -> tuple[_Shade, int]:
+    """Return the colour of a name in its family, and how often the family was gone through."""
+    step = max(read.n, 1) - 1
+    family: tuple[_Shade, ...]
     if read.kind in _SINGLE:
-        return _SINGLE[read.kind]
-    if read.kind in _DIRECTED:
+        family, step = (_SINGLE[read.kind],), 0
+    elif read.kind in _DIRECTED:
         family = _DIRECTED[read.kind][read.direction or 1]
     elif read.kind == "oscillation":
         family = _OSCILLATION.get(read.mark, _OSCILLATION[""])
     else:
-        return UNNAMED, "grey"
-    return family[(max(read.n, 1) - 1 + _further(read.mark)) % len(family)]
+        return (UNNAMED, "grey"), 0
+    around, at = divmod(step + _further(read.mark), len(family))
+    return family[at], around
 
 
 def _read(name: str, kind: str | None) -> _Read:

@@ -9,24 +9,42 @@ from pendmap.model.units import Units
 from pendmap.words import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
 
-__all__ = ["summarise"]
+    from pendmap.model import Effect, Pendulum
+
+__all__ = ["of_motion", "summarise", "unlimited_rotation"]
 
 _NEARLY_CHANCE = 0.15
 
 
-def summarise(dataset: xr.Dataset, *, bound_was_chosen: bool) -> str:
+def of_motion(effects: Sequence[Effect], what: str) -> list[str]:
+    """Say that ``what`` is shown is the motion, where effects change its reading."""
+    names = [effect.name for effect in effects if effect.reads]
+    if not names:
+        return []
+    verb = "acts" if len(names) == 1 else "act"
+    return [
+        f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
+    ]
+
+
+def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
     """Return the findings of a basin map, a sentence a line.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
+    pendulum : Pendulum
+        The model without dimensions.
     bound_was_chosen : bool
         Whether the bound on periods is pendmap's own choice, not the caller's.
     """
     plane = dataset.attrs["plane"]
+    unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
         lines = [_conservative(dataset)]
     elif plane == "only_chaos":
@@ -37,8 +55,12 @@ def summarise(dataset: xr.Dataset, *, bound_was_chosen: bool) -> str:
         share = dataset.attrs[key]
         if share > 0 and plane != "conservative":
             bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
+            bound = bound.split(";")[0] if unlimited else bound  # no bound helps
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     a = dataset.attrs
+    if plane != "conservative":
+        lines += unlimited
+    lines += of_motion(pendulum.effects, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
         f"{counted(a['steps_per_period'], 'step')} a period, "
@@ -46,6 +68,38 @@ def summarise(dataset: xr.Dataset, *, bound_was_chosen: bool) -> str:
         f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')} ({a['simd']})."
     )
     return "\n".join(lines)
+
+
+def unlimited_rotation(pendulum: Pendulum) -> list[str]:
+    """Say so where nothing limits the speed of a rotation, so that it settles on nothing.
+
+    Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
+    grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
+    """
+    kinds = {effect.name: effect for effect in pendulum.effects if effect.brakes}
+    own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
+    added = dict.fromkeys(own.values(), 0.0)
+    for effect in pendulum.effects:
+        if effect.name in own:
+            added[own[effect.name]] = next(iter(effect.parameters.values()))
+    gamma, friction, torque = (
+        getattr(pendulum, name) + added[name] for name in ("gamma", "theta_r", "torque")
+    )
+    # Stribeck's part of friction is none at speed; all others may brake a rotation.
+    if gamma > 0 or kinds.keys() - {"coulomb_friction", "stribeck_friction", "viscous_damping"}:
+        return []
+    if torque == 0 or friction == 0 or abs(torque) < friction:
+        return []
+    way = "forward" if torque > 0 else "backward"
+    lines = [
+        f"Without viscous damping (gamma = 0) nothing limits a rotation {way}: a turn gains "
+        f"2 pi ({abs(torque):g} - {friction:g}) m l^2 w0^2 by torque less friction, so that it "
+        + ("speeds up for ever" if abs(torque) > friction else "keeps its energy")
+        + " and settles on nothing, whatever it looks like. A smaller --max-periods shows as much."
+    ]
+    if abs(torque) > friction + 1 + abs(pendulum.p):
+        lines.append("Friction can hold it nowhere (torque above theta_r + 1 + p): no start rests.")
+    return lines
 
 
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:

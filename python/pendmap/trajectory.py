@@ -14,6 +14,7 @@ from pendmap.grid import starts
 from pendmap.model import Units, without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY
 from pendmap.store import FORMAT_VERSION
+from pendmap.summary import of_motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["advance", "simulate"]
 
 _SAMPLES = 64
+"""Samples a period, where nothing asks for more."""
+_APART = 0.1
+"""Angle between two samples, rad, that looks smooth in the phase plane."""
+_SMOOTH_SAMPLES = 200_000
+"""Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
 _MOST_SAMPLES = 2_000_000
 _ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
 
@@ -45,7 +51,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     ----------
     pendulum : Pendulum or Rig
         The model. With a rig everything is in SI: times in s, velocities in rad/s, exponents in
-        1/s; only ``tol`` and the errors are of numbers without dimensions.
+        1/s; only ``tol`` and the errors are of numbers without dimensions. Effects of the group
+        ``reading`` change nothing here: angle and velocity are those of the motion, not what a
+        sensor shows of it.
     theta, velocity : float
         State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
     until : float
@@ -56,7 +64,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         more; then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
         ``reached_error``, the difference at the end in ``end_error``.
     samples : int, optional
-        Samples a period; 64 by default, fewer where that would be more than two million in all.
+        Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
+        picture needs, up to 200,000 in all; fewer than 64 where that would be more than two
+        million. The motion does not depend on them, the batches of an exponent do.
     lyapunov : bool
         Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
         standard error from the spread of 20 batches, the first tenth left out (``exponent_from``
@@ -87,6 +97,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     periods = until / model.period
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
+        if not lyapunov:  # its batches are counted in samples: they stay what they are
+            speed, end = units.bare(velocity, VELOCITY), units.bare(until, TIME)
+            samples = max(samples, _smooth(pendulum, speed, end))
     samples = checks.whole("samples", samples, 1, checks.MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
         raise InputError(f"until is {until:g}: {periods:.3g} periods do not fit into memory")
@@ -139,8 +152,21 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    dataset.attrs["summary"] = _summary(dataset, units)
+    dataset.attrs["summary"] = "\n".join(
+        [_summary(dataset, units), *of_motion(model.effects, "angle and velocity here are")]
+    )
     return dataset
+
+
+def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
+    """Samples a period that show the motion as a curve, from a guess of its greatest speed."""
+    periods = max(until / pendulum.period, 1.0)
+    pulled = abs(velocity) + abs(pendulum.torque) * until
+    if pendulum.gamma > 0:
+        pulled = min(pulled, abs(pendulum.torque) / pendulum.gamma)
+    speed = max(abs(velocity), 2 * math.sqrt(1 + abs(pendulum.p)), pulled)
+    wanted = min(pendulum.period * speed / _APART, checks.MOST_SAMPLES)
+    return int(min(math.ceil(wanted), _SMOOTH_SAMPLES // periods))
 
 
 def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> dict[str, float]:

@@ -88,6 +88,24 @@ pub struct Stepping<'a, R, K> {
     pub state: &'a mut Running<R>,
     /// Takes the accelerations at begin and end.
     pub ends: &'a mut [R; 2],
+    /// Takes velocities and accelerations at the stages.
+    pub stages: &'a mut Stages<R>,
+}
+
+/// Velocities and accelerations at the stages of a step: kept from step to step, since to clear them
+/// would take as long as a stage.
+#[derive(Clone, Copy, Debug)]
+pub struct Stages<R> {
+    velocities: [R; STAGES],
+    accelerations: [R; STAGES],
+}
+
+impl<R: Real> Stages<R> {
+    /// In the shape of `number`.
+    #[inline(always)]
+    pub fn new(number: R) -> Self {
+        Self { velocities: [number; STAGES], accelerations: [number; STAGES] }
+    }
 }
 
 impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
@@ -95,11 +113,10 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
     // written out by a macro, since looked up it takes as long as the formulas.
     #[inline(always)]
     fn run(self) {
-        let Self { equation, clock, sense, part, state, ends } = self;
+        let Self { equation, clock, sense, part, state, ends, stages } = self;
         let h = clock.length();
         let Running { theta: theta0, velocity: velocity0 } = *state;
-        let mut velocities = [velocity0; STAGES];
-        let mut accelerations = [velocity0; STAGES];
+        let Stages { velocities, accelerations } = stages;
         let (mut theta, mut velocity) = (theta0, velocity0);
         let mut i = part.start;
         while i < part.end {

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
 use super::block::{Block, Held};
-use super::general::{Clock, END, Own, Running, STEP, Shared, Stepping, WHOLE};
+use super::general::{Clock, END, Own, Running, STEP, Shared, Stages, Stepping, WHOLE};
 use super::step::{Moving, Rubbing};
 use super::stroboscopic::Strobe;
 use super::ticket::{Progress, Reached, Ticket};
@@ -50,17 +50,18 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         if events && range.start == 0 {
             self.begin(block);
         }
+        let stages = &mut Stages::new(Q::splat(self.tokens.1, 0.0));
         let steps = self.strobe.steps();
         for k in range {
             let time = [k, k + 1].map(|k| self.length * k as f64 / steps as f64);
             match (route, extra) {
-                (Route::General, _) => self.general_step(block, k, time),
+                (Route::General, _) => self.general_step(block, k, time, stages),
                 (Route::Friction, false) => self.friction_step(block, k, time),
                 _ => self.step_with_effects(block, k, time),
             }
             if events {
                 block.let_go(time);
-                self.work_off(block);
+                self.work_off(block, stages);
             }
         }
     }
@@ -166,7 +167,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
 
     /// The same for torques that depend on the velocity.
     #[inline(always)]
-    fn general_step(&self, block: &mut Block, k: usize, time: [f64; 2]) {
+    fn general_step(&self, block: &mut Block, k: usize, time: [f64; 2], stages: &mut Stages<Q>) {
         let table = &self.strobe.timetable;
         let token = self.tokens.1;
         let scale = self.strobe.schedule.kick;
@@ -181,7 +182,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 Running { theta: half_turns.scale(PI), velocity: kick.scale(1.0 / scale) };
             let before = lanes.velocity * sense;
             let mut ends = [sense; 2];
-            self.carry(STEP, clock, sense, &mut lanes, &mut ends);
+            self.carry(STEP, clock, sense, &mut lanes, &mut ends, stages);
             let after = Moving {
                 half_turns: lanes.theta.scale(FRAC_1_PI),
                 kick: lanes.velocity.scale(scale),
@@ -197,7 +198,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 let moving = !(before - before.like(f64::MIN_POSITIVE)).signs();
                 let flags = moving & (passed | (b0.signs() & reach.signs()));
                 if flags != 0 {
-                    self.carry(END, clock, sense, &mut lanes, &mut ends);
+                    self.carry(END, clock, sense, &mut lanes, &mut ends, stages);
                     let gain = scale * table.length;
                     let ends = [ends[0].scale(gain), ends[1].scale(gain)];
                     let before = Moving { half_turns, kick };
@@ -217,9 +218,10 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         sense: Q,
         state: &mut Running<Q>,
         ends: &mut [Q; 2],
+        stages: &mut Stages<Q>,
     ) {
         let equation = &self.equation;
-        Q::apart(self.tokens.1, Stepping { equation, clock, sense, part, state, ends });
+        Q::apart(self.tokens.1, Stepping { equation, clock, sense, part, state, ends, stages });
     }
 
     #[inline(always)]
@@ -265,7 +267,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
 
     /// Runs the queue until every ticket has arrived or is held.
     #[inline(always)]
-    fn work_off(&self, block: &mut Block) {
+    fn work_off(&self, block: &mut Block, stages: &mut Stages<Q>) {
         let token = self.tokens.1;
         while !block.queue.is_empty() {
             let mut first = 0;
@@ -281,7 +283,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 let clock =
                     Own { begin: Q::load(token, &asked[3]), length: Q::load(token, &asked[4]) };
                 let mut ends = [sense; 2];
-                self.carry(WHOLE, clock, sense, &mut lanes, &mut ends);
+                self.carry(WHOLE, clock, sense, &mut lanes, &mut ends, stages);
                 lanes.theta.store(&mut asked[0]);
                 lanes.velocity.store(&mut asked[1]);
                 ends[0].store(&mut asked[2]);

@@ -121,7 +121,7 @@ mod x86 {
     impl Isa for V4 {
         const FUSED: bool = true;
         type Lanes = Bundle<Self, 12>;
-        type Narrow = Bundle<Self, 4>;
+        type Narrow = Bundle<Self, 6>;
         type Single = Fused;
 
         #[inline(always)]

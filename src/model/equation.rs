@@ -152,9 +152,11 @@ impl<R: Real> Equation<R> {
     /// All torques per inertia but friction.
     #[inline(always)]
     pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        // First, so that nothing need be kept in registers meanwhile.
+        let extra = self.extra(forcing, at);
         let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
         let bias = Kind::BiasTorque.torque(&Self::only(self.torque), at);
-        (-forcing.vertical).mul_add(at.sine, self.extra(forcing, at) + bias + damping)
+        (-forcing.vertical).mul_add(at.sine, extra + bias + damping)
     }
 
     /// What acts besides gravity, the constant torque, viscous damping and friction.
@@ -173,11 +175,11 @@ impl<R: Real> Equation<R> {
     /// The magnitude of the friction.
     #[inline(always)]
     pub fn friction(&self, at: &Point<R>) -> R {
-        let mut sum = Kind::CoulombFriction.friction(&Self::only(self.theta_r), at);
+        let mut sum = at.constant(0.0);
         for (kind, parameters) in &self.frictions {
             sum = sum + kind.friction(parameters, &at.hidden());
         }
-        sum
+        sum + Kind::CoulombFriction.friction(&Self::only(self.theta_r), at)
     }
 
     /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at

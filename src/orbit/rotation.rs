@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix2;
 
 use crate::integrate::State;
-use crate::integrate::general::{Own, Running, STEP as ALL_STAGES, Stepping};
+use crate::integrate::general::{Own, Running, STEP as ALL_STAGES, Stages, Stepping};
 use crate::integrate::tangent::Tangent;
 use crate::lanes::Work;
 use crate::model::pendulum::Route;
@@ -56,7 +56,8 @@ fn carry(
     let clock = Own { begin: number(0.0, [0.0; 2]), length: number(length, [0.0; 2]) };
     let sense = number(sense, [0.0; 2]);
     let (state, ends) = (&mut state, &mut [sense; 2]);
-    Stepping { equation, clock, sense, part: ALL_STAGES, state, ends }.run();
+    let stages = &mut Stages::new(sense);
+    Stepping { equation, clock, sense, part: ALL_STAGES, state, ends, stages }.run();
     let Running { theta, velocity } = *state;
     let [a, b, c, d] = [theta.slope[0], theta.slope[1], velocity.slope[0], velocity.slope[1]];
     ([theta.value, velocity.value], Matrix2::new(a, b, c, d))

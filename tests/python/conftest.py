@@ -7,9 +7,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
+
+from pendmap import cli
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 HERE = Path(__file__).resolve().parent
 COMMAND = Path(sys.executable).with_name("pendmap")
@@ -47,5 +52,31 @@ def pendmap_command(tmp_path: Path) -> Run:
             cwd=tmp_path,
             env=clean | (env or {}),
         )
+
+    return run
+
+
+@pytest.fixture
+def strict_recordings() -> Iterator[None]:
+    """Rerun raises what it would only warn of."""
+    import rerun as rr  # noqa: PLC0415 (most tests need none of it)
+
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture
+def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """`pendmap rig` with these words in `tmp_path`, within this process: a start costs most."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+        assert env is None
+        monkeypatch.setattr(sys, "argv", ["pendmap", "rig", *map(str, words)])
+        with pytest.raises(SystemExit) as end:
+            cli.run()
+        out, err = capsys.readouterr()
+        return subprocess.CompletedProcess(words, int(end.value.code or 0), out, err)
 
     return run

@@ -16,6 +16,8 @@ from conftest import COMMAND
 from pendmap import InputError, _core
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from conftest import Run
 
 NAMES = [effect.name for effect in pendmap.effects()]
@@ -75,13 +77,26 @@ def test_what_is_written_names_every_effect_and_parameter(pendmap_command: Run) 
     assert [e["name"] for e in json.loads(one.stdout)["effects"]] == ["magnet"]
 
 
+def test_what_is_named_is_shown_as_it_stands_in_a_model_file(
+    pendmap_command: Run, tmp_path: Path
+) -> None:
+    names = ("power_law_drag", "magnet", "encoder_gain")
+    said = pendmap_command("effects", *names).stdout
+    assert "in SI times w0^(2-n), rad^(1-n) s^(n-2))" in said
+    text = "[pendulum]\n" + said[said.index("[[effect]]") :]
+    (tmp_path / "model.toml").write_text(text, encoding="utf-8")
+    model = pendmap.load_model(tmp_path / "model.toml")
+    assert [effect.name for effect in model.effects] == list(names)
+    assert model.effects[1].parameters == {"amplitude": 0.005, "width": 0.1}
+
+
 def test_on_a_terminal_it_is_a_table() -> None:
     ours, theirs = pty.openpty()
     try:
         subprocess.run(
             [str(COMMAND), "effects", "magnet", "stribeck_friction"],
             stdout=theirs,
-            env=os.environ | {"COLUMNS": "200", "TERM": "xterm"},
+            env=os.environ | {"COLUMNS": "300", "TERM": "xterm"},
             check=True,
         )
         said = os.read(ours, 65536).decode()
@@ -90,7 +105,7 @@ def test_on_a_terminal_it_is_a_table() -> None:
         os.close(ours)
     assert "revealed by" in said
     assert "magnet" in said
-    assert "vs [rad/s]" in said
+    assert "in SI times w0, rad/s" in said
 
 
 def test_an_unknown_name_gets_one_line(pendmap_command: Run) -> None:

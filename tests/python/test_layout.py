@@ -11,22 +11,22 @@ import pytest
 from matplotlib import rc_context
 from matplotlib.text import Text
 
+import motions
 import pendmap
 import synthetic
 from pendmap import InputError
 from pendmap.figures import basins, style
 from pendmap.pictures import layers, plane
 
-UNRELIABLE: dict[str, Any] = {"labels_reliable": 0, "unreliable": 0.207}
 MAPS = {
     "usual": synthetic.painted(),
-    "unreliable": synthetic.painted(**UNRELIABLE),
+    "unreliable": synthetic.painted(**synthetic.UNRELIABLE),
     "torque": synthetic.painted(velocity=(-10.0, 10.0), p=0.0, torque=0.5),
-    "thin": synthetic.painted(theta=(0.0, 1e-12), velocity=(-1.0, 1.0), **UNRELIABLE),
+    "thin": synthetic.painted(theta=(0.0, 1e-12), velocity=(-1.0, 1.0), **synthetic.UNRELIABLE),
     "far": synthetic.painted(theta=(1e6, 1e6 + 1.0), velocity=(-1.0, 1.0)),
     "huge": synthetic.painted(theta=(1e300, 2e300), velocity=(-1.0, 1.0)),
-    "flat": synthetic.painted(theta=(-10.0, 10.0), velocity=(-2.0, 2.0), **UNRELIABLE),
-    "chaos": synthetic.chaotic(cells=16, periods=3),
+    "flat": synthetic.painted(theta=(-10.0, 10.0), velocity=(-2.0, 2.0), **synthetic.UNRELIABLE),
+    "chaos": motions.chaotic(cells=16, periods=3),
 }
 HUGE = (1.0, 1.0)
 

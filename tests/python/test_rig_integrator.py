@@ -203,7 +203,7 @@ def test_corners_and_cusps_against_scipy_in_pieces() -> None:
     w0, friction = 6.2, 0.3
     load = LoadDependentFriction(k=0.1)
     sharp = SharpStribeckFriction(a=0.1, vs=0.5)
-    magnet = Magnet(A=0.5, w=0.1)
+    magnet = Magnet(amplitude=0.5, width=0.1)
 
     def rate(t: float, y: np.ndarray) -> list[float]:
         th, v = y

@@ -44,6 +44,24 @@ def test_sections_are_taken_once_a_period() -> None:
     assert np.cos(at) == pytest.approx(np.cos(run.section_theta.values), abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("pendulum", "velocity", "until"),
+    [
+        (Pendulum(p=1.5, omega=0.3), 0.5, 60.0),
+        (Pendulum(p=0, gamma=0.01), 30.0, 10.0),
+        (Pendulum(p=0, gamma=0.1, torque=2.0), 0.0, 100.0),
+        (Pendulum(p=1, omega=9.0), 9.0, 20.0),
+    ],
+)
+def test_there_are_samples_enough_for_a_smooth_curve(
+    pendulum: Pendulum, velocity: float, until: float
+) -> None:
+    run = pendmap.simulate(pendulum, 1.0, velocity, until)
+    assert float(np.abs(np.diff(run.theta)).max()) < 0.15
+    long = pendmap.simulate(Pendulum(p=0, gamma=0.5), 1.0, 1e4, 10_000.0, tol=1e-3)
+    assert long.sizes["time"] <= 210_000
+
+
 def test_the_exponent_of_tumbling_chaos(truths: dict[str, Any]) -> None:
     for v in truths["lyapunov"].values():
         pendulum = Pendulum(v["gamma"], v["p"], v["omega"])

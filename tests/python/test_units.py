@@ -165,7 +165,7 @@ def test_rounded_digits_do_not_contradict_and_the_rig_s_own_name_counts() -> Non
     ("words", "complaint"),
     [
         ({"name": "drag", "parameters": {}}, "name is 'drag': allowed is an effect of the library"),
-        ({"name": "quadratic_darg", "parameters": {}}, "the nearest is quadratic_drag"),
+        ({"name": "quadratic_darg", "parameters": {}}, "the library, perhaps quadratic_drag;"),
         ({"name": 3, "parameters": {}}, "name is 3"),
         ({"name": ["a"], "parameters": {}}, "name is ['a']"),
         ({"parameters": {}}, "quadratic_drag: q is missing: it needs q (1/rad)"),

@@ -61,11 +61,16 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins
+    from pendmap.model import without_dimensions
+    from pendmap.summary import unlimited_rotation
 
     usual = Grid.square(count or _DEFAULT, model.units.w0)
     grid = Grid(
         Axis(*theta) if theta else usual.theta, Axis(*velocity) if velocity else usual.velocity
     )
+    if outputs.shows_progress:  # the summary says it too, after all periods have passed
+        for line in unlimited_rotation(without_dimensions(model)[0]):
+            click.echo(line, err=True)
     with progress_bar("basins", shown=outputs.shows_progress) as progress:
         dataset = basins(model, grid, progress=progress, **given)
     show(dataset, outputs, fields)

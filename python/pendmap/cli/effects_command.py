@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from pendmap.files import toml_text
 
 if TYPE_CHECKING:
     from pendmap.model.library import EffectDefinition, EffectParameter
@@ -21,8 +24,10 @@ __all__ = ["command"]
 def command(*, names: tuple[str, ...], as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 
-    The formulas stand on the right of th'' = ..., with v = th'. Units are those of SI, typical
-    values (in brackets) without dimensions. With NAMEs those alone.
+    The formulas stand on the right of th'' = ..., with v = th'; those of drives say what the pivot
+    does, those of readings what the sensor shows. In brackets: values of interest without
+    dimensions, and what makes them those of a model file in SI. With NAMEs those effects alone, and
+    how they stand in a model file.
     """
     from pendmap.cli.show import plain
     from pendmap.model.effects import definition
@@ -38,6 +43,12 @@ def command(*, names: tuple[str, ...], as_json: bool) -> None:
     else:
         for effect in shown:
             _write(effect)
+    if wanted and not as_json:
+        click.echo(
+            "\nIn a model file without dimensions, which simulate and basins take by --model:"
+        )
+        for effect in shown:
+            click.echo(f"\n{toml_text({'effect': [_example(effect)]})}".rstrip())
 
 
 def _draw(effects: list[EffectDefinition]) -> None:
@@ -45,10 +56,10 @@ def _draw(effects: list[EffectDefinition]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table("effect", "formula", "parameters", "revealed by", "maps")
+    table = Table("effect", "formula", "parameters", "revealed by", "maps", show_lines=True)
     for effect in effects:
         parameters = "\n".join(_parameter(parameter) for parameter in effect.parameters)
-        cells = (effect.name, effect.formula, parameters, effect.revealed_by, effect.mappable)
+        cells = (effect.name, effect.formula, parameters, effect.revealed_by, _maps(effect))
         # Not markup: a formula may have brackets.
         table.add_row(*(Text(cell) for cell in cells))
     Console().print(table)
@@ -58,10 +69,38 @@ def _write(effect: EffectDefinition) -> None:
     click.echo(f"{effect.name:<24} {effect.formula}")
     for parameter in effect.parameters:
         click.echo(f"{'':<26} {_parameter(parameter)}")
-    click.echo(f"{'':<26} {effect.group}, in maps: {effect.mappable}; {effect.revealed_by}")
+    click.echo(f"{'':<26} {effect.group}; maps {_maps(effect)}; revealed by {effect.revealed_by}")
+
+
+def _maps(effect: EffectDefinition) -> str:
+    """What maps do with an effect, with the word maps before it."""
+    if effect.group == "reading":
+        return "do not see it"
+    return {"frozen": "hold it at lab_time", "no": "refuse it"}.get(effect.mappable, "have it")
 
 
 def _parameter(parameter: EffectParameter) -> str:
     low, high = parameter.typical
-    unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
-    return f"{parameter.name}{unit}: {parameter.meaning} ({low:g} to {high:g})"
+    unit = "" if parameter.unit == "1" else parameter.unit
+    power = str(parameter.power_of_w0)
+    if parameter.power_of_w0_less:
+        power = f"({power}-{parameter.power_of_w0_less})"
+    if power == "0":
+        values = f"{low:g} to {high:g} {unit}".rstrip()
+    else:
+        scale = "w0" if power == "1" else f"w0^{power}"
+        values = f"{low:g} to {high:g}; in SI times {scale}, {unit}"
+    return f"{parameter.name}: {parameter.meaning} ({values})"
+
+
+def _example(effect: EffectDefinition) -> dict[str, Any]:
+    """An effect as a table of a model file, its parameters of a usual size."""
+    return {
+        "name": effect.name,
+        "parameters": {p.name: _usual(*p.typical) for p in effect.parameters},
+    }
+
+
+def _usual(low: float, high: float) -> float:
+    """A round value between two."""
+    return float(f"{math.sqrt(low * high) if low > 0 else high / 2:.1g}")

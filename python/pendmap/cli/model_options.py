@@ -24,7 +24,7 @@ _BARE = {
     "p": "Amplitude Y Omega^2/g of the drive.",
     "omega": "Frequency Omega/w0 of the drive.",
     "phase": "Phase of the drive at tau = 0, rad.",
-    "torque": "Constant torque over m l^2 w0^2.",
+    "torque": "Constant torque over m l^2 w0^2, also beside a model in SI.",
     "theta_r": "Coulomb friction Tr/w0^2.",
 }
 _SI = {
@@ -42,7 +42,8 @@ def model_options(function: Command) -> Command:
         type=click.Path(path_type=Path),
         metavar="FILE.toml",
         help="Model file, without dimensions or in SI; options typed beside it override it. In SI"
-        " times are in s and velocities in rad/s.",
+        " times are in s and velocities in rad/s; the options from --gamma to --theta-r have no"
+        " dimensions there either.",
     )
     preset = click.option(
         "--preset", type=click.Choice(sorted(PRESETS)), help="A point of the paper's figure 2."

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.types import NUMBER
+from pendmap.cli.types import NUMBER, OutputFile
 from pendmap.files import held_interrupts
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from pendmap import virtual_rig
 
 __all__ = ["command"]
 
@@ -24,7 +28,7 @@ __all__ = ["command"]
     multiple=True,
     metavar="NAME",
     help="Effect to hide, more than once for several: a name of --list, also with its parameters"
-    " (magnet:dipole,A=0.1,d=0.2), any (the seed chooses) or none.  [default: any for hidden]",
+    " (magnet:dipole,amplitude=0.1,d=0.2), any (the seed chooses) or none.  [default: hidden: any]",
 )
 @click.option("--size", type=NUMBER, default=1.0, help="Scales drawn effects.  [default: 1]")
 @click.option("--noise", type=NUMBER, help="Degrees.  [default: 0.1; hidden: 0.05 to 0.5]")
@@ -48,6 +52,11 @@ __all__ = ["command"]
 @click.option(
     "--tr", "friction", type=NUMBER, help="Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]"
 )
+@click.option(
+    "--plot",
+    type=OutputFile([".png", ".svg", ".pdf"]),
+    help="Figure of the records: .png .svg .pdf.",
+)
 @click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
 @click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
@@ -56,6 +65,7 @@ def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,
     out: Path | None,
+    plot: Path | None,
     replace: bool,
     listing: bool,
     as_json: bool,
@@ -84,14 +94,41 @@ def command(  # noqa: PLR0913 (an option each)
         with held_interrupts():
             virtual_rig.write(experiment, where)
             written += [str(where.experiment), str(where.truth)]
+        if plot is not None:
+            with held_interrupts():
+                written.append(str(_draw(experiment, where.experiment.name, plot)))
     except KeyboardInterrupt:
         raise KeyboardInterrupt(*written) from None
     if as_json:
-        click.echo(json.dumps({"experiment": written[0], "truth": written[1]}))
+        names = ("experiment", "truth", "plot")
+        click.echo(json.dumps(dict(zip(names, written, strict=False))))
     elif not quiet:
         seconds = sum(run.plan.duration for run in experiment.runs)
         click.echo(f"Written: {written[0]} ({len(experiment.runs)} runs, {seconds:.0f} s)")
         click.echo(f"The truth: {written[1]}")
+        if plot is not None:
+            click.echo(f"The records: {plot}")
+
+
+def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
+    """Draw the records, with what the folder says about them and nothing that it hides."""
+    from pendmap import figures, virtual_rig
+
+    held = virtual_rig.held_out(experiment)
+    records = []
+    for k, run in enumerate(experiment.runs):
+        plan = run.plan
+        words = [f"run_{k:02d}: {plan.kind}"]
+        if plan.kind == "forced":
+            omega = "\N{GREEK CAPITAL LETTER OMEGA}"
+            words += [f"p = {plan.p:g}", f"{omega} = {plan.frequency:g} rad/s"]
+        words += ["held out"] if k in held else []
+        records.append(figures.Record(", ".join(words), run.time, run.angle))
+    sensor = experiment.sensor
+    counts = f", {sensor.counts} counts a turn" if sensor.counts else ""
+    subtitle = f"virtual rig, {counted(len(records), 'run')}; {sensor.rate:g} Hz{counts}"
+    title = f"Measured angle: {name}"
+    return figures.draw_records(records, path, title=title, subtitle=subtitle)
 
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:

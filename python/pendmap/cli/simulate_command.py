@@ -31,7 +31,9 @@ __all__ = ["command"]
     "--until", type=NUMBER, default=100.0, help="Last time, in 1/w0, in SI s.  [default: 100]"
 )
 @click.option("--tol", type=NUMBER, default=1e-9, help="Error after 5 periods.  [default: 1e-9]")
-@click.option("--samples", type=Whole(1, MOST_SAMPLES), help="Samples a period.  [default: 64]")
+@click.option(
+    "--samples", type=Whole(1, MOST_SAMPLES), help="Samples a period.  [default: 64 or more]"
+)
 @click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
 @click.option("--quiet", is_flag=True, help="No summary.")
 @output_options

@@ -11,16 +11,18 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, style, trajectory
+from pendmap.figures import basins, records, style, trajectory
+from pendmap.figures.records import Record
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     import xarray as xr
 
-__all__ = ["SUFFIXES", "draw"]
+__all__ = ["SUFFIXES", "Record", "draw", "draw_records"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
@@ -88,5 +90,39 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         made = _KINDS[kind](dataset, layer=layer, size=size, dpi=resolution, colormap=colormap)
+        style.write(made, part)
+    return Path(path)
+
+
+def draw_records(
+    runs: Sequence[Record], path: str | os.PathLike[str], *, title: str, subtitle: str
+) -> Path:
+    """Draw the records of an experiment into a file: a panel a run, measured angle against time.
+
+    Parameters
+    ----------
+    runs : sequence of Record
+        One or more.
+    path : str or path
+        As of :func:`draw`.
+    title, subtitle : str
+        What stands above all panels.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix, or without any run.
+    OSError
+        If the file cannot be written.
+    """
+    if not runs:
+        raise InputError("runs is []: allowed is one record or more")
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        made = records.figure(runs, title=title, subtitle=subtitle, dpi=style.resolution(None))
         style.write(made, part)
     return Path(path)

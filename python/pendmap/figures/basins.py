@@ -40,6 +40,10 @@ SMALL = 0.64
 LETTER = 0.082
 """Inches of a letter of a bold title."""
 
+_FORWARD, _BACKWARD = "^>", "v<"
+_SHAPES = {"oscillation": "sPXph8", "inverted_rest": "D"}
+"""Markers by kind; the further ones where the colours begin again."""
+
 _SECTION = "its attractor, once a period"
 _COLOUR_MAPS = {"settle": "viridis", "turns": "RdBu_r", "exponent": "magma"}
 
@@ -230,9 +234,8 @@ def _scale(
 
 def _marker(entry: legend.Entry) -> str:
     turn = palette.direction(entry.name, entry.kind)
-    if turn:
-        return "^" if turn > 0 else "v"
-    return {"oscillation": "s", "inverted_rest": "D"}.get(entry.kind, "o")
+    shapes = _FORWARD if turn > 0 else _BACKWARD if turn < 0 else _SHAPES.get(entry.kind, "o")
+    return shapes[palette.lap(entry.name, entry.kind) % len(shapes)]
 
 
 def _drawn(entry: legend.Entry, size: float) -> dict[str, Any]:

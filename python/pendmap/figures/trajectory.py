@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.patches import Patch
 
 from pendmap.errors import InputError
 from pendmap.figures import sheet as sheets
@@ -34,7 +35,10 @@ FLAT = 0.1
 MANY = 500
 """Points of a section above which they are drawn smaller."""
 
-_EARLY_COLOUR, _LATE_COLOUR = "#a9b8cc", "#1d3557"
+LEGEND_ROOM = 2.6
+"""Inches of a panel whose title leaves room for a legend beside it."""
+
+_EARLY_COLOUR, _LATE_COLOUR, _REST_COLOUR = "#93a7c1", "#1d3557", "#f8edd6"
 
 
 def figure(
@@ -97,7 +101,42 @@ def _history(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     if time[-1] > time[0]:
         clock = names.clock(Units.of(dataset.attrs))
         style.scale(axes, "x", (float(time[0]), float(time[-1])), clock)
+    _at_rest(axes, dataset)
     axes.set_title(mark + "time history")
+
+
+def _at_rest(axes: Axes, dataset: xr.Dataset) -> None:
+    """Shade the times at which friction holds the pendulum, and say so above the panel."""
+    spans = resting(dataset)
+    if not len(spans):
+        return
+    widths = [(begin, end - begin) for begin, end in spans]
+    across = axes.get_xaxis_transform()
+    axes.broken_barh(widths, (0.0, 1.0), transform=across, color=_REST_COLOUR, lw=0, zorder=0)
+    box = axes.get_window_extent()
+    if box.width / axes.figure.dpi < LEGEND_ROOM:
+        return
+    axes.legend(
+        [Patch(color=_REST_COLOUR, lw=0)],
+        ["at rest"],
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderpad=0.0,
+        borderaxespad=0.4,
+        handlelength=1.4,
+        handletextpad=0.5,
+    )
+
+
+def resting(dataset: xr.Dataset) -> npt.NDArray[np.float64]:
+    """Return when friction holds the pendulum, from and to, shape (n, 2)."""
+    if "event_kind" not in dataset:
+        return np.empty((0, 2))
+    kinds, times = dataset["event_kind"].values, dataset["event_time"].values
+    last = float(dataset["time"].values[-1])
+    begins = times[kinds == "stick"]
+    ends = np.append(times[kinds == "release"], last)[: begins.size]
+    return np.stack([begins, ends], axis=1)
 
 
 def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
@@ -107,7 +146,10 @@ def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     last = plane.broken_at_wrap(theta[late:], velocity[late:])
     axes.plot(early[:, 0], early[:, 1], color=_EARLY_COLOUR, lw=0.5)
     axes.plot(last[:, 0], last[:, 1], color=_LATE_COLOUR, lw=0.7)
-    style.phase_plane(axes, (-math.pi, math.pi), _range(velocity), Units.of(dataset.attrs))
+    if dataset.attrs.get("stuck"):
+        rest = plane.wrapped(theta[-1:])
+        axes.plot(rest, velocity[-1:], "o", ms=3.5, mew=0, color=_LATE_COLOUR)
+    style.phase_plane(axes, (-math.pi, math.pi), plane.padded(velocity), Units.of(dataset.attrs))
     axes.set_title(mark + "phase plane")
 
 
@@ -118,7 +160,7 @@ def _section(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     size = 1.3 if theta.size > MANY else 2.6
     for which, colour in ((~np.asarray(late, bool), _EARLY_COLOUR), (late, _LATE_COLOUR)):
         axes.plot(theta[which], velocity[which], "o", ms=size, mew=0, color=colour)
-    speeds = _range(dataset["velocity"].values)
+    speeds = plane.padded(dataset["velocity"].values)
     style.phase_plane(axes, (-math.pi, math.pi), speeds, Units.of(dataset.attrs))
     axes.set_title(mark + "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section, once a period")
 
@@ -128,10 +170,3 @@ def _late(time: npt.NDArray[np.float64]) -> int:
     if time.size == 0:
         return 0
     return int(np.searchsorted(time, time[-1] - LATE * (time[-1] - time[0])))
-
-
-def _range(velocity: npt.NDArray[np.float64]) -> tuple[float, float]:
-    """Return limits with a margin, never empty."""
-    low, high = float(np.min(velocity)), float(np.max(velocity))
-    pad = max(0.06 * (high - low), 0.05)
-    return low - pad, high + pad

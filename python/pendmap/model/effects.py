@@ -39,9 +39,9 @@ def definition(name: object) -> dict[str, Any]:
     known = library()
     if not isinstance(name, str) or name not in known:
         near = difflib.get_close_matches(str(name), known, n=1)
-        hint = f"the nearest is {near[0]}, " if near else ""
+        hint = f", perhaps {near[0]}" if near else ""
         raise InputError(
-            f"name is {checks.shown(name)}: allowed is an effect of the library; {hint}"
+            f"name is {checks.shown(name)}: allowed is an effect of the library{hint}; "
             "pendmap effects lists all"
         )
     return known[name]
@@ -119,6 +119,16 @@ class Effect:
     def drives(self) -> bool:
         """Whether it moves the pivot."""
         return bool(definition(self.name)["group"] == "drive")
+
+    @property
+    def brakes(self) -> bool:
+        """Whether it is a kind of damping or friction."""
+        return bool(definition(self.name)["group"] == "damping")
+
+    @property
+    def reads(self) -> bool:
+        """Whether it changes the sensor's reading alone, not the motion."""
+        return bool(definition(self.name)["group"] == "reading")
 
     @property
     def drifts(self) -> bool:

@@ -9,11 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-import tomli_w
-
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.files import whole_file
+from pendmap.files import toml_text, whole_file
 from pendmap.model import quantities
 from pendmap.model.effects import Effect
 from pendmap.model.pendulum import Pendulum
@@ -112,7 +110,7 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
         content["effect"] = [_table(effect) for effect in model.effects]
     try:
         _check_notes(model.notes)
-        text = tomli_w.dumps(content | dict(model.notes))
+        text = toml_text(content | dict(model.notes))
     except (TypeError, ValueError) as error:
         raise InputError(f"{os.fspath(path)}: notes: {error}") from None
     with whole_file(path, (".toml",)) as part:
@@ -161,7 +159,7 @@ def _is_si(table: dict[str, Any]) -> bool:
     """Whether a table is in SI; all its keys are checked."""
     for key in table:
         if key not in _SI and key not in _BARE:
-            raise InputError(f"{_shown(key)} is not known: allowed {_instead(key)}")
+            raise InputError(f"{_shown(key)} is not known{_instead(key)}")
     si = [key for key in table if key in _ONLY_SI]
     bare = [key for key in table if key in _ONLY_BARE]
     if si and bare:
@@ -177,15 +175,15 @@ def _shown(key: str) -> str:
 
 
 def _instead(key: str) -> str:
-    """Return what may stand in place of a key that is not known."""
+    """Return the end of the sentence that a key is not known: what may stand in its place."""
     stem = key.rsplit("_", 1)[0]
     for known, unit in quantities.SI_UNITS.items():
         if known.rsplit("_", 1)[0] in (key, stem) or known == stem:
-            return f"is {known}, in {unit}"
+            return f": allowed is {known}, in {unit}"
     near = difflib.get_close_matches(key, (*_BARE, *_SI), n=1, cutoff=0.7)
-    nearest = f"is perhaps {near[0]}: " if near else ""
+    nearest = f", perhaps {near[0]} is meant" if near else ""
     without = ", ".join(_BARE)
-    return f"{nearest}are {without}, or in SI {', '.join(_SI)}"
+    return f"{nearest}: allowed are {without}, or in SI {', '.join(_SI)}"
 
 
 def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:

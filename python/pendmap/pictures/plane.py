@@ -17,10 +17,12 @@ __all__ = [
     "broken_at_wrap",
     "cell_edges",
     "copies",
+    "padded",
     "plain_ticks",
     "shifted",
     "short_ticks",
     "thinned",
+    "wrapped",
 ]
 
 Floats = npt.NDArray[np.float64]
@@ -135,15 +137,30 @@ def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
         Each of the m crossings adds the point on one edge, a row of nan, and that on the other.
     """
     angle, rate = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
-    turn = np.ceil((angle - math.pi) / TWO_PI)
-    curve: Floats = np.stack([angle - TWO_PI * turn, rate], axis=1)
+    within = wrapped(angle)
+    turn = np.round((angle - within) / TWO_PI)
+    curve: Floats = np.stack([within, rate], axis=1)
     at = np.flatnonzero(np.diff(turn))
     edge = np.where(turn[at + 1] > turn[at], math.pi, -math.pi)
-    part = (edge + TWO_PI * turn[at] - angle[at]) / (angle[at + 1] - angle[at])
+    part = (edge - within[at]) / (angle[at + 1] - angle[at])
+    part = np.clip(part, 0.0, 1.0)  # where rounding is coarser than the steps
     crossing = rate[at] + part * (rate[at + 1] - rate[at])
     gap = np.full_like(edge, np.nan)
     extra = np.stack([edge, crossing, gap, gap, -edge, crossing], axis=1).reshape(-1, 2)
     return np.insert(curve, np.repeat(at + 1, 3), extra, axis=0)
+
+
+def wrapped(theta: Floats) -> Floats:
+    """Return angles in (-pi, pi], also where they are as large as numbers get."""
+    within: Floats = math.pi - np.remainder(math.pi - theta, TWO_PI)
+    return within
+
+
+def padded(values: Floats) -> tuple[float, float]:
+    """Return the limits of an axis that holds the values, with a margin, never empty."""
+    low, high = float(np.min(values)), float(np.max(values))
+    pad = max(0.06 * (high - low), 0.05, 1e-6 * max(abs(low), abs(high)))
+    return low - pad, high + pad
 
 
 def _offset(low: float, high: float) -> float:

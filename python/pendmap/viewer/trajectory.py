@@ -12,6 +12,7 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pendmap.errors import InputError
 from pendmap.model.units import TIME, VELOCITY, Units
 from pendmap.pictures import names, plane
 from pendmap.viewer import frame
@@ -36,6 +37,9 @@ TRAIL_POINTS = 48
 
 TRAILS = 20000
 """Trails that are logged at most; the trail of a longer trajectory moves on in larger steps."""
+
+FASTEST, LATEST = 1e30, 9e9
+"""Velocity and time that a recording can hold."""
 
 MANY = 1000
 """Points of a section above which they are drawn smaller."""
@@ -97,6 +101,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     theta = dataset["theta"].values.astype(float)
     velocity = dataset["velocity"].values.astype(float)
     units = Units.of(dataset.attrs)
+    _refuse_beyond(time, velocity)
     clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
     if units.si:
         clock = "The time of the viewer is that of the rig."
@@ -110,11 +115,18 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     _section(stream, dataset)
 
 
+def _refuse_beyond(time: Floats, velocity: Floats) -> None:
+    """Refuse what a recording cannot hold: its places are single precision, its times ns."""
+    fastest = float(np.max(np.abs(velocity), initial=0.0))
+    if fastest > FASTEST:
+        raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
+    if time.size and time[-1] > LATEST:
+        raise InputError(f"until is {time[-1]:g}: a recording holds up to {LATEST:g}")
+
+
 def _frame(dataset: xr.Dataset) -> frame.Frame:
-    velocity = dataset["velocity"].values
-    low, high = float(velocity.min()), float(velocity.max())
-    pad = max(0.06 * (high - low), 0.05)
-    return frame.Frame((-math.pi, math.pi), (low - pad, high + pad), Units.of(dataset.attrs))
+    speeds = plane.padded(dataset["velocity"].values)
+    return frame.Frame((-math.pi, math.pi), speeds, Units.of(dataset.attrs))
 
 
 def _stroke(dataset: xr.Dataset) -> float:
@@ -181,7 +193,7 @@ def _phase(stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Fl
     curve = plane.broken_at_wrap(theta, velocity).astype(np.float32)
     lines = rr.LineStrips2D([curve], colors=[CURVE], radii=rr.Radius.ui_points(0.6))
     stream.log("phase/data/curve", lines, static=True)
-    now = np.stack([_wrapped(theta), velocity], axis=1)
+    now = np.stack([plane.wrapped(theta), velocity], axis=1)
     _points(stream, "phase/data/now", time, now, Look(BOB, 6.0))
 
 
@@ -227,8 +239,3 @@ def _strips(
     arrow = pa.ListArray.from_arrays(offsets, points, type=_STRIP)
     columns = rr.LineStrips2D.columns(strips=arrow)
     stream.send_columns(path, [_at(time)], columns)
-
-
-def _wrapped(theta: Floats) -> Floats:
-    """Return angles in (-pi, pi]."""
-    return theta - plane.TWO_PI * np.ceil((theta - math.pi) / plane.TWO_PI)

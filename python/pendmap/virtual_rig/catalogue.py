@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from pendmap.virtual_rig.effect import Effect
 
-__all__ = ["ANY", "EFFECTS", "NONE", "describe", "draw"]
+__all__ = ["ANY", "EFFECTS", "NONE", "describe", "draw", "draws_size"]
 
 EFFECTS: Final[dict[str, type[Effect]]] = {
     effect.full_name(): effect for effect in (*DAMPING, *TORQUES, *STANDS, *READINGS)
@@ -97,6 +97,15 @@ def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> lis
             raise InputError(f"effect {name!r} shows in {kind.needs} runs only: here are none")
         made.append(kind.draw(rng, scale, given))
     return made
+
+
+def draws_size(text: str) -> bool:
+    """Whether what a user asked for has a size that is drawn; where it is not known, too."""
+    if text == NONE:
+        return False
+    name, given = _parse(text)
+    fields = dataclasses.fields(EFFECTS[name]) if name in EFFECTS else ()
+    return not any(field.metadata.get("size") and field.name in given for field in fields)
 
 
 def _parse(text: str) -> tuple[str, dict[str, float]]:

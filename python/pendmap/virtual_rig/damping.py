@@ -23,13 +23,13 @@ class ViscousDamping(Effect):
 
     name = "viscous_damping"
     group = "damping"
-    formula = "-b v"
+    formula = "-gamma v"
     drawn = False
 
-    b: float = size(0.0025, 0.01, "1/s")
+    gamma: float = size(0.0025, 0.01, "1/s")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
-        return -self.b * motion.velocity
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        return -self.gamma * motion.velocity
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class CoulombFriction(Effect):
 
     name = "coulomb_friction"
     group = "friction"
-    formula = "-f sign v"
+    formula = "-theta_r sign v"
     drawn = False
 
-    f: float = size(0.013, 0.053, "rad/s2")
+    theta_r: float = size(0.013, 0.053, "rad/s^2")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats | float:
-        return self.f
+        return self.theta_r
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class QuadraticDrag(Effect):
 
     q: float = size(0.0002, 0.0008, "1/rad")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return -self.q * motion.velocity * motion.speed
 
 
@@ -69,9 +69,9 @@ class CubicDamping(Effect):
     group = "damping"
     formula = "-k3 v^3"
 
-    k3: float = size(2e-05, 8e-05, "s/rad2")
+    k3: float = size(2e-05, 8e-05, "s/rad^2")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return -self.k3 * motion.velocity**3
 
 
@@ -86,7 +86,7 @@ class PowerLawDrag(Effect):
     q: float = size(0.0009, 0.0035, "rad^(1-n) s^(n-2)")
     n: float = shape(1.3, 1.7, "", least=0.0, most=5.0)
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         # The side beyond a turn is only looked at to find the turn.
         return -self.q * motion.direction * np.maximum(motion.speed, 0.0) ** self.n
 
@@ -102,7 +102,7 @@ class AsymmetricViscous(Effect):
 
     b: float = size(0.0005, 0.002, "1/s")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return -self.b * motion.speed
 
     def least_damping(self) -> float:
@@ -118,7 +118,7 @@ class AsymmetricCoulomb(Effect):
     formula = "-d abs(sign v)"
     signed = True
 
-    d: float = size(0.0035, 0.014, "rad/s2")
+    d: float = size(0.0035, 0.014, "rad/s^2")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
         return self.d * direction
@@ -136,7 +136,7 @@ class StribeckFriction(Effect):
     formula = "-a exp(-(v/vs)^2) sign v"
     delta: ClassVar[float] = 2.0
 
-    a: float = size(0.05, 0.2, "rad/s2")
+    a: float = size(0.05, 0.2, "rad/s^2")
     vs: float = shape(0.1, 0.6, "rad/s", least=1e-3)
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
@@ -162,7 +162,7 @@ class LoadDependentFriction(Effect):
     group = "load"
     formula = "-k (abs((1 + a(t)) cos th + v^2/w0^2) - 1) sign v"
 
-    k: float = size(0.003, 0.012, "rad/s2")
+    k: float = size(0.003, 0.012, "rad/s^2")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
         return self.k * (motion.side * motion.load - 1)
@@ -179,7 +179,7 @@ class CoulombDrift(Effect):
     group = "friction"
     formula = "-r t sign v, t lab time"
 
-    r: float = size(2.5e-05, 0.0001, "rad/s3")
+    r: float = size(2.5e-05, 0.0001, "rad/s^3")
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
         return self.r * motion.lab
@@ -194,7 +194,7 @@ class WarmingCoulomb(Effect):
     group = "friction"
     formula = "+f (1 - exp(-t/tau)) sign v, t lab time"
 
-    f: float = size(0.01, 0.04, "rad/s2")
+    f: float = size(0.01, 0.04, "rad/s^2")
     tau: float = shape(60.0, 240.0, "s", least=1e-3)
 
     def friction(self, motion: Motion, direction: Floats) -> Floats:
@@ -212,9 +212,9 @@ class ViscousDrift(Effect):
     group = "damping"
     formula = "-r t v, t lab time"
 
-    r: float = size(5e-06, 2e-05, "1/s2")
+    r: float = size(5e-06, 2e-05, "1/s^2")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return -self.r * motion.lab * motion.velocity
 
 
@@ -230,7 +230,7 @@ class WarmingViscous(Effect):
     b: float = size(0.0012, 0.005, "1/s")
     tau: float = shape(60.0, 240.0, "s", least=1e-3)
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return -self.b * np.expm1(-motion.lab / self.tau) * motion.velocity
 
     def least_damping(self) -> float:
@@ -249,10 +249,10 @@ class DahlFriction(Effect):
     formula = "-f z/zc, z' = v - abs(v) z/zc"
     states = 1
 
-    f: float = size(0.012, 0.05, "rad/s2")
+    f: float = size(0.012, 0.05, "rad/s^2")
     zc: float = shape(0.02, 0.1, "rad", least=1e-3)
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return -self.f / self.zc * own[..., 0]
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
@@ -268,7 +268,7 @@ class RoughSpot(Effect):
     group = "friction"
     formula = "-f exp(-(1 - cos(th - th0))/w^2) sign v"
 
-    f: float = size(0.04, 0.16, "rad/s2")
+    f: float = size(0.04, 0.16, "rad/s^2")
     th0: float = shape(-1.0, 1.0, "rad")
     w: float = shape(0.1, 0.4, "rad", least=1e-3)
 

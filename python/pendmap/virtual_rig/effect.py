@@ -202,7 +202,7 @@ class Effect:
         """The least that the effect ever adds to c/m, 1/s."""
         return 0.0
 
-    def torque(self, motion: Motion, own: Floats) -> Floats | float:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats | float:
         """Acceleration that the effect adds, rad/s^2, shape (L, K)."""
         return 0.0
 

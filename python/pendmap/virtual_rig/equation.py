@@ -137,7 +137,7 @@ class Equation:
         if not isinstance(m.lateral, float):
             total -= p.w0**2 * m.lateral * m.cos
         for effect, part in zip(self.effects, self._own, strict=True):
-            total = total + effect.torque(m, own[..., part])
+            total = total + effect.acceleration(m, own[..., part])
         return total
 
     def friction(self, m: Motion, direction: Floats) -> Floats | float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.catalogue import draw
+from pendmap.virtual_rig.catalogue import draw, draws_size
 from pendmap.virtual_rig.drive import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
@@ -49,7 +49,7 @@ class Request:
     effects : tuple of str
         Effects to hide; :func:`pendmap.virtual_rig.catalogue.draw` says how they are written.
     size : float
-        Multiplies the size of every effect that is drawn; above 0.
+        Multiplies the size of every effect that is drawn; above 0, and 1 where none is.
     w0, c_over_m, friction : float
         The rig in SI, rad/s, 1/s, rad/s^2.
     free, forced : int
@@ -96,6 +96,7 @@ class Request:
             raise InputError(f"size is {self.size:g}: allowed is a finite number above 0")
         if self.duration is not None and not 1 <= self.duration <= 3600:  # noqa: PLR2004
             raise InputError(f"duration is {self.duration:g}: allowed is 1 to 3600 s")
+        self._refuse_idle()
         free, forced = self.runs
         if min(free, forced) < 0 or not 1 <= free + forced <= 99:  # noqa: PLR2004
             raise InputError(f"{free} free and {forced} forced runs: allowed are 1 to 99 together")
@@ -113,6 +114,20 @@ class Request:
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise InputError(f"{name} is {value:g}: allowed is {low:g} to {high:g} {unit}")
+
+    def _refuse_idle(self) -> None:
+        """Refuse what is asked for and would change nothing."""
+        asked = self.effects or PRESETS[self.preset].effects
+        if self.size != 1 and not any(draws_size(text) for text in asked):
+            raise InputError(
+                f"size is {self.size:g}: no size of an effect is drawn here: allowed with an "
+                "effect whose size is not given"
+            )
+        if self.noise == 0 and self.correlation != 0:
+            raise InputError(
+                f"correlation is {self.correlation:g}: without noise there is nothing to "
+                "correlate: allowed with noise above 0"
+            )
 
     @property
     def runs(self) -> tuple[int, int]:

@@ -48,7 +48,7 @@ class PivotCompliance(Effect):
     def _modes(self) -> list[tuple[float, float, float]]:
         return [(self.mu, self.wx, self.z)]
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         total = np.zeros_like(motion.theta)
         for k, mode in enumerate(self._modes()):
             total -= _recoil(motion, own[..., 2 * k : 2 * k + 2], mode) * motion.cos
@@ -89,14 +89,14 @@ class BaseSway(Effect):
 
     name = "base_sway"
     group = "stand"
-    formula = "-w0^2 A cos(ws t + psi) cos th, t lab time"
+    formula = "-w0^2 amplitude cos(ws t + psi) cos th, t lab time"
 
-    A: float = size(0.00017, 0.0007, "g")
+    amplitude: float = size(0.00017, 0.0007, "g")
     ws: float = shape(2.0, 10.0, "rad/s", least=0.0, most=100.0)
     psi: float = shape(-np.pi, np.pi, "rad")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
-        sway = self.A * np.cos(self.ws * motion.lab + self.psi)
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        sway = self.amplitude * np.cos(self.ws * motion.lab + self.psi)
         return np.asarray(-(motion.w0**2) * sway * motion.cos)
 
 
@@ -176,7 +176,7 @@ class DriveChirp(_DriveEffect):
     name = "drive_chirp"
     formula = "phase Omega t + r t^2/2 + phi"
 
-    r: float = size(1.5e-05, 6e-05, "rad/s2")
+    r: float = size(1.5e-05, 6e-05, "rad/s^2")
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
         return dataclasses.replace(drive, chirp=np.full_like(drive.p, self.r))
@@ -187,14 +187,14 @@ class DriveSecondHarmonic(_DriveEffect):
     """A shaker that distorts: twice the frequency as well."""
 
     name = "drive_second_harmonic"
-    formula = "a(t) + e p cos(2 (Omega t + phi) + psi)"
+    formula = "a(t) + e p cos(2 (Omega t + phi) + phase)"
     signed = False
 
     e: float = size(0.0027, 0.011, "", most=10.0)
-    psi: float = shape(-math.pi, math.pi, "rad")
+    phase: float = shape(-math.pi, math.pi, "rad")
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
-        phi = np.full_like(drive.p, self.psi)
+        phi = np.full_like(drive.p, self.phase)
         return dataclasses.replace(drive, p_second=self.e * drive.p, phi_second=phi)
 
 
@@ -203,14 +203,14 @@ class LateralDrive(_DriveEffect):
     """A shaker that does not move straight: sideways as well."""
 
     name = "lateral_drive"
-    formula = "-w0^2 e p cos(Omega t + phi + psi) cos th"
+    formula = "-w0^2 e p cos(Omega t + phi + phase) cos th"
     signed = False
 
     e: float = size(0.0007, 0.003, "", most=10.0)
-    psi: float = shape(-math.pi, math.pi, "rad")
+    phase: float = shape(-math.pi, math.pi, "rad")
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
-        phi = np.full_like(drive.p, self.psi)
+        phi = np.full_like(drive.p, self.phase)
         return dataclasses.replace(drive, p_lateral=self.e * drive.p, phi_lateral=phi)
 
 

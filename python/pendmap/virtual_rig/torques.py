@@ -23,13 +23,13 @@ class BiasTorque(Effect):
 
     name = "bias_torque"
     group = "torque"
-    formula = "+B"
+    formula = "+torque"
     signed = True
 
-    B: float = size(0.004, 0.015, "rad/s2")
+    torque: float = size(0.004, 0.015, "rad/s^2")
 
-    def torque(self, motion: Motion, own: Floats) -> float:
-        return self.B
+    def acceleration(self, motion: Motion, own: Floats) -> float:
+        return self.torque
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,14 @@ class BearingHarmonic(Effect):
 
     name = "bearing_harmonic"
     group = "torque"
-    formula = "+A sin(n th + psi)"
+    formula = "+amplitude sin(n th + psi)"
 
-    A: float = size(0.016, 0.065, "rad/s2")
+    amplitude: float = size(0.016, 0.065, "rad/s^2")
     n: float = shape(2, 6, "", whole=True, least=1, most=100)
     psi: float = shape(-np.pi, np.pi, "rad")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
-        return np.asarray(self.A * np.sin(self.n * motion.theta + self.psi))
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        return np.asarray(self.amplitude * np.sin(self.n * motion.theta + self.psi))
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,15 @@ class Magnet(Effect):
 
     name = "magnet"
     group = "torque"
-    formula = "-A (x/w) exp(-x^2/(2 w^2)), x = th wrapped"
+    formula = "-amplitude (x/width) exp(-x^2/(2 width^2)), x = th wrapped"
     signed = True
 
-    A: float = size(0.04, 0.16, "rad/s2")
-    w: float = shape(0.08, 0.2, "rad", least=1e-3)
+    amplitude: float = size(0.04, 0.16, "rad/s^2")
+    width: float = shape(0.08, 0.2, "rad", least=1e-3)
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
-        x = (motion.theta - 2 * np.pi * np.round(motion.theta / (2 * np.pi))) / self.w
-        return np.asarray(-self.A * x * np.exp(-(x**2) / 2))
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        x = (motion.theta - 2 * np.pi * np.round(motion.theta / (2 * np.pi))) / self.width
+        return np.asarray(-self.amplitude * x * np.exp(-(x**2) / 2))
 
 
 @dataclass(frozen=True)
@@ -72,15 +72,15 @@ class DipoleMagnet(Effect):
     name = "magnet"
     variant = "dipole"
     group = "torque"
-    formula = "-A (sin th/d) (1 + 2 (1 - cos th)/d^2)^(-5/2)"
+    formula = "-amplitude (sin th/d) (1 + 2 (1 - cos th)/d^2)^(-5/2)"
     signed = True
 
-    A: float = size(0.07, 0.3, "rad/s2")
+    amplitude: float = size(0.07, 0.3, "rad/s^2")
     d: float = shape(0.15, 0.4, "rad", least=1e-3)
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         distance = 1 + 2 * (1 - motion.cos) / self.d**2
-        return np.asarray(-self.A * motion.sin / self.d * distance**-2.5)
+        return np.asarray(-self.amplitude * motion.sin / self.d * distance**-2.5)
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,9 @@ class ElasticRestoring(Effect):
     group = "torque"
     formula = "-k th, th not wrapped"
 
-    k: float = size(0.0003, 0.0012, "1/s2")
+    k: float = size(0.0003, 0.0012, "1/s^2")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return -self.k * motion.theta
 
 
@@ -108,7 +108,7 @@ class RigTilt(Effect):
 
     d: float = size(0.0004, 0.0015, "rad")
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return np.asarray(-(motion.w0**2) * (np.sin(motion.theta + self.d) - motion.sin))
 
 
@@ -127,7 +127,7 @@ class InertiaRipple(Effect):
     def inertia(self, motion: Motion) -> Floats:
         return np.asarray(self.e * np.cos(self.n * motion.theta + self.psi))
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         angle = self.n * motion.theta + self.psi
         return np.asarray(self.e * self.n / 2 * np.sin(angle) * motion.velocity**2)
 
@@ -149,7 +149,7 @@ class AddedMass(Effect):
     def inertia(self, motion: Motion) -> float:
         return self.e
 
-    def torque(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
         return np.asarray(-self.e * motion.w0**2 * motion.vertical * motion.sin)
 
 

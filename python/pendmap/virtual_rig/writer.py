@@ -11,10 +11,8 @@ import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import tomli_w
-
 from pendmap.errors import InputError
-from pendmap.files import held_interrupts
+from pendmap.files import held_interrupts, toml_text
 
 if TYPE_CHECKING:
     import os
@@ -22,12 +20,14 @@ if TYPE_CHECKING:
     from pendmap.virtual_rig.effect import Effect
     from pendmap.virtual_rig.experiment import Experiment, Run
 
-__all__ = ["FORMAT_VERSION", "Places", "places", "write"]
+__all__ = ["FORMAT_VERSION", "Places", "held_out", "places", "write"]
 
 FORMAT_VERSION: Final = 1
 """Version of the layout of the truth file."""
 
 _GRAVITY: Final = 9.81
+_ENOUGH: Final = 3
+"""Runs of a kind from which on one is held out."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,10 +99,8 @@ def write(experiment: Experiment, where: Places) -> None:
                 raise type(error)(error.errno, error.strerror, str(folder)) from error
             for k, run in enumerate(experiment.runs):
                 _write_run(part / _file(k), run)
-            with (part / "experiment.toml").open("wb") as file:
-                tomli_w.dump(_description(experiment), file)
-            with truth_part.open("wb") as file:
-                tomli_w.dump(_truth(experiment), file)
+            _write_toml(part / "experiment.toml", _description(experiment))
+            _write_toml(truth_part, _truth(experiment))
             if folder.exists():
                 folder.rename(old)
             try:
@@ -129,19 +127,37 @@ def _write_run(path: Path, run: Run) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def _write_toml(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(toml_text(content), encoding="utf-8", newline="\n")
+
+
 def _description(experiment: Experiment) -> dict[str, Any]:
     """What somebody who did the experiment would know."""
     rig: dict[str, Any] = {"gravity": _GRAVITY, "w0": round(experiment.parameters.w0, 1)}
     if experiment.sensor.counts:
         rig["encoder_counts"] = experiment.sensor.counts
     runs = []
+    held = held_out(experiment)
     for k, run in enumerate(experiment.runs):
         plan = run.plan
         entry: dict[str, Any] = {"file": _file(k), "kind": plan.kind, "lab_time_s": plan.lab_time}
+        if k in held:
+            entry["hold_out"] = True
         if plan.kind == "forced":
             entry["drive"] = _drive(run)
         runs.append(entry)
     return {"rig": rig, "run": runs}
+
+
+def held_out(experiment: Experiment) -> set[int]:
+    """Which runs are to be kept from fits, to try them on: of each kind with 3 or more, one.
+
+    It is the last but one: what is fitted has runs before and after it, quicker and slower ones.
+    """
+    kinds: dict[str, list[int]] = {}
+    for k, run in enumerate(experiment.runs):
+        kinds.setdefault(run.plan.kind, []).append(k)
+    return {runs[-2] for runs in kinds.values() if len(runs) >= _ENOUGH}
 
 
 def _drive(run: Run) -> dict[str, float]:

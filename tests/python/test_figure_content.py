@@ -1,0 +1,178 @@
+"""What the figures of maps and trajectories show."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from matplotlib.colors import LogNorm
+
+import motions
+import pendmap
+import synthetic
+from drawn import made, named, titles, written
+from pendmap import palette
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = npt.NDArray[np.float64]
+
+
+def test_labels_lead_and_settle_time_stands_beside_them() -> None:
+    figure = made(synthetic.painted(synthetic.USUAL[:4]))
+    assert titles(figure) == ["basins of attraction", "settle time"]
+    assert "periods to settle" in written(figure)
+    assert "\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 1,  \N{GREEK SMALL LETTER OMEGA} = 2" in (
+        figure.texts[1].get_text()
+    )
+    settle = figure.axes[1].images[-1]
+    assert isinstance(settle.norm, LogNorm)
+    assert figure.axes[0].get_xlabel() == "\N{GREEK SMALL LETTER THETA} (rad)"
+    ticks = [tick.get_text() for tick in figure.axes[0].get_xticklabels()]
+    assert ticks == ["\N{MINUS SIGN}π", "\N{MINUS SIGN}π/2", "0", "π/2", "π"]
+
+
+def test_without_drive_there_is_no_frequency() -> None:
+    figure = made(synthetic.painted(synthetic.USUAL[:2], p=0.0, torque=0.5, phase=0.3))
+    assert (
+        figure.texts[1]
+        .get_text()
+        .startswith("\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 0,  torque = 0.5;")
+    )
+    assert "periods of 2\N{GREEK SMALL LETTER PI} to settle" in written(figure)
+
+
+def test_legend_names_share_error_and_twin() -> None:
+    dataset = synthetic.painted(synthetic.USUAL[:3], (30, 40))
+    texts = named(made(dataset))
+    assert len(texts) == 3
+    share, stderr = (100 * float(dataset[v].values[1]) for v in ("fraction", "stderr"))
+    assert texts[1] == (
+        f"rotation 1:+1, {share:.1f} \N{PLUS-MINUS SIGN} {stderr:.1f} %,"
+        " twin of rotation 1:\N{MINUS SIGN}1"
+    )
+    assert texts[0].startswith("rest, ")
+    assert "twin" not in texts[0]
+
+
+def test_undecided_and_failed_are_in_the_legend_only_if_present() -> None:
+    both = named(made(synthetic.painted(shape=(10, 10), undecided=7, failed=3)))
+    assert both[-2:] == ["undecided, 7 %", "failed, 3 %"]
+    assert not [t for t in named(made(synthetic.painted())) if t.startswith(("undec", "fail"))]
+
+
+def test_cells_have_their_attractors_colour_the_right_way_up() -> None:
+    dataset = synthetic.painted(synthetic.USUAL[:5], (12, 9), undecided=2, failed=1)
+    image = made(dataset).axes[0].images[0]
+    drawn = np.asarray(image.get_array())
+    assert image.origin == "lower"
+    assert image.get_extent() == pytest.approx([-math.pi, math.pi, -3, 3])
+    for (row, column), label in np.ndenumerate(dataset["label"].values):
+        name = {0: "undecided", -1: "failed"}.get(
+            int(label), str(dataset["attractor"].values[label - 1])
+        )
+        assert tuple(drawn[row, column]) == palette.rgb(name)
+
+
+def test_attractors_are_marked_with_their_copies() -> None:
+    dataset = synthetic.painted(
+        synthetic.USUAL[:4], theta=(-2 * math.pi, 2 * math.pi), velocity=(-1.0, 3.0)
+    )
+    marks = {line.get_markerfacecolor(): line.get_xydata() for line in made(dataset).axes[0].lines}
+    rest = np.asarray(marks[palette.colour("rest")])
+    assert sorted(rest[:, 0]) == pytest.approx([-2 * math.pi, 0, 2 * math.pi])
+    swing = np.asarray(marks[palette.colour("oscillation 2:0")])
+    assert len(swing) == 4
+    assert palette.colour("rotation 1:-1") not in marks, "its point lies outside the window"
+
+
+def test_values_of_settle_time_and_cells_without_one() -> None:
+    dataset = synthetic.painted(synthetic.USUAL[:3], (8, 8), undecided=3)
+    settle = made(dataset).axes[1].images[-1]
+    drawn: Floats = np.ma.filled(np.ma.asarray(settle.get_array()), np.nan)
+    expected = dataset["settle_periods"].values
+    assert (np.isnan(drawn) == (expected < 0)).all()
+    assert (drawn[expected >= 0] == np.maximum(expected, 1)[expected >= 0]).all()
+
+
+def test_unreliable_labels_come_last_small_and_marked() -> None:
+    figure = made(synthetic.painted(**synthetic.UNRELIABLE))
+    assert titles(figure) == ["settle time", "net turns until settled", "basins of attraction"]
+    warning = "labels unreliable: 20.7 % change under half the step or mirroring"
+    assert warning in written(figure)
+    boxes = [axes.get_window_extent() for axes in figure.axes if axes.get_title(loc="left")]
+    assert boxes[2].width < 0.7 * boxes[0].width
+    assert boxes[0].width == pytest.approx(boxes[1].width)
+    assert warning in written(made(synthetic.painted(**synthetic.UNRELIABLE), "labels"))
+    assert "unreliable" not in written(made(synthetic.painted()))
+
+
+def test_chaos_that_takes_all_shows_turns_exponent_and_its_points() -> None:
+    dataset = motions.chaotic(cells=24, periods=4)
+    figure = made(dataset)
+    assert titles(figure) == [
+        "net turns after 4 periods",
+        "finite-time exponent over 4 periods",
+        "its attractor, once a period",
+    ]
+    assert named(figure) == ["tumbling chaos, 100 % of the starts"]
+    turns = figure.axes[0].images[-1]
+    low, high = turns.get_clim()
+    assert low == -(high or 0.0) < 0.0
+    assert (np.asarray(turns.get_array()) == dataset["net_turns"].values).all()
+
+
+def test_without_damping_there_is_nothing_to_name() -> None:
+    figure = made(motions.chaotic(gamma=0.0, p=0.6, omega=2.0, cells=24, periods=4))
+    assert titles(figure) == ["net turns after 4 periods", "finite-time exponent over 4 periods"]
+    assert named(figure) == []
+    assert "No attractors without damping" in written(figure)
+
+
+def test_a_real_map_has_the_basins_of_the_smooth_point() -> None:
+    dataset = motions.integrated(p=0.6, cells=30, periods=60)
+    figure = made(dataset)
+    drawn = np.asarray(figure.axes[0].images[0].get_array()).reshape(-1, 3)
+    yellow = np.all(drawn == palette.rgb("oscillation 2:0"), axis=1).mean()
+    blue = np.all(drawn == palette.rgb("rotation 1:-1"), axis=1).mean()
+    red = np.all(drawn == palette.rgb("rotation 1:+1"), axis=1).mean()
+    assert yellow == pytest.approx(0.83, abs=0.03)
+    assert blue == red == pytest.approx(0.085, abs=0.02)
+
+
+def test_the_parts_of_a_trajectory() -> None:
+    dataset = motions.swing(periods=20, steps=30)
+    figure = made(dataset)
+    assert titles(figure) == ["time history", "phase plane", "Poincaré section, once a period"]
+    history, phase, section = figure.axes
+    assert points(history) == dataset.sizes["time"] + 1
+    for line in phase.lines:
+        xy = np.asarray(line.get_xydata())
+        assert np.nanmax(np.abs(xy[:, 0])) <= math.pi + 1e-12
+        assert np.nanmax(np.abs(np.diff(xy[:, 0]))) < 1.0, "a line crosses the plane at the wrap"
+    assert points(section) == dataset.sizes["period"]
+
+
+def test_rest_is_shaded_and_named() -> None:
+    model = pendmap.Pendulum(p=2.2, omega=0.6, theta_r=0.8)
+    run = pendmap.simulate(model, 1.0, 0.0, 40.0)
+    figure = made(run)
+    (bars,) = figure.axes[0].collections
+    spans = [path.get_extents().intervalx for path in bars.get_paths()]
+    sticks = run.event_time.values[run.event_kind.values == "stick"]
+    releases = run.event_time.values[run.event_kind.values == "release"]
+    assert len(sticks) == 2
+    assert [begin for begin, _ in spans] == pytest.approx(sticks)
+    assert [end for _, end in spans] == pytest.approx([*releases, 40.0])
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["at rest"]
+    assert made(pendmap.simulate(pendmap.Pendulum(), 1.0, 0.0, 9.0)).axes[0].get_legend() is None
+
+
+def points(axes: Axes) -> int:
+    return sum(len(np.asarray(line.get_xydata())) for line in axes.lines)

@@ -1,0 +1,155 @@
+"""Files of figures: whole or absent, the same each time, bad input refused."""
+
+from __future__ import annotations
+
+import math
+import struct
+import subprocess
+import sys
+import tracemalloc
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import motions
+import synthetic
+from drawn import made, titles
+from pendmap import InputError, figures
+from pendmap.figures import style
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+
+@pytest.mark.parametrize(
+    ("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
+)
+def test_files_are_written_whole_and_the_same_each_time(
+    tmp_path: Path, suffix: str, magic: bytes
+) -> None:
+    dataset = synthetic.painted()
+    first = figures.draw(dataset, tmp_path / f"a.{suffix}")
+    second = figures.draw(dataset, str(tmp_path / f"b.{suffix}"))
+    assert first.read_bytes().startswith(magic)
+    assert first.read_bytes() == second.read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == [f"a.{suffix}", f"b.{suffix}"]
+
+
+def test_size_and_resolution_are_kept(tmp_path: Path) -> None:
+    file = figures.draw(synthetic.painted(), tmp_path / "a.png", size=(7.5, 5.0), dpi=80)
+    assert struct.unpack(">II", file.read_bytes()[16:24]) == (600, 400)
+
+
+@pytest.mark.parametrize("layer", ["labels", "label", "settle", "net_turns", "turns"])
+def test_one_layer_alone(tmp_path: Path, layer: str) -> None:
+    figures.draw(synthetic.painted(), tmp_path / "a.png", layer=layer, dpi=50)
+    assert len(titles(made(synthetic.painted(), layer))) == 1
+
+
+def test_the_colour_map_is_used(tmp_path: Path) -> None:
+    plain = figures.draw(synthetic.painted(), tmp_path / "a.png", layer="settle", dpi=50)
+    other = figures.draw(
+        synthetic.painted(), tmp_path / "b.png", layer="settle", dpi=50, colormap="cividis"
+    )
+    assert plain.read_bytes() != other.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "says"),
+    [
+        ("a.jpg", {}, r"'\.jpg'.*\.png, \.svg, \.pdf"),
+        ("a", {}, r"suffix ''"),
+        ("a.png", {"layer": "exponent"}, "'exponent'.*labels, settle, turns"),
+        ("a.png", {"layer": "colour"}, "'colour'"),
+        ("a.png", {"colormap": "rainbowish"}, "'rainbowish'.*viridis"),
+        ("a.png", {"layer": "labels", "colormap": "viridis"}, "attractor"),
+        ("a.png", {"size": (1.0, 1.0)}, r"\(1\.0, 1\.0\).*at least"),
+        ("a.png", {"size": (math.nan, 5.0)}, "nan"),
+        ("a.png", {"size": (200.0, 5.0)}, "at most"),
+        ("a.png", {"size": (30.0, 5.0), "dpi": 1000}, "20000 pixels"),
+        ("a.png", {"dpi": 5}, "dpi 5"),
+        ("a.png", {"dpi": math.nan}, "dpi nan"),
+    ],
+)
+def test_bad_input_is_refused_and_leaves_nothing(
+    tmp_path: Path, name: str, options: dict[str, object], says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        figures.draw(synthetic.painted(), tmp_path / name, **options)  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_dataset_of_another_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"kind None.*basins, trajectory"):
+        figures.draw(xr.Dataset(), tmp_path / "a.png")
+    with pytest.raises(InputError, match="list of starts"):
+        figures.draw(synthetic.painted().isel(theta=0, drop=True), tmp_path / "a.png")
+
+
+def test_a_trajectory_has_its_own_layers(tmp_path: Path) -> None:
+    dataset = motions.swing(periods=3, steps=20)
+    figures.draw(dataset, tmp_path / "a.png", layer="section", dpi=50)
+    with pytest.raises(InputError, match=r"'labels'.*history, phase, section"):
+        figures.draw(dataset, tmp_path / "b.png", layer="labels")
+
+
+def test_an_absent_folder_or_a_folder_in_the_way(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="folder does not exist"):
+        figures.draw(synthetic.painted(), tmp_path / "no" / "a.png")
+    (tmp_path / "b.png").mkdir()
+    with pytest.raises(IsADirectoryError, match=r"b\.png"):
+        figures.draw(synthetic.painted(), tmp_path / "b.png")
+
+
+def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "a.png"
+    file.write_bytes(b"old")
+
+    def interrupted(_figure: Figure, part: Path) -> None:
+        part.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(style, "write", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        figures.draw(synthetic.painted(), file)
+    assert file.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_large_maps_are_never_converted_whole(tmp_path: Path) -> None:
+    peaks = []
+    for side in (1000, 4000):
+        dataset = enlarged(synthetic.painted(synthetic.USUAL[:3], (10, 10), undecided=4), side)
+        figures.draw(dataset, tmp_path / "warm.png")
+        tracemalloc.start()
+        figures.draw(dataset, tmp_path / "a.png")
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 4000 * 4000, "more than one byte a cell beyond the thinned map"
+
+
+def enlarged(dataset: xr.Dataset, side: int) -> xr.Dataset:
+    """Return a map of ``side`` squared cells, its arrays in memory."""
+    index = np.arange(side) * dataset.sizes["theta"] // side
+    return (
+        dataset.isel(theta=index, velocity=index)
+        .assign_coords(
+            theta=synthetic.centres(-math.pi, math.pi, side),
+            velocity=synthetic.centres(-3, 3, side),
+        )
+        .load()
+    )
+
+
+def test_neither_library_is_loaded_before_it_is_needed() -> None:
+    code = (
+        "import sys; from pendmap import palette; from pendmap.pictures import legend, plane;"
+        "assert not {'matplotlib', 'rerun'} & set(sys.modules);"
+        "from pendmap import figures;"
+        "assert not {'matplotlib.pyplot', 'rerun'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,87 @@
+"""The pieces of pictures: thinning, wrapped curves, ticks, percents, layers, legend."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import to_rgb
+
+import motions
+import synthetic
+from pendmap.pictures import layers, legend, plane
+
+
+def test_thinning_keeps_at_most_the_limit_and_copies_nothing() -> None:
+    array = xr.DataArray(np.arange(1000 * 70).reshape(1000, 70), dims=("velocity", "theta"))
+    thin = plane.thinned(array, 100)
+    assert thin.shape == (100, 70)
+    assert np.shares_memory(thin, array.values)
+    assert plane.thinned(array, 1000) is not None
+    assert (plane.thinned(array, 1000) == array.values).all()
+
+
+def test_a_curve_is_cut_exactly_at_the_wrap() -> None:
+    theta = np.linspace(0.0, -7 * math.pi, 400)
+    curve = plane.broken_at_wrap(theta, theta)
+    gaps = np.flatnonzero(np.isnan(curve[:, 0]))
+    assert len(gaps) == 4
+    assert np.allclose(curve[gaps - 1, 0], -math.pi)
+    assert np.allclose(curve[gaps + 1, 0], math.pi)
+    assert np.allclose(curve[gaps - 1, 1], [-math.pi * k for k in (1, 3, 5, 7)])
+    assert len(plane.broken_at_wrap([], [])) == 0
+
+
+def test_angles_are_wrapped_as_far_as_numbers_go() -> None:
+    far = np.array([math.pi, -math.pi, 1e16, -1e300, 1.7e308])
+    within = plane.wrapped(far)
+    assert (np.abs(within) <= math.pi).all()
+    assert within[:2].tolist() == [math.pi, math.pi]
+    curve = plane.broken_at_wrap(1e16 + np.arange(0.0, 40.0, 2.0), np.ones(20))
+    assert np.nanmax(np.abs(curve[:, 0])) <= math.pi
+
+
+@pytest.mark.parametrize(
+    ("window", "labels"),
+    [
+        ((-math.pi, math.pi), "-π -π/2 0 π/2 π"),
+        ((0, 2 * math.pi), "0 π/2 π 3π/2 2π"),
+        ((-math.pi / 2, math.pi / 2), "-π/2 -π/4 0 π/4 π/2"),
+        ((-4 * math.pi, 4 * math.pi), "-4π -2π 0 2π 4π"),
+        ((0.1, 0.2), "0.1 0.12 0.14 0.16 0.18 0.2"),
+    ],
+)
+def test_angle_ticks(window: tuple[float, float], labels: str) -> None:
+    ticks = plane.angle_ticks(*window)
+    assert " ".join(label for _, label in ticks) == labels.replace("-", "\N{MINUS SIGN}")
+    assert all(window[0] - 1e-9 <= at <= window[1] + 1e-9 for at, _ in ticks)
+
+
+@pytest.mark.parametrize(
+    ("share", "stderr", "text"),
+    [
+        (0.20921, 0.00131, "20.92 ± 0.13 %"),
+        (0.5, 0.05, "50.0 ± 5.0 %"),
+        (1.0, 0.0, "100 %"),
+        (0.25, math.nan, "25 %"),
+        (0.333, 0.19, "33 ± 19 %"),
+    ],
+)
+def test_percent_has_the_digits_its_error_supports(share: float, stderr: float, text: str) -> None:
+    assert legend.percent(share, stderr) == text
+
+
+def test_layers_lead_as_the_map_demands() -> None:
+    assert layers.layers(synthetic.painted()) == ("labels", "settle", "turns")
+    assert layers.layers(synthetic.painted(**synthetic.UNRELIABLE)) == ("settle", "turns", "labels")
+    assert layers.layers(motions.chaotic(cells=16, periods=3)) == ("turns", "exponent")
+    assert layers.layers(synthetic.painted(synthetic.USUAL[10:12])) == ("labels", "turns")
+
+
+def test_a_legend_entry_has_the_colour_of_its_cells() -> None:
+    dataset = synthetic.painted(synthetic.USUAL, undecided=3, failed=2)
+    table = legend.colours(dataset)
+    for entry in legend.entries(dataset):
+        assert tuple(table[entry.id + 1] / 255) == pytest.approx(to_rgb(entry.colour))

@@ -1,0 +1,66 @@
+"""Files of recordings: whole or absent, the same for the same map, bad input refused."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+import rerun as rr
+import xarray as xr
+
+import synthetic
+from pendmap import InputError, viewer
+from pendmap.viewer import basins
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("strict_recordings")
+
+
+def test_a_recording_is_whole_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "a.rrd"
+    file.write_bytes(b"old")
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(viewer._KINDS, "basins", (basins.blueprint, interrupted))  # noqa: SLF001
+    with pytest.raises(KeyboardInterrupt):
+        viewer.record(synthetic.painted(), file)
+    assert file.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_the_same_map_is_the_same_recording(tmp_path: Path) -> None:
+    other = synthetic.painted()
+    other["label"][4, 5] = 0
+    ids = [
+        recorded(dataset, tmp_path).recordings[0].recording_id
+        for dataset in (synthetic.painted(), synthetic.painted(seconds=9.0), other)
+    ]
+    assert ids[0] == ids[1] != ids[2]
+
+
+def test_errors_are_raised_although_the_library_would_only_warn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rr.set_strict_mode(False)
+    monkeypatch.setattr(basins, "_COLOUR_MAPS", {"settle": "no such map"})
+    with pytest.raises(ValueError, match="no such map"):
+        viewer.record(synthetic.painted(), tmp_path / "a.rrd")
+    assert not rr.strict_mode()
+    assert not list(tmp_path.iterdir())
+
+
+def test_bad_input_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"'\.txt'.*\.rrd"):
+        viewer.record(synthetic.painted(), tmp_path / "a.txt")
+    with pytest.raises(InputError, match=r"kind None.*basins, trajectory"):
+        viewer.record(xr.Dataset(), tmp_path / "a.rrd")
+    with pytest.raises(InputError, match="list of starts"):
+        viewer.record(synthetic.painted().isel(theta=0, drop=True), tmp_path / "a.rrd")
+    with pytest.raises(FileNotFoundError, match="folder does not exist"):
+        viewer.record(synthetic.painted(), tmp_path / "no" / "a.rrd")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,104 @@
+"""Recordings of trajectories, read back: state, pendulum, phase plane, trail."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import motions
+import pendmap
+import synthetic
+from pendmap import InputError
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+pytestmark = pytest.mark.usefixtures("strict_recordings")
+
+
+@pytest.fixture(scope="module")
+def swing() -> xr.Dataset:
+    return motions.swing(periods=12, steps=200, p=1.7, omega=0.87)
+
+
+def test_a_trajectory_read_back(tmp_path: Path, swing: xr.Dataset) -> None:
+    back = recorded(swing, tmp_path)
+    theta, velocity = swing["theta"].values, swing["velocity"].values
+    assert np.allclose(back.rows("/state/theta", "Scalars:scalars"), theta)
+    assert np.allclose(back.rows("/state/omega", "Scalars:scalars"), velocity)
+    energy = back.rows("/state/energy", "Scalars:scalars")
+    assert np.allclose(energy, velocity**2 / 2 + 1 - np.cos(theta))
+    assert np.allclose(back.seconds("/state/theta"), swing["time"].values, atol=1e-5)
+    now = back.rows("/phase/data/now", "Points2D:positions")
+    assert np.allclose(now[:, 0], synthetic.wrap(theta), atol=1e-6)
+    assert np.allclose(now[:, 1], velocity, atol=1e-6)
+    points = back.rows("/poincare/data/points", "Points2D:positions")
+    assert np.allclose(points[:, 0], swing["section_theta"].values, atol=1e-6)
+    assert back.columns["/poincare/data/points"]["period"] == list(range(13))
+    assert {"/pendulum/data/trail", "/phase/data/curve", "/summary"} <= set(back.columns)
+
+
+def test_the_pendulum_hangs_on_its_pivot(tmp_path: Path, swing: xr.Dataset) -> None:
+    back = recorded(swing, tmp_path)
+    bob = back.rows("/pendulum/data/bob", "Points2D:positions")
+    pivot = back.rows("/pendulum/data/pivot", "Points2D:positions")
+    arm = back.rows("/pendulum/data/arm", "LineStrips2D:strips")
+    assert np.allclose(np.hypot(*(bob - pivot).T), 1.0, atol=1e-5)
+    assert np.allclose(arm, np.stack([pivot, bob], axis=1))
+    hanging = np.arctan2((bob - pivot)[:, 0], -(bob - pivot)[:, 1])
+    assert np.allclose(np.cos(hanging - swing["theta"].values), 1.0, atol=1e-6)
+
+
+def test_the_pivot_accelerates_as_the_equation_says(tmp_path: Path, swing: xr.Dataset) -> None:
+    back = recorded(swing, tmp_path)
+    height = back.rows("/pendulum/data/pivot", "Points2D:positions")[:, 1]
+    h = float(swing["time"][1] - swing["time"][0])
+    every = 20  # the positions have single precision
+    acceleration = np.diff(height[::every], 2) / (every * h) ** 2
+    drive = 1.7 * np.cos(0.87 * swing["time"].values[::every][1:-1])
+    assert np.allclose(acceleration, drive, atol=0.06)
+
+
+def test_the_curve_does_not_cross_the_plane(tmp_path: Path, swing: xr.Dataset) -> None:
+    back = recorded(swing, tmp_path)
+    curve = np.array(back.one("/phase/data/curve", "LineStrips2D:strips"))
+    assert np.isnan(curve[:, 0]).any(), "this trajectory tumbles"
+    assert np.nanmax(np.abs(np.diff(curve[:, 0]))) < 1.0
+
+
+def test_the_trail_ends_at_the_bob(tmp_path: Path, swing: xr.Dataset) -> None:
+    back = recorded(swing, tmp_path)
+    trail = back.rows("/pendulum/data/trail", "LineStrips2D:strips")
+    bob = back.rows("/pendulum/data/bob", "Points2D:positions")
+    assert np.allclose(trail[:, -1], bob)
+    assert np.allclose(trail[150, -2], bob[145]), (
+        "every fifth of 200 samples: one period, 40 points"
+    )
+    assert np.allclose(trail[0], bob[0])
+
+
+@pytest.mark.parametrize("periods", [0, 1])
+def test_the_shortest_trajectories(tmp_path: Path, periods: int) -> None:
+    back = recorded(motions.swing(periods=periods, steps=3, p=0.0), tmp_path)
+    assert len(back.rows("/state/theta", "Scalars:scalars")) == 3 * periods + 1
+
+
+@pytest.mark.parametrize("theta", [1e16, -1e300, 1.7e308])
+def test_angles_as_large_as_numbers_get(tmp_path: Path, theta: float) -> None:
+    back = recorded(pendmap.simulate(pendmap.Pendulum(), theta, 0.0, 9.0), tmp_path)
+    now = back.rows("/phase/data/now", "Points2D:positions")
+    assert np.abs(now[:, 0]).max() <= math.pi + 1e-6
+
+
+def test_what_no_recording_holds_is_refused(tmp_path: Path) -> None:
+    run = motions.swing(periods=1, steps=3)
+    run["velocity"][1] = 1e40
+    with pytest.raises(InputError, match=r"velocity reaches 1e\+40: a recording holds"):
+        recorded(run, tmp_path)
+    assert not list(tmp_path.iterdir())

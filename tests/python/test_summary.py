@@ -1,0 +1,50 @@
+"""What summaries say about a model: effects on the reading alone, rotations without a limit."""
+
+from __future__ import annotations
+
+import pytest
+
+import pendmap
+from pendmap import Effect, Grid, Pendulum
+
+READINGS = (Effect("encoder_offset", {"d": 0.1}), Effect("encoder_gain", {"e": 0.01}))
+
+
+def test_motion_is_told_from_its_reading() -> None:
+    model = Pendulum(p=0, effects=READINGS)
+    plain = pendmap.simulate(Pendulum(p=0), 1.0, 0.0, 5.0)
+    run = pendmap.simulate(model, 1.0, 0.0, 5.0)
+    assert (run.theta.values == plain.theta.values).all()
+    names = "encoder_offset, encoder_gain act on the sensor's reading alone: "
+    assert names + "angle and velocity here are of the motion" in run.attrs["summary"]
+    share = pendmap.basins(model, Grid.square(3), max_periods=200)
+    assert names + "this map is of the motion" in share.attrs["summary"]
+    assert "reading" not in plain.attrs["summary"]
+    alone = pendmap.simulate(Pendulum(p=0, effects=READINGS[:1]), 1.0, 0.0, 5.0)
+    assert "encoder_offset acts on" in alone.attrs["summary"]
+
+
+@pytest.mark.parametrize(
+    ("model", "says"),
+    [
+        (Pendulum(gamma=0, p=0, theta_r=0.1, torque=1.3), "rotation forward: a turn gains 2 pi (1"),
+        (Pendulum(gamma=0, p=0, theta_r=0.1, torque=-0.5), "rotation backward"),
+        (Pendulum(gamma=0, p=0, theta_r=0.1, torque=0.05), ""),
+        (Pendulum(gamma=0.01, p=0, theta_r=0.1, torque=1.3), ""),
+        (
+            Pendulum(
+                *(0, 0, 1),
+                theta_r=0.1,
+                torque=1.3,
+                effects=(Effect("quadratic_drag", {"q": 0.1}),),
+            ),
+            "",
+        ),
+    ],
+)
+def test_why_nothing_limits_a_rotation_is_said(model: Pendulum, says: str) -> None:
+    summary = pendmap.basins(model, Grid.square(5), max_periods=20).attrs["summary"]
+    assert says in summary
+    assert ("nothing limits a rotation" in summary) == bool(says)
+    assert ("no start rests" in summary) == (model.torque == 1.3 and bool(says))
+    assert not says or "raises this bound" not in summary

@@ -1,0 +1,47 @@
+"""TOML as people write it: it reads back, with a table for each entry of a list."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+import pytest
+
+from pendmap.files import toml_text
+
+DEEP = {
+    "deep": [{"z": [1, {"q": '\n"'}]}],
+    "long": {f"{'y' * 10}{i}": {"m": i / 3} for i in range(9)},
+    "after": True,
+    "e": {},
+    "l": [],
+}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {},
+        {"a b": 1, "x": [DEEP, {}, DEEP], "t": {"u": [{"v": 1}]}, "n": [[1, 2], [{}]]},
+        {"only": [{"name": "a", "of long": {str(i): float(i) for i in range(40)}}]},
+        {"none": [], "mixed": [1, {"a": 2}], "last": 3},
+    ],
+    ids=["nothing", "deep", "long", "mixed"],
+)
+def test_it_reads_back(content: dict[str, Any]) -> None:
+    assert tomllib.loads(toml_text(content)) == content
+
+
+def test_lists_of_tables_have_a_heading_each() -> None:
+    run = {"file": "run_00.csv", "drive": {"p": 0.2, "phi": -1.5}, "ends": [0.5, 2]}
+    assert toml_text({"version": 1, "rig": {"w0": 6.2}, "run": [run, {"file": "b"}]}) == (
+        "version = 1\n"
+        "\n[rig]\nw0 = 6.2\n"
+        '\n[[run]]\nfile = "run_00.csv"\ndrive = { p = 0.2, phi = -1.5 }\nends = [0.5, 2]\n'
+        '\n[[run]]\nfile = "b"\n'
+    )
+
+
+def test_what_toml_has_not_is_refused() -> None:
+    with pytest.raises(TypeError):
+        toml_text({"effect": [{"name": object()}]})
