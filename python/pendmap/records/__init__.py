@@ -1,0 +1,8 @@
+"""Records of experiments: read, understood, checked; nothing is ever written beside them."""
+
+from __future__ import annotations
+
+from pendmap.records.experiment import Experiment, Finding, Run, Segment
+from pendmap.records.noise import NoiseFloor, noise_floor
+
+__all__ = ["Experiment", "Finding", "NoiseFloor", "Run", "Segment", "noise_floor"]
