@@ -91,6 +91,8 @@ class Run:
         Whether it is kept back from fits.
     velocity : ndarray, shape (N,), or None
         rad/s, where it was measured.
+    acceleration : ndarray, shape (N,), or None
+        m/s^2 (or rad/s^2), where it was measured beside the angle.
     drive : mapping or None
         ``p``, ``Omega`` and ``phi`` (``None``: to be fitted) of a(t) = p cos(Omega t + phi).
     pivot : mapping of str to ndarray, or None
@@ -121,6 +123,7 @@ class Run:
     lab_time_s: float = 0.0
     hold_out: bool = False
     velocity: Floats | None = None
+    acceleration: Floats | None = None
     drive: Mapping[str, float | None] | None = None
     pivot: Mapping[str, Floats] | None = None
     pivot_unit: str | None = None
