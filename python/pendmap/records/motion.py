@@ -1,7 +1,250 @@
-"""x."""
+"""What the pendulum does in a free record: held, released, swinging, at rest, released again."""
+
 from __future__ import annotations
-from typing import TYPE_CHECKING
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.records.experiment import Segment
+from pendmap.records.local_fit import local_fit
+from pendmap.records.noise import normal_scale
+from pendmap.records.runs_of import true_runs
+from pendmap.records.scale import periods_of
+from pendmap.records.swings import swings
+from pendmap.records.zero import middle_of
+from pendmap.words import counted
+
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["check"]
+
+STILL: Final = 8.0
+"""Standard deviations of noise within which a whole period must stay to be no motion: white
+noise spans 5 or 6 in a hundred samples."""
+
+RISE: Final = 0.1
+"""Share of the largest swing by which a free swing grows only if somebody helps."""
+
+HELD: Final = 1.5
+"""Times longer than a release from rest takes to be seen, from where it was held before."""
+
+UPRIGHT: Final = 2.7
+"""Angle in rad beyond which a pendulum leaves so slowly that a hold cannot be told."""
+
+CERTAIN: Final = 4.0
+"""Standard errors that an offset must have to be said."""
+
+
 def check(work: Work) -> None:
-    pass
+    """Divide a free record into stretches and trust the longest swing alone; say the offset."""
+    low, high = float(work.time[0]), float(work.time[-1])
+    work.segments = [Segment("motion", low, high, used=True)]
+    noise = _noise(work)
+    limit = max(STILL * noise, 2.5 * work.count)
+    good = work.theta[work.trusted]
+    if good.size < 4 or np.ptp(good) <= limit:  # noqa: PLR2004
+        if np.ptp(work.theta) == 0:
+            raise InputError(f"{work.where}: the angle never changes: allowed is a motion")
+        work.say("no-motion", f"nothing moves: all angles within {np.ptp(good):.3g} rad")
+        return
+    if work.plan.kind != "free":
+        return
+    middle = middle_of(work.time[work.trusted], good)
+    middle = float(np.median(good)) if middle is None else middle
+    found = periods_of(work, middle)
+    period = found.small if found else _known_period(work)
+    if period is None:
+        work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
+        return
+    stretches = _still(work, period, limit)
+    parts = _moving(work, stretches)
+    parts = [piece for part in parts for piece in _releases(work, part, middle, limit)]
+    if not parts:
+        return
+    held = _held_short(work, parts[0], period, noise)
+    if held is not None:
+        parts[0] = (held, parts[0][1])
+    _settle(work, parts, middle)
+    _offset(work, parts, limit)
+
+
+def _noise(work: Work) -> float:
+    fit = local_fit(work.time, work.theta)
+    return min(normal_scale(fit.residual), 0.05 * float(np.ptp(work.theta)))
+
+
+def _known_period(work: Work) -> float | None:
+    w0 = work.known.get("w0")
+    if not w0 and "gravity" in work.known and "length_m" in work.known:
+        w0 = math.sqrt(work.known["gravity"] / work.known["length_m"])
+    return 2 * math.pi / w0 if w0 else None
+
+
+def _still(work: Work, period: float, limit: float) -> list[tuple[int, int]]:
+    """Return stretches, of a period and more, in which nothing moves."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d  # noqa: PLC0415 (heavy)
+
+    theta = work.theta.copy()
+    bad = ~work.trusted
+    if bad.any():
+        theta[bad] = np.interp(work.time[bad], work.time[~bad], theta[~bad])
+    width = max(round(period / float(np.median(np.diff(work.time)))), 5) | 1
+    if width >= theta.size:
+        return []
+    highest = maximum_filter1d(theta, width, mode="nearest")
+    spread = highest - minimum_filter1d(theta, width, mode="nearest")
+    still = np.asarray(spread <= limit, bool)
+    half = width // 2
+    still[:half], still[-half:] = still[half], still[-half - 1]
+    low, high = true_runs(still)
+    return [
+        (max(int(a) - (half if a > 0 else 0), 0), min(int(b) + half, theta.size))
+        for a, b in zip(low, high, strict=True)
+    ]
+
+
+def _moving(work: Work, still: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    edges = [0, *(place for stretch in still for place in stretch), work.time.size]
+    pairs = zip(edges[::2], edges[1::2], strict=True)
+    return [(a, b) for a, b in pairs if b - a > 5]  # noqa: PLR2004 (a swing has more)
+
+
+def _releases(
+    work: Work, part: tuple[int, int], middle: float, limit: float
+) -> list[tuple[int, int]]:
+    """Divide a motion where the swing grows: somebody took the pendulum and let it go again."""
+    low, high = part
+    good = np.flatnonzero(work.trusted[low:high]) + low
+    if good.size < 5:  # noqa: PLR2004
+        return []
+    half = swings(work.time[good], work.theta[good] - middle, least=limit)
+    size = np.abs(half.peak)
+    if size.size < 4:  # noqa: PLR2004
+        return [part]
+    # Neighbours together: an offset makes every other half cycle larger.
+    pairs = np.maximum(size[:-1], size[1:])
+    rise = max(RISE * float(size.max()), 2 * limit)
+    cuts: list[tuple[int, int]] = []
+    least, at = pairs[0], 0
+    k = 1
+    while k < pairs.size:
+        if pairs[k] < least:
+            least, at = pairs[k], k
+        elif pairs[k] > least + rise:
+            top = k
+            while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
+                top += 1
+            peak = top + int(size[top + 1] > size[top]) if top + 1 < size.size else top
+            stop = int(np.searchsorted(work.time, half.peak_time[min(at + 1, size.size - 1)]))
+            go = int(np.searchsorted(work.time, half.peak_time[peak]))
+            cuts.append((stop, go))
+            least, at, k = pairs[top], top, top
+        k += 1
+    edges = [low, *(place for cut in cuts for place in cut), high]
+    pieces = zip(edges[::2], edges[1::2], strict=True)
+    return [(a, b) for a, b in pieces if b - a > 5]  # noqa: PLR2004
+
+
+def _held_short(
+    work: Work, part: tuple[int, int], period: float, noise: float
+) -> int | None:
+    """Return where a motion begins that was held for less than a period before."""
+    low = part[0]
+    theta, time = work.theta[low : part[1]], work.time[low : part[1]]
+    start = float(np.median(theta[:5]))
+    seen = max(6 * noise, 1.5 * work.count, 1e-4)
+    left = np.flatnonzero(np.abs(theta - start) > seen)
+    w0 = 2 * math.pi / period
+    if not left.size or abs(start) > UPRIGHT or abs(math.sin(start)) < 0.05:  # noqa: PLR2004
+        return None
+    usual = math.sqrt(2 * seen / (w0**2 * abs(math.sin(start))))
+    interval = float(np.median(np.diff(work.time)))
+    still = float(time[left[0]] - time[0])
+    if still <= HELD * usual + 4 * interval:
+        return None
+    return low + max(int(np.searchsorted(time, time[left[0]] - usual)), 0)
+
+
+def _settle(work: Work, parts: list[tuple[int, int]], middle: float) -> None:
+    """Name the stretches, trust the longest swing, and say so."""
+    longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
+    trusted = np.zeros(work.time.size, bool)
+    trusted[parts[longest][0] : parts[longest][1]] = True
+    segments = []
+    at = 0
+    for k, (low, high) in enumerate(parts):
+        if low > at:
+            segments.append(_between(work, at, low, middle, first=k == 0))
+        segments.append(_segment(work, "motion", low, high, used=k == longest))
+        at = high
+    if at < work.time.size:
+        segments.append(_between(work, at, work.time.size, middle, first=False))
+    work.segments = segments
+    work.trusted &= trusted
+    if len(parts) > 1:
+        low, high = parts[longest]
+        span = (float(work.time[low]), float(work.time[high - 1]))
+        text = (
+            f"{len(parts)} releases: the longest swing is used, {span[0]:.6g} to {span[1]:.6g} s"
+        )
+        work.say("several-releases", text, span=span)
+    first, last = segments[0], segments[-1]
+    if first.what == "held":
+        text = f"held until {first.to_s:.6g} s, not for fitting"
+        work.say("held-start", text, span=(first.from_s, first.to_s))
+    if last.what == "rest" and len(segments) > 1:
+        text = f"at rest from {last.from_s:.6g} s, not for fitting"
+        work.say("rest-tail", text, span=(last.from_s, last.to_s))
+
+
+def _between(work: Work, low: int, high: int, middle: float, *, first: bool) -> Segment:
+    """Name what is no swing: at the rest or held elsewhere."""
+    reach = float(np.max(np.abs(work.theta[work.trusted] - middle)))
+    level = work.theta[low:high]
+    far = abs(float(np.median(level)) - middle) > 0.1 * reach  # noqa: PLR2004 (friction holds less)
+    moved = float(np.ptp(level)) > 0.2 * reach  # noqa: PLR2004
+    what = "handled" if moved and not first else "held" if far or first else "rest"
+    return _segment(work, what, low, high, used=False)
+
+
+def _segment(work: Work, what: str, low: int, high: int, *, used: bool) -> Segment:
+    return Segment(what, float(work.time[low]), float(work.time[high - 1]), used)
+
+
+def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
+    """Say where it rests, or about what it swings, if that is not 0."""
+    last = work.segments[-1]
+    if last.what == "rest":
+        tail = work.theta[work.time >= last.from_s]
+        value = float(np.mean(tail))
+        error = float(np.std(tail)) / math.sqrt(tail.size)
+        error = max(error, work.count / math.sqrt(12))
+        said = f"it rests at {_folded(value):+.3g} rad: an offset, or what friction holds"
+    else:
+        low, high = max(parts, key=lambda part: part[1] - part[0])
+        good = np.flatnonzero(work.trusted[low:high]) + low
+        theta = work.theta[good]
+        turns = 2 * math.pi * round(float(np.median(theta[theta.size // 2 :])) / (2 * math.pi))
+        peaks = swings(work.time[good], theta - turns, least=limit).peak
+        if peaks.size < 8:  # noqa: PLR2004 (six middles)
+            return
+        middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
+        middles = middles[middles.size // 2 :]  # small swings: no friction's asymmetry, no turns
+        value = float(np.median(middles))
+        error = 1.6 * normal_scale(middles - value) / math.sqrt(middles.size)
+        error = max(error, work.count / math.sqrt(12 * middles.size))
+        said = f"it swings about {value:+.3g} +- {error:.1g} rad: an offset of the zero"
+    if abs(_folded(value)) > max(CERTAIN * error, 1e-5):
+        work.say("zero-offset", f"{said}; left to the fit")
+
+
+def _folded(angle: float) -> float:
+    return angle - 2 * math.pi * round(angle / (2 * math.pi))
