@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, style, trajectory
+from pendmap.figures import basins, record, style, trajectory
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
 
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["SUFFIXES", "draw"]
+    from pendmap.records import Experiment
+
+__all__ = ["SUFFIXES", "draw", "draw_record"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
@@ -89,4 +91,47 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         made = _KINDS[kind](dataset, layer=layer, size=size, dpi=resolution, colormap=colormap)
         style.write(made, part)
+    return Path(path)
+
+
+def draw_record(
+    experiment: Experiment,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Draw what an experiment holds into a file.
+
+    Of one record: the angle with what is for fitting and what is not, the findings at their places
+    and in words, the intervals of its clock, its noise against speed. Of several runs: a strip
+    each.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What ``pendmap.read_experiment`` returned.
+    path : str or path
+        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
+    size : (float, float), optional
+        Width and height in inches; by default as large as the parts need.
+    dpi : float, optional
+        Pixels per inch, 200 by default.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix and an impossible size or resolution.
+    OSError
+        If the file cannot be written.
+    """
+    resolution = style.resolution(dpi)
+    style.check_size(size, resolution)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(record.figure(experiment, size=size, dpi=resolution), part)
     return Path(path)

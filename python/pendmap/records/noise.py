@@ -10,7 +10,7 @@ gain, is noise. Three things spoil that, and each has its remedy here:
   pendulum passes at least a count from one to the next; slower than that nothing can be said but
   that an even error within a count has the standard deviation count/sqrt(12), and that is the
   least that is reported.
-- Outliers: what is beyond six standard deviations (robust, from the median) is left out with all
+- Outliers: what is beyond eight standard deviations (robust, from quantiles) is left out with all
   windows that it is part of, then a plain root mean square is taken. The median alone would be
   wrong by a tenth for the even errors of a counter.
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["NoiseFloor", "SpeedRange", "noise_floor", "noise_of", "normal_scale", "outlying"]
+__all__ = ["NoiseFloor", "SpeedRange", "noise_floor", "broad_scale", "noise_of", "normal_scale", "outlying"]
 
 DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
 """Degree and samples of the polynomials that are tried in turn."""
@@ -54,8 +54,9 @@ some room, from where the error of a rounded sum is that of its parts to a perce
 CLEAR: Final = 4
 """Counts of way from which a speed is taken: rounding then changes it by a quarter at most."""
 
-FALSE: Final = 6.0
-"""Standard deviations beyond which a residual is an outlier: 2e-9 of white noise is."""
+FALSE: Final = 8.0
+"""Standard deviations beyond which a residual is an outlier. White noise stays below 6; that of
+real encoders has longer tails, which are part of it."""
 
 FEWEST: Final = 40
 """Residuals that a standard deviation is taken from; half a dozen would be wrong by a third."""
@@ -239,7 +240,7 @@ def _clean(fit: LocalFit, bad: NDArray[np.bool_]) -> LocalFit:
 def outlying(fit: LocalFit, size: int) -> NDArray[np.bool_]:
     """Return which of ``size`` samples share a window with an outlier."""
     false = np.zeros(size, bool)
-    scale = normal_scale(fit.residual)
+    scale = broad_scale(np.abs(fit.residual))
     false[fit.middle[np.abs(fit.residual) > FALSE * scale]] = scale > 0
     return _near(false, fit.neighbours)
 
@@ -247,6 +248,18 @@ def outlying(fit: LocalFit, size: int) -> NDArray[np.bool_]:
 def normal_scale(values: Floats) -> float:
     """Return the standard deviation of normal values from the median of their sizes, robust."""
     return 1.4826 * float(np.median(np.abs(values))) if values.size else 0.0
+
+
+def broad_scale(sizes: Floats) -> float:
+    """Return a standard deviation from sizes, robust, that knows of long tails.
+
+    The larger of those that the median and the 80 % quantile show: where noise changes with speed,
+    or has long tails, the median alone is half of it. A tenth of false samples changes neither.
+    """
+    if not sizes.size:
+        return 0.0
+    half, most = np.quantile(sizes, [0.5, 0.8])
+    return float(max(1.4826 * half, most / 1.2816))
 
 
 def _near(marked: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:

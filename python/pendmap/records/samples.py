@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.records.local_fit import POINTS, local_fit
-from pendmap.records.noise import DEGREES, normal_scale
+from pendmap.records.noise import DEGREES, broad_scale, normal_scale
 from pendmap.records.runs_of import equal_runs
 from pendmap.records.steps import find_steps
 from pendmap.words import counted
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["check", "step_of"]
 
-SPIKE: Final = 8.0
+SPIKE: Final = 10.0
 """Local standard deviations of a residual that make an outlier. White noise reaches 6 once in
-5e8 samples; the rest is for noise that grows with speed."""
+5e8 samples; the rest is for noise with long tails, as real encoders have."""
 
 NEARBY: Final = 151
 """Samples around each that its scale comes from: more than a false stretch, less than a decay."""
@@ -149,11 +149,11 @@ def _degree(time: Floats, theta: Floats) -> tuple[int, int]:
 
 
 def _scale(size: Floats) -> Floats:
-    """Return the standard deviation around each residual, robust, never under the median's."""
+    """Return the standard deviation around each residual, robust, never under the record's."""
     from scipy.ndimage import median_filter  # noqa: PLC0415 (heavy)
 
     near: Floats = 1.4826 * median_filter(size, size=min(NEARBY, size.size), mode="nearest")
-    floor = 0.5 * normal_scale(size)
+    floor = broad_scale(size)
     return np.maximum(near, max(floor, 1e-9))
 
 
