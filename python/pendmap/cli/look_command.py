@@ -15,9 +15,7 @@ __all__ = ["command"]
 
 @click.command("look")
 @click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
-@click.option(
-    "--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf."
-)
+@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="No summary.")
 def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> None:

@@ -7,17 +7,20 @@ import textwrap
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from matplotlib.transforms import ScaledTranslation
 
 from pendmap.errors import InputError
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
 from pendmap.records.local_fit import local_fit
 from pendmap.records.noise import noise_floor
+from pendmap.records.runs_of import true_runs
 from pendmap.records.summary import noise_said
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Transform
     from numpy.typing import NDArray
 
     from pendmap.records import Experiment, Finding, Run
@@ -43,6 +46,9 @@ MOST_LINES: Final = 14
 FEW: Final = 400
 """Samples under which each is drawn as a dot."""
 
+APART: Final = 0.22
+"""Inches between numbers in one row."""
+
 SHORT: Final = 2e-3
 """Share of the record under which a finding is a line, not a span."""
 
@@ -62,14 +68,14 @@ def _one(experiment: Experiment, size: tuple[float, float] | None, dpi: float) -
     letters = max(int((width - 1.0) / 0.073), 20)
     noted = _listed(run, letters)
     below = 0.3 + 0.17 * len(noted) if noted else 0.0
-    height = size[1] if size else 6.4 + below
+    height = size[1] if size else 6.1 + below
     across = width - sheets.LEFT - sheets.RIGHT
     down = height - sheets.TOP - sheets.BOTTOM - below
     _refuse_small(size, across, down)
     sheet = sheets.headed((width, height), dpi, f"Record {run.name}", _subtitle(run))
     gap_x, gap_y, flags = 0.85, 0.85, 0.3
-    top = 0.55 * (down - gap_y - flags)
-    low = down - gap_y - flags - top
+    top = 0.55 * (down - gap_y)
+    low = down - gap_y - top
     base = sheets.BOTTOM + below
     first = sheets.place(sheet, sheets.LEFT, base + low + gap_y, across, top)
     marks = sheets.place(sheet, sheets.LEFT, base + low + gap_y + top, across, flags)
@@ -101,7 +107,9 @@ def _refuse_small(size: tuple[float, float] | None, across: float, down: float) 
 def _subtitle(run: Run) -> str:
     if run.peaks_only:
         return f"{run.time.size} turning points, {run.time[0]:.6g} to {run.time[-1]:.6g} s"
-    said = noise_said(noise_floor(run)).split(",", maxsplit=1)[0].replace("+-", "\N{PLUS-MINUS SIGN}")
+    said = (
+        noise_said(noise_floor(run)).split(",", maxsplit=1)[0].replace("+-", "\N{PLUS-MINUS SIGN}")
+    )
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
     return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {said}"
 
@@ -135,7 +143,7 @@ def _history(axes: Axes, run: Run) -> None:
     _limits(axes, run)
     style.scale(axes, "x", axes.get_xlim(), "t (s)")
     style.scale(axes, "y", axes.get_ylim(), ANGLE, angle=float(np.ptp(axes.get_ylim())) > 2)  # noqa: PLR2004
-    parts = [("for fitting", USED), ("not for fitting", UNUSED), ("false", FALSE)]
+    parts = [("for fitting", USED), ("not for fitting", UNUSED), ("outliers", FALSE)]
     shown = [True, bool((~run.trusted & ~lone).any()), bool(lone.any())]
     at = 1.0
     for (text, colour), there in reversed(list(zip(parts, shown, strict=True))):
@@ -148,10 +156,8 @@ def _history(axes: Axes, run: Run) -> None:
             at -= size + 0.025
 
 
-def _under(axes: Axes):  # noqa: ANN202
+def _under(axes: Axes) -> Transform:
     """Coordinates across the panel and, in inches, from a little under its tick labels."""
-    from matplotlib.transforms import ScaledTranslation  # noqa: PLC0415
-
     return axes.transAxes + ScaledTranslation(0, -0.24, axes.figure.dpi_scale_trans)
 
 
@@ -165,10 +171,11 @@ def _limits(axes: Axes, run: Run) -> None:
 
 
 def _lone(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the marked samples have at most two marked ones beside them: outliers."""
-    padded = np.concatenate([[False] * 3, marked, [False] * 3])
-    near = sum(padded[3 + k : 3 + k + marked.size].astype(int) for k in range(-3, 4))
-    return marked & (np.asarray(near) <= 4)  # noqa: PLR2004
+    """Which of the marked samples stand in stretches of three at most: outliers."""
+    lone = np.zeros(marked.size, bool)
+    for low, high in zip(*true_runs(marked), strict=True):
+        lone[low:high] = high - low <= 3  # noqa: PLR2004
+    return lone
 
 
 def _broken(run: Run) -> NDArray[np.bool_]:
@@ -205,19 +212,16 @@ def _flags(axes: Axes, run: Run) -> None:
         if right < low or left > high:
             continue
         inch = (left - low + pad) / (high - low + 2 * pad) * width
-        row = next((r for r in (0, 1) if all(abs(inch - x) > 0.22 for x in taken[r])), None)
+        row = next((r for r in (0, 1) if all(abs(inch - x) > APART for x in taken[r])), None)
         if row is None:
             continue
         taken[row].append(inch)
         colour = style.QUIET if found.mended else style.ALARM
-        if right - left > SHORT * (high - low):
+        if right - left > SHORT * (high - low) and not found.where.startswith("row"):
             axes.plot([left, right], [row + 0.1] * 2, color=colour, lw=1.6, solid_capstyle="butt")
         else:
             axes.plot([left], [row + 0.12], "v", color=colour, ms=3.5, mew=0)
-        # Under the edge of the panel on the right a number would leave the figure.
-        axes.text(
-            left, row + 0.28, str(number), color=colour, fontsize=8, ha="center", va="bottom"
-        )
+        axes.text(left, row + 0.28, str(number), color=colour, fontsize=8, ha="center", va="bottom")
 
 
 def _intervals(axes: Axes, run: Run) -> None:
@@ -232,7 +236,7 @@ def _intervals(axes: Axes, run: Run) -> None:
     else:
         pad = max(0.05 * (high - low), 0.02 * usual)
         edges = np.linspace(low - pad, high + pad, 61)
-    axes.hist(steps, edges, color=USED, log=True)
+    axes.hist(steps, edges.tolist(), color=USED, log=True)
     axes.set_ylim(bottom=0.7)
     if not wide:
         style.scale(axes, "x", (float(edges[0]), float(edges[-1])), "interval (ms)")
@@ -270,7 +274,8 @@ def _residuals(axes: Axes, run: Run) -> None:
         axes.plot([part.speed_from, high], [level, level], color=FALSE, lw=1.8)
     top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
     axes.set_ylim(0, max(top, 1e-9))
-    axes.set_xlim(0, max(float(np.quantile(speed, 0.999)) * 1.03, 1e-9))
+    fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
+    axes.set_xlim(0, max(fastest * 1.03, 1e-9))
     axes.text(
         0.98, 0.96, "line: standard deviation", transform=axes.transAxes, ha="right", va="top",
         color=FALSE, fontsize=8.5,
@@ -321,9 +326,11 @@ def _strip(axes: Axes, run: Run, longest: float) -> None:
     axes.set_xlim(-0.01 * longest, 1.01 * longest)
     style.scale(axes, "x", (0.0, longest), "t from the start (s)")
     style.scale(axes, "y", axes.get_ylim(), ANGLE, angle=high - low > 2)  # noqa: PLR2004
-    said = [run.kind]
+    said: list[str] = [run.kind]
     if run.drive is not None:
-        said.append(f"p = {run.drive['p']:g}, \N{GREEK CAPITAL LETTER OMEGA} = {run.drive['Omega']:g} rad/s")
+        said.append(
+            f"p = {run.drive['p']:g}, \N{GREEK CAPITAL LETTER OMEGA} = {run.drive['Omega']:g} rad/s"
+        )
     if run.hold_out:
         said.append("held out")
     odd = sum(not found.mended for found in run.findings)

@@ -100,16 +100,16 @@ def _derived(work: Work) -> None:
 
 def _integrated(work: Work, velocity: Floats) -> Floats:
     """Integrate a velocity; a straight line that the sensor's bias adds is taken out."""
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415 (heavy)
+    from scipy.interpolate import CubicSpline
 
     velocity = np.where(np.abs(velocity) > LARGEST, 0.0, velocity)
     time = work.time - work.time[0]
     theta: Floats = CubicSpline(time, velocity).antiderivative()(time)
     if np.ptp(theta - np.median(theta)) > 2 * TURN:
-        return theta - theta[-1]  # it turns: where it hangs is not seen here
+        return np.asarray(theta - theta[-1])  # it turns: where it hangs is not seen here
     middle = _middles(time, theta)
     if middle is None:
-        return theta - np.median(theta)
+        return np.asarray(theta - np.median(theta))
     line = np.polyfit(*middle, 1)
     return np.asarray(theta - np.polyval(line, time))
 
@@ -118,7 +118,7 @@ def _middles(time: Floats, theta: Floats) -> tuple[Floats, Floats] | None:
     """Return times and values halfway between turning points of either side."""
     trend = np.polyval(np.polyfit(time, theta, 1), time)
     found = swings(time, theta - trend)
-    if found.peak_time.size < 4:  # noqa: PLR2004 (two middles make a line)
+    if found.peak_time.size < 4:
         return None
     peaks = found.peak + np.interp(found.peak_time, time, trend)
     # Halves of (1, 2, 1): what the decay does to a plain mean of two turns cancels.
@@ -131,7 +131,7 @@ def _unwrap(work: Work) -> None:
     steps = np.diff(work.theta)
     jumps = np.flatnonzero(np.abs(steps) > JUMP * TURN)
     span = float(np.ptp(work.theta))
-    if not jumps.size or span > BAND * TURN or span < 0.9 * TURN:  # noqa: PLR2004
+    if not jumps.size or span > BAND * TURN or span < 0.9 * TURN:
         return
     work.theta = np.unwrap(work.theta)
     text = f"the sensor wraps: {counted(jumps.size, 'jump')} of one turn undone"

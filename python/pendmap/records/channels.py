@@ -83,8 +83,8 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
     _check(places, table, where)
     values, units = {}, {}
     for channel, place in places.items():
-        column = asked.get(channel)
-        values[channel] = _in_si(channel, table, place, column, description, where)
+        given = asked.get(channel)
+        values[channel] = _in_si(channel, table, place, given, description, where)
         units[channel] = table.names[place] or f"column {place + 1}"
     declared = {c for c, column in asked.items() if column.unit or column.scale}
     pivot, unit = _pivot(table, plan, where)
@@ -179,7 +179,7 @@ def _by_position(table: Table, places: dict[str, int]) -> list[Finding]:
 
 def _rises(values: Floats) -> bool:
     steps = np.diff(values[np.isfinite(values)])
-    return bool(steps.size and np.mean(steps > 0) > 0.9)  # noqa: PLR2004 (a clock with flaws)
+    return bool(steps.size and np.mean(steps > 0) > 0.9)
 
 
 def _check(places: dict[str, int], table: Table, where: str) -> None:
@@ -229,9 +229,7 @@ def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
     return np.asarray((raw - zero) * kind.factor(unit, where))
 
 
-def _pivot(
-    table: Table, plan: RunPlan, where: str
-) -> tuple[dict[str, Floats] | None, str | None]:
+def _pivot(table: Table, plan: RunPlan, where: str) -> tuple[dict[str, Floats] | None, str | None]:
     if plan.pivot is None:
         return None, None
     unit, factor = PIVOT_UNITS[plan.pivot["unit"]]

@@ -56,7 +56,7 @@ def circle_angle(time: Floats, x: Floats, y: Floats, where: str) -> CircleAngle:
         away = np.abs(np.hypot(u - a, v - b) - radius)
         limit = 6 * max(1.4826 * float(np.median(away)), 1e-9)
         kept = away <= limit
-    if not (math.isfinite(radius) and 0 < radius < 1e3):  # noqa: PLR2004 (an arc of 0.06 degrees)
+    if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(
             f"{where}: pixel_x and pixel_y lie on no circle: allowed are places of a bob"
         )
@@ -96,7 +96,7 @@ def _geometric(
         slope = np.column_stack([-(u - a) / distance, -(v - b) / distance, -np.ones(u.size)])
         step = np.linalg.lstsq(slope, -(distance - radius), rcond=None)[0]
         a, b, radius = a + float(step[0]), b + float(step[1]), radius + float(step[2])
-        if not math.isfinite(radius) or np.max(np.abs(step)) < 1e-12:  # noqa: PLR2004
+        if not math.isfinite(radius) or np.max(np.abs(step)) < 1e-12:
             break
     distance = np.hypot(u - a, v - b) - radius
     rms = float(np.sqrt(np.mean(distance**2)))

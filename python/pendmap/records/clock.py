@@ -1,4 +1,4 @@
-"""The clock: stamps that are missing, jump, repeat, run backwards, jitter, or are in milliseconds."""
+"""The clock: stamps that are missing, repeat, jump, run backwards or jitter."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def mend(work: Work) -> None:
         If no two stamps are in order.
     """
     _finite(work)
-    if work.time.size < 2:  # noqa: PLR2004
+    if work.time.size < 2:
         work.refuse_short()
     _wrapped(work)
     _restarted(work)
     _coarse(work)
     _ordered(work)
-    if work.time.size < 2 or not work.time[-1] > work.time[0]:  # noqa: PLR2004
+    if work.time.size < 2 or not work.time[-1] > work.time[0]:
         raise InputError(f"{work.where}: the times do not increase: allowed are times in order")
     _spacing(work)
 
@@ -118,7 +118,7 @@ def _coarse(work: Work) -> None:
     if same < COARSE or same == 1 or np.any(steps < 0):
         return
     rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)
-    if np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9:  # noqa: PLR2004
+    if np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9:
         return  # the samples are repeated with their stamps
     place = np.arange(work.time.size)
     slope, start = np.polyfit(place, work.time - work.time[0], 1)
@@ -127,7 +127,9 @@ def _coarse(work: Work) -> None:
     if slope <= 0 or np.max(np.abs(away)) > 1.5 * tick:
         return  # samples are lost besides: left to the rest
     work.time = work.time[0] + start + slope * place
-    text = f"{100 * same:.0f} % of the stamps repeat the one before: spread evenly, {1 / slope:.6g} Hz"
+    text = (
+        f"{100 * same:.0f} % of the stamps repeat the one before: spread evenly, {1 / slope:.6g} Hz"
+    )
     work.say("time-coarse", text, mended=True)
 
 

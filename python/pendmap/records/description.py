@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import tomllib
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
@@ -13,6 +12,7 @@ from pendmap.errors import InputError
 from pendmap.records.units import CHANNELS, PIVOT_UNITS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from pendmap.records.experiment import Kind
@@ -165,7 +165,7 @@ def _text(name: str, value: object) -> str:
 
 
 def _columns(table: dict[str, Any]) -> dict[str, Column]:
-    _keys(table, CHANNELS, "[columns]")
+    _keys(table, tuple(CHANNELS), "[columns]")
     return {channel: _column(channel, value) for channel, value in table.items()}
 
 
@@ -196,13 +196,9 @@ def _reader(table: dict[str, Any]) -> Reader:
     delimiter, decimal = table.get("delimiter"), table.get("decimal")
     if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1):
         allowed = 'one character, like ";" or "\\t"'
-        raise InputError(
-            f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is {allowed}"
-        )
+        raise InputError(f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is {allowed}")
     if decimal not in {None, ".", ","}:
-        raise InputError(
-            f'[reader]: decimal is {checks.shown(decimal)}: allowed is "." or ","'
-        )
+        raise InputError(f'[reader]: decimal is {checks.shown(decimal)}: allowed is "." or ","')
     if delimiter is not None and delimiter in '"\r\n\0+-.0123456789eE':
         raise InputError(
             f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is what numbers do not need"

@@ -137,7 +137,7 @@ class Run:
     @property
     def rate_hz(self) -> float:
         """Samples a second, from the median interval."""
-        import numpy as np  # noqa: PLC0415 (the types alone need no numpy)
+        import numpy as np
 
         return float(1 / np.median(np.diff(self.time))) if self.time.size > 1 else 0.0
 

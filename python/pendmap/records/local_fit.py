@@ -136,7 +136,7 @@ def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats]:
     fitted = np.einsum("mk,mpk,mp->m", middle, q, theta)
     gain = np.sqrt(np.maximum(1.0 - np.einsum("mk,mk->m", middle, middle), 1e-6))
     diagonal = np.abs(np.einsum("mkk->mk", r))
-    sound = np.min(diagonal, axis=1) > 1e-9 * np.max(diagonal, axis=1)  # noqa: PLR2004 (rank)
+    sound = np.min(diagonal, axis=1) > 1e-9 * np.max(diagonal, axis=1)
     slope = np.full(theta.shape[0], np.nan)
     right = np.einsum("mpk,mp->mk", q[sound], theta[sound])
     slope[sound] = np.linalg.solve(r[sound], right[:, :, None])[:, 1, 0] / width[sound]

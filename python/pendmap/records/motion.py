@@ -15,7 +15,6 @@ from pendmap.records.runs_of import true_runs
 from pendmap.records.scale import periods_of
 from pendmap.records.swings import swings
 from pendmap.records.zero import middle_of
-from pendmap.words import counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +49,7 @@ def check(work: Work) -> None:
     noise = _noise(work)
     limit = max(STILL * noise, 2.5 * work.count)
     good = work.theta[work.trusted]
-    if good.size < 4 or np.ptp(good) <= limit:  # noqa: PLR2004
+    if good.size < 4 or np.ptp(good) <= limit:
         if np.ptp(work.theta) == 0:
             raise InputError(f"{work.where}: the angle never changes: allowed is a motion")
         work.say("no-motion", f"nothing moves: all angles within {np.ptp(good):.3g} rad")
@@ -90,7 +89,7 @@ def _known_period(work: Work) -> float | None:
 
 def _still(work: Work, period: float, limit: float) -> list[tuple[int, int]]:
     """Return stretches, of a period and more, in which nothing moves."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d  # noqa: PLC0415 (heavy)
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     theta = work.theta.copy()
     bad = ~work.trusted
@@ -114,7 +113,7 @@ def _still(work: Work, period: float, limit: float) -> list[tuple[int, int]]:
 def _moving(work: Work, still: list[tuple[int, int]]) -> list[tuple[int, int]]:
     edges = [0, *(place for stretch in still for place in stretch), work.time.size]
     pairs = zip(edges[::2], edges[1::2], strict=True)
-    return [(a, b) for a, b in pairs if b - a > 5]  # noqa: PLR2004 (a swing has more)
+    return [(a, b) for a, b in pairs if b - a > 5]
 
 
 def _releases(
@@ -123,11 +122,11 @@ def _releases(
     """Divide a motion where the swing grows: somebody took the pendulum and let it go again."""
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low
-    if good.size < 5:  # noqa: PLR2004
+    if good.size < 5:
         return []
     half = swings(work.time[good], work.theta[good] - middle, least=limit)
     size = np.abs(half.peak)
-    if size.size < 4:  # noqa: PLR2004
+    if size.size < 4:
         return [part]
     # Neighbours together: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
@@ -150,12 +149,10 @@ def _releases(
         k += 1
     edges = [low, *(place for cut in cuts for place in cut), high]
     pieces = zip(edges[::2], edges[1::2], strict=True)
-    return [(a, b) for a, b in pieces if b - a > 5]  # noqa: PLR2004
+    return [(a, b) for a, b in pieces if b - a > 5]
 
 
-def _held_short(
-    work: Work, part: tuple[int, int], period: float, noise: float
-) -> int | None:
+def _held_short(work: Work, part: tuple[int, int], period: float, noise: float) -> int | None:
     """Return where a motion begins that was held for less than a period before."""
     low = part[0]
     theta, time = work.theta[low : part[1]], work.time[low : part[1]]
@@ -163,7 +160,7 @@ def _held_short(
     seen = max(6 * noise, 1.5 * work.count, 1e-4)
     left = np.flatnonzero(np.abs(theta - start) > seen)
     w0 = 2 * math.pi / period
-    if not left.size or abs(start) > UPRIGHT or abs(math.sin(start)) < 0.05:  # noqa: PLR2004
+    if not left.size or abs(start) > UPRIGHT or abs(math.sin(start)) < 0.05:
         return None
     usual = math.sqrt(2 * seen / (w0**2 * abs(math.sin(start))))
     interval = float(np.median(np.diff(work.time)))
@@ -192,9 +189,7 @@ def _settle(work: Work, parts: list[tuple[int, int]], middle: float) -> None:
     if len(parts) > 1:
         low, high = parts[longest]
         span = (float(work.time[low]), float(work.time[high - 1]))
-        text = (
-            f"{len(parts)} releases: the longest swing is used, {span[0]:.6g} to {span[1]:.6g} s"
-        )
+        text = f"{len(parts)} releases: the longest swing is used, {span[0]:.6g} to {span[1]:.6g} s"
         work.say("several-releases", text, span=span)
     first, last = segments[0], segments[-1]
     if first.what == "held":
@@ -209,8 +204,8 @@ def _between(work: Work, low: int, high: int, middle: float, *, first: bool) -> 
     """Name what is no swing: at the rest or held elsewhere."""
     reach = float(np.max(np.abs(work.theta[work.trusted] - middle)))
     level = work.theta[low:high]
-    far = abs(float(np.median(level)) - middle) > 0.1 * reach  # noqa: PLR2004 (friction holds less)
-    moved = float(np.ptp(level)) > 0.2 * reach  # noqa: PLR2004
+    far = abs(float(np.median(level)) - middle) > 0.1 * reach
+    moved = float(np.ptp(level)) > 0.2 * reach
     what = "handled" if moved and not first else "held" if far or first else "rest"
     return _segment(work, what, low, high, used=False)
 
@@ -234,7 +229,7 @@ def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
         theta = work.theta[good]
         turns = 2 * math.pi * round(float(np.median(theta[theta.size // 2 :])) / (2 * math.pi))
         peaks = swings(work.time[good], theta - turns, least=limit).peak
-        if peaks.size < 8:  # noqa: PLR2004 (six middles)
+        if peaks.size < 8:
             return
         middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
         middles = middles[middles.size // 2 :]  # small swings: no friction's asymmetry, no turns

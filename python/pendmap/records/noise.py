@@ -21,6 +21,7 @@ filter.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -35,7 +36,15 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["NoiseFloor", "SpeedRange", "noise_floor", "broad_scale", "noise_of", "normal_scale", "outlying"]
+__all__ = [
+    "NoiseFloor",
+    "SpeedRange",
+    "broad_scale",
+    "noise_floor",
+    "noise_of",
+    "normal_scale",
+    "outlying",
+]
 
 DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
 """Degree and samples of the polynomials that are tried in turn."""
@@ -149,9 +158,7 @@ def noise_of(
     return found or NoiseFloor(math.nan, math.nan)
 
 
-def _noise(
-    time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float
-) -> NoiseFloor | None:
+def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) -> NoiseFloor | None:
     first = _clean(local_fit(time, theta), bad)
     if first.middle.size < FEWEST:
         return None
@@ -295,7 +302,7 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
     if slowest > 0:
         found.append(SpeedRange(0.0, slowest, least, least / 10, 0))
         edges[0] = slowest
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         part = _only(fit, (speed >= low) & (speed <= high))
         if part.middle.size:
             sigma = max(_rms(part), least)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.records import angle, clock, motion, samples, scale, signs
+from pendmap.records import angle, clock, motion, noise_check, samples, scale, signs
 from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
@@ -103,6 +103,7 @@ def _run(
         scale.check(work)
         motion.check(work)
         signs.check(work)
+        noise_check.check(work)
     work.refuse_short()
     return Run(
         name=name,

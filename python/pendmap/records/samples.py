@@ -1,4 +1,4 @@
-"""Samples that lie: outliers, missed counts, readings that clip or freeze; the step they come in."""
+"""Samples that lie: outliers, readings that clip or freeze; the step they come in."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def _count(work: Work) -> float:
             text = f"the readings come in steps of {seen:.4g} rad ({turn:.5g} a turn)"
             work.say("counts-seen", text)
         return seen
-    count = 2 * math.pi / counts
-    if seen > 1.5 * count and work.theta.size > 200:  # noqa: PLR2004 (a slow record skips counts)
+    count = 2 * math.pi / float(counts)
+    if seen > 1.5 * count and work.theta.size > 200:
         text = (
             f"the readings come in steps of {seen:.4g} rad, {2 * math.pi / seen:.5g} a turn:"
             f" encoder_counts says {counts}"
@@ -82,7 +82,7 @@ def step_of(theta: Floats) -> float:
     believed where the readings repeat and lie on its multiples.
     """
     values = np.unique(np.round(theta, 12))
-    if values.size < 3 or values.size > 0.7 * theta.size:  # noqa: PLR2004
+    if values.size < 3 or values.size > 0.7 * theta.size:
         return 0.0
     apart = np.diff(values)
     # Written digits round multiples of a step: neighbours differ by it, give or take a digit.
@@ -90,7 +90,7 @@ def step_of(theta: Floats) -> float:
     near = apart[(apart >= 0.5 * least) & (apart < 1.5 * least)]
     step = float(np.median(near)) if near.size else least
     multiples = np.round(apart / step)
-    small = multiples < 50  # noqa: PLR2004 (their sum is known to a step)
+    small = multiples < 50
     if step <= 0 or not np.any(multiples[small] > 0):
         return 0.0
     step = float(np.sum(apart[small]) / max(np.sum(multiples[small]), 1.0))
@@ -150,7 +150,7 @@ def _degree(time: Floats, theta: Floats) -> tuple[int, int]:
 
 def _scale(size: Floats) -> Floats:
     """Return the standard deviation around each residual, robust, never under the record's."""
-    from scipy.ndimage import median_filter  # noqa: PLC0415 (heavy)
+    from scipy.ndimage import median_filter
 
     near: Floats = 1.4826 * median_filter(size, size=min(NEARBY, size.size), mode="nearest")
     floor = broad_scale(size)
@@ -158,7 +158,7 @@ def _scale(size: Floats) -> Floats:
 
 
 def _highest(size: Floats, reach: int) -> Floats:
-    from scipy.ndimage import maximum_filter1d  # noqa: PLC0415 (heavy)
+    from scipy.ndimage import maximum_filter1d
 
     highest: Floats = maximum_filter1d(size, 2 * reach + 1, mode="nearest")
     return highest
@@ -193,7 +193,7 @@ def _frozen(work: Work) -> None:
     low, high = equal_runs(work.theta, SAME)
     marked = np.zeros(work.theta.size, bool)
     for a, b in zip(low, high, strict=True):
-        if a < 3 or b > work.theta.size - 3 or not work.trusted[a]:  # noqa: PLR2004
+        if a < 3 or b > work.theta.size - 3 or not work.trusted[a]:
             continue
         jump = abs(work.theta[b] - work.theta[b - 1])
         before = abs(work.theta[a] - work.theta[a - 1])
@@ -222,5 +222,5 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
     if not slopes:
         return False
     half = (work.time[high - 1] - work.time[low]) / 2
-    noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0  # noqa: PLR2004
+    noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
     return bool(min(slopes) * half / 2 > 2 * work.count + 3 * min(noise, 0.01))

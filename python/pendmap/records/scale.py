@@ -88,7 +88,7 @@ def periods_of(work: Work, middle: float) -> Periods | None:
     time, theta = work.time[good], work.theta[good] - middle
     if time.size < 4 * FEWEST:
         return None
-    noise = float(np.median(np.abs(np.diff(theta, 2)))) if theta.size > 2 else 0.0  # noqa: PLR2004
+    noise = float(np.median(np.abs(np.diff(theta, 2)))) if theta.size > 2 else 0.0
     reach = float(np.quantile(np.abs(theta), 0.98))
     least = max(2.5 * work.count, min(4 * noise, 0.3 * reach), 0.02 * reach)
     half = swings(time, theta, least=least)
@@ -98,7 +98,7 @@ def periods_of(work: Work, middle: float) -> Periods | None:
     # The mean of neighbours takes out a middle that is a little off, for odd and even half cycles.
     amplitude = (size[:-2] + 2 * size[1:-1] + size[2:]) / 4
     period = half.period
-    steady = np.abs(period / np.median(period) - 1) < 0.6  # noqa: PLR2004 (K(A) up to 2.8 rad)
+    steady = np.abs(period / np.median(period) - 1) < 0.6
     inside = steady & (amplitude > 4 * least)
     if np.count_nonzero(inside) >= FEWEST:
         steady = inside
@@ -152,16 +152,16 @@ def _rescale(work: Work, factor: float) -> None:
 def _curvature(work: Work, found: Periods, largest: float) -> None:
     """Say so where the period does not grow with the swing as a pendulum's does."""
     grown = _growth(found.amplitude)
-    if largest > 3.0 or np.ptp(grown) < 2e-3 or found.period.size < 2 * FEWEST:  # noqa: PLR2004
+    if largest > 3.0 or np.ptp(grown) < 2e-3 or found.period.size < 2 * FEWEST:
         return
     columns = np.column_stack([np.ones(grown.size), grown - 1])
     answer, spread = _robust_line(columns, found.period)
     share = float(answer[1] / answer[0])
     error = float(spread[1] / answer[0])
     # 1 for radians; readings that are k times the angle show about 1/k^2.
-    if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:  # noqa: PLR2004 (other forces bend it too)
+    if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
         factor = math.sqrt(share) if share > 0 else 0.0
-        degrees = " (degrees?)" if share < 0.1 else ""  # noqa: PLR2004
+        degrees = " (degrees?)" if share < 0.1 else ""
         text = (
             f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
             f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is about"
@@ -188,7 +188,7 @@ def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
         scale = max(1.4826 * float(np.median(away)), 1e-12)
         weights = np.minimum(1.0, 1.345 * scale / np.maximum(away, 1e-12))
     inverse = np.linalg.pinv((columns * weights[:, None]).T @ columns)
-    return answer, scale * np.sqrt(np.diag(inverse))
+    return np.asarray(answer, float), scale * np.sqrt(np.diag(inverse))
 
 
 def _known(work: Work, found: Periods) -> None:

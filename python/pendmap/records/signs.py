@@ -1,4 +1,4 @@
-"""Signs and scales that two channels show of each other: gyroscope and angle, pivot and response."""
+"""Signs and scales that two channels show of each other: gyroscope and angle, pivot and motion."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _velocity(work: Work) -> None:
     which = work.trusted[fit.middle]
     slope, seen = fit.slope[which], velocity[fit.middle][which]
     scale = float(np.max(np.abs(seen), initial=0.0))
-    if slope.size < 10 or scale == 0 or float(np.std(slope)) == 0 or float(np.std(seen)) == 0:  # noqa: PLR2004
+    if slope.size < 10 or scale == 0 or float(np.std(slope)) == 0 or float(np.std(seen)) == 0:
         return
     seen = seen / scale  # squares of huge numbers overflow
     alike = float(np.corrcoef(slope, seen)[0, 1])
@@ -86,11 +86,11 @@ def _drive(work: Work) -> None:
     th'' = -w0^2 sin th - (a_vertical / l) sin th + (-a_lateral / l) cos th, so that both have
     a negative coefficient where upward and toward positive theta are positive.
     """
-    from scipy.signal import savgol_filter  # noqa: PLC0415 (heavy)
+    from scipy.signal import savgol_filter
 
     interval = float(np.median(np.diff(work.time)))
     count = math.floor((work.time[-1] - work.time[0]) / interval) + 1
-    if count < 100 or count > 10 * work.time.size or not work.trusted.any():  # noqa: PLR2004
+    if count < 100 or count > 10 * work.time.size or not work.trusted.any():
         return
     even = work.time[0] + interval * np.arange(count)
     good = work.trusted
@@ -140,7 +140,7 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
         good = np.isfinite(values)
         if np.count_nonzero(good) < even.size // 2 or np.std(values[good]) == 0:
             continue
-        if np.max(np.abs(values[good])) < 1e6:  # noqa: PLR2004 (m/s2; squares do not overflow)
+        if np.max(np.abs(values[good])) < 1e6:
             motion = np.interp(even, work.time[good], values[good])
             found[way] = smooth(motion, order) if order else motion
     return found

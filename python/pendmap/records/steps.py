@@ -101,10 +101,10 @@ def _jumps(time: Floats, theta: Floats, count: float) -> list[tuple[int, float, 
     place = np.arange(size.size) + SIDE
     usual = float(np.median(np.diff(time)))
     worst = np.max(np.lib.stride_tricks.sliding_window_view(np.diff(time), 2 * SIDE - 1), axis=1)
-    even = worst < 1.3 * usual  # noqa: PLR2004 (a gap is no place for this filter)
+    even = worst < 1.3 * usual
     scale = max(normal_scale(size[even]), 1e-9) if even.any() else math.inf
     limit = CLEAR * scale + 2 * count
-    found = []
+    found: list[tuple[int, float, float]] = []
     left = np.where(even, np.abs(size), 0.0)
     while left.size and len(found) <= MOST:
         k = int(np.argmax(left))
@@ -125,6 +125,9 @@ def _stays(theta: Floats, at: int, size: float, scale: float) -> bool:
     x = np.arange(SIDE) + 0.5
     right = np.polyfit(x, after, 3)
     left = np.polyfit(-x[::-1], before, 3)
-    rough = max(np.std(after - np.polyval(right, x)), np.std(before - np.polyval(left, -x[::-1])))
-    jump = np.polyval(right, 0.0) - np.polyval(left, 0.0)
+    rough = max(
+        float(np.std(after - np.polyval(right, x))),
+        float(np.std(before - np.polyval(left, -x[::-1]))),
+    )
+    jump = float(np.polyval(right, 0.0) - np.polyval(left, 0.0))
     return bool(abs(jump) > max(6 * rough, abs(size) / 2) and abs(jump - size) < abs(size) + scale)

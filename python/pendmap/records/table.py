@@ -70,7 +70,7 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
 
 
 def _parquet(data: bytes, where: str) -> Table:
-    import pandas as pd  # noqa: PLC0415 (heavy)
+    import pandas as pd
 
     try:
         frame = pd.read_parquet(io.BytesIO(data))
@@ -92,6 +92,6 @@ def _parquet(data: bytes, where: str) -> Table:
             columns.append(pd.to_numeric(column, errors="coerce").to_numpy(dtype=float))
     values = np.column_stack(columns)
     values[~np.isfinite(values)] = np.nan
-    if values.shape[1] < 2:  # noqa: PLR2004 (a time and an angle)
+    if values.shape[1] < 2:
         raise InputError(f"{where}: has one column: allowed are a time and an angle")
     return Table(tuple(map(str, frame.columns)), values, np.arange(1, values.shape[0] + 1))

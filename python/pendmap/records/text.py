@@ -80,13 +80,13 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
     InputError
         If it is no text.
     """
-    findings = []
+    findings: list[Finding] = []
     if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
         raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return data.decode("utf-16", errors="replace"), findings
     nuls = data.count(b"\0")
-    if nuls > MOST_NULS * len(data) and data[1::2].count(b"\0") > 0.9 * nuls:  # noqa: PLR2004
+    if nuls > MOST_NULS * len(data) and data[1::2].count(b"\0") > 0.9 * nuls:
         return data.decode("utf-16-le", errors="replace"), findings
     if nuls > MOST_NULS * len(data):
         raise InputError(f"{where}: is no text: allowed are CSV (or other text) and Parquet")
@@ -111,7 +111,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     InputError
         If there are no rows of two numbers or more.
     """
-    import pandas as pd  # noqa: PLC0415 (heavy; Parquet and CSV alone need it)
+    import pandas as pd
 
     whole = text.endswith(("\n", "\r"))
     lines = [(k, line) for k, line in enumerate(re.split(r"\r\n|\n|\r", text), 1) if line.strip()]
@@ -133,7 +133,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
         )
     dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
     if dropped and not (findings and len(dropped) == 1):
-        shown = ", ".join(map(str, dropped[:3])) + (", ..." if len(dropped) > 3 else "")  # noqa: PLR2004
+        shown = ", ".join(map(str, dropped[:3])) + (", ..." if len(dropped) > 3 else "")
         said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
         findings.append(Finding("unreadable-lines", said, True, f"line {shown}"))  # noqa: FBT003
     rows = [k for (k, _), fit in zip(lines, fits, strict=True) if fit]
@@ -156,7 +156,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
 
 
 def _numbers(column: object, decimal: str) -> NDArray[np.float64]:
-    import pandas as pd  # noqa: PLC0415
+    import pandas as pd
 
     texts = pd.Series(column).astype(str).str.strip()
     if decimal != ".":
@@ -262,6 +262,6 @@ def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ..
 
 
 def _unit(text: str) -> bool:
-    from pendmap.records.units import CHANNELS  # noqa: PLC0415 (small; keeps the top plain)
+    from pendmap.records.units import CHANNELS
 
     return len(text) > 0 and any(channel.has(text) for channel in CHANNELS.values())

@@ -104,27 +104,72 @@ _ACCELERATIONS: Final = {
 }
 _LENGTHS: Final = {
     **dict.fromkeys(("px", "pixel", "pixels"), 1.0),
-    **{"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
 }
 
 CHANNELS: Final = {
     "time": Channel(
-        "s", _TIMES, "t_s", ("t", "time", "zeit", "temps", "tiempo", "tempo", "time ?stamp",
-                             "elapsed( time)?", "clock", "seconds_elapsed")
+        "s",
+        _TIMES,
+        "t_s",
+        (
+            "t",
+            "time",
+            "zeit",
+            "temps",
+            "tiempo",
+            "tempo",
+            "time ?stamp",
+            "elapsed( time)?",
+            "clock",
+            "seconds_elapsed",
+        ),
     ),
     "angle": Channel(
-        "rad", _ANGLES, "theta_rad", ("theta", "θ", "th", "angle", "winkel", "alpha", "phi", "φ",
-                                      "encoder", "ang(le)? ?pos(ition)?", "angular position",
-                                      "volts?", "voltage", "counts?", "adc")
+        "rad",
+        _ANGLES,
+        "theta_rad",
+        (
+            "theta",
+            "θ",
+            "th",
+            "angle",
+            "winkel",
+            "alpha",
+            "phi",
+            "φ",
+            "encoder",
+            "ang(le)? ?pos(ition)?",
+            "angular position",
+            "volts?",
+            "voltage",
+            "counts?",
+            "adc",
+        ),
     ),
     "velocity": Channel(
-        "rad/s", _SPEEDS, "velocity_rad_s", ("omega", "ω", "(angular )?velocity", "theta ?dot",
-                                             "dtheta", "gyro(scope)?( ?[xyz])?", "rot(ation)? ?rate"
-                                             "( ?[xyz])?", "w[xyz]?", "omega filtered")
+        "rad/s",
+        _SPEEDS,
+        "velocity_rad_s",
+        (
+            "omega",
+            "ω",
+            "(angular )?velocity",
+            "theta ?dot",
+            "dtheta",
+            "gyro(scope)?( ?[xyz])?",
+            "rot(ation)? ?rate( ?[xyz])?",
+            "w[xyz]?",
+            "omega filtered",
+        ),
     ),
     "acceleration": Channel(
-        "m/s2", _ACCELERATIONS, "acceleration_m_s2", ("(linear )?acc(el|eleration)?( ?[xyz])?",
-                                                      "a[xyz]?")
+        "m/s2",
+        _ACCELERATIONS,
+        "acceleration_m_s2",
+        ("(linear )?acc(el|eleration)?( ?[xyz])?", "a[xyz]?"),
     ),
     "pixel_x": Channel("px", _LENGTHS, "pixel_x", ("x", "pixel ?x", "x ?pixel", "px x", "pos ?x")),
     "pixel_y": Channel("px", _LENGTHS, "pixel_y", ("y", "pixel ?y", "y ?pixel", "px y", "pos ?y")),

@@ -92,7 +92,7 @@ class Work:
         where = ""
         if at is not None and at.size:
             shown = ", ".join(str(int(self.rows[k])) for k in at[:3])
-            where = f"{'rows' if at.size > 1 else 'row'} {shown}{', ...' if at.size > 3 else ''}"  # noqa: PLR2004
+            where = f"{'rows' if at.size > 1 else 'row'} {shown}{', ...' if at.size > 3 else ''}"
             span = span or (float(self.time[at[0]]), float(self.time[at[-1]]))
         if span is not None and not all(map(math.isfinite, span)):
             span = None

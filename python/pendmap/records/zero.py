@@ -28,7 +28,7 @@ def middle_of(time: Floats, theta: Floats) -> float | None:
     """Return what a free swing ends around, rad: its last quarter's, of whole half cycles."""
     start = time[0] + 0.75 * (time[-1] - time[0])
     late = theta[time >= start]
-    if late.size < 20:  # noqa: PLR2004
+    if late.size < 20:
         return None
     middle = (float(np.quantile(late, 0.02)) + float(np.quantile(late, 0.98))) / 2
     swing = float(np.quantile(late, 0.98) - np.quantile(late, 0.02)) / 2
