@@ -86,6 +86,18 @@ def said(make: Callable[[str], str | bytes], *keys: str, suffix: str = ".csv") -
     return Damage(make, keys, suffix=suffix)
 
 
+def _again(a: Floats) -> tuple[Floats, Floats]:
+    """A hand takes the pendulum, carries it back in 1 s, holds it 0.3 s, and lets it go."""
+    carried = a[-1] + (a[0] - a[-1]) * (1 - np.cos(np.pi * np.arange(100) / 100)) / 2
+    theta = np.r_[a, carried, np.full(30, a[0]), a[:600]]
+    return np.arange(theta.size) / 100, theta
+
+
+def _lossy(t: Floats, a: Floats, share: float) -> tuple[Floats, Floats]:
+    kept = np.random.default_rng(3).random(t.size) > share
+    return t[kept], a[kept]
+
+
 def _swapped(t: Floats) -> Floats:
     t[[300, 301]] = t[[301, 300]]
     return t
@@ -166,7 +178,7 @@ TEXTS = {
         suffix=".parquet",
     ),
     "parquet with words": bad(
-        parquet(lambda f: f.assign(theta_rad="x")), "no", ".parquet"
+        parquet(lambda f: f.assign(theta_rad="x")), "0 samples", ".parquet"
     ),
     "parquet without rows": bad(parquet(lambda f: f.iloc[:0]), "is empty", ".parquet"),
     "parquet cut": bad(lambda s: parquet(lambda f: f)(s)[:900], "Parquet", ".parquet"),
@@ -174,12 +186,13 @@ TEXTS = {
 }  # fmt: skip
 
 TIMES = {
-    "times not there": bad(arrays(lambda t, a: (t * np.nan, a)), "row with a time"),
+    "times not there": bad(arrays(lambda t, a: (t * np.nan, a)), "no rows of numbers"),
     "times all equal": bad(arrays(lambda t, a: (t * 0, a)), "do not increase"),
     "some times missing": said(arrays(lambda t, a: (at(t, slice(50, 60), np.nan), a)), "time-missing"),
     "times backwards": said(arrays(lambda t, a: (t[::-1], a[::-1])), "time-backwards"),
     "two rows exchanged": said(arrays(lambda t, a: (_swapped(t), a)), "time-backwards"),
-    "rows shuffled": said(arrays(lambda t, a: (RNG.permutation(t), a)), "time-backwards"),
+    "rows shuffled": bad(arrays(lambda t, a: (RNG.permutation(t), a)), "out of order"),
+    "rows in another order": said(arrays(lambda t, a: tuple(RNG.permutation(np.c_[t, a]).T)), "time-backwards"),
     "one false stamp": said(arrays(lambda t, a: (at(t, 400, 1e9), a)), "time-backwards"),
     "one stamp of zero": said(arrays(lambda t, a: (at(t, 400, 0.0), a)), "time-backwards"),
     "a repeated row": said(every("0.500000,0.1", 2000)),
@@ -187,8 +200,8 @@ TIMES = {
     "a coarse clock": said(arrays(lambda t, a: (np.floor(t / 0.03) * 0.03, a)), "time-coarse"),
     "jitter": said(arrays(lambda t, a: (t + RNG.normal(0, 1e-3, t.size), a)), "time-jitter"),
     "a gap": said(arrays(lambda t, a: (np.delete(t, slice(300, 350)), np.delete(a, slice(300, 350)))), "time-gap"),
-    "many gaps": said(arrays(lambda t, a: (t[RNG.random(t.size) > 0.1], a[: np.sum(t >= 0)][:1].repeat(0))[:1] * 2 if False else tuple(np.stack([t, a])[:, np.random.default_rng(3).random(t.size) > 0.05])), "time-gap"),
-    "uneven": said(arrays(lambda t, a: tuple(np.stack([t, a])[:, np.random.default_rng(3).random(t.size) > 0.4])), "time-uneven"),
+    "many gaps": said(arrays(lambda t, a: _lossy(t, a, 0.05)), "time-gap"),
+    "uneven": said(arrays(lambda t, a: _lossy(t, a, 0.4)), "time-uneven"),
     "milliseconds": said(arrays(lambda t, a: (t * 1e3, a)), "time-unit"),
     "microseconds": said(arrays(lambda t, a: (t * 1e6, a)), "time-unit"),
     "a clock that starts again": said(arrays(lambda t, a: (np.where(t < 4, t, t - 4), a)), "time-restarts"),
@@ -200,7 +213,7 @@ TIMES = {
 }  # fmt: skip
 
 ANGLES = {
-    "no angles": bad(arrays(lambda t, a: (t, a * np.nan)), "samples"),
+    "no angles": bad(arrays(lambda t, a: (t, a * np.nan)), "no rows of numbers"),
     "an angle that never changes": bad(arrays(lambda t, a: (t, a * 0 + 0.3)), "never changes"),
     "noise alone": said(arrays(lambda t, a: (t, RNG.normal(0, 1e-3, t.size))), "no-motion"),
     "huge": bad(arrays(lambda t, a: (t, a * 1e200)), "samples"),
@@ -223,7 +236,8 @@ ANGLES = {
     "frozen": said(arrays(lambda t, a: (t, at(a, slice(425, 440), a[425]))), "frozen"),
     "coarse counts": said(arrays(lambda t, a: (t, np.round(a / 0.049) * 0.049)), "counts-seen"),
     "held at the start": said(arrays(lambda t, a: (np.arange(t.size + 200) / 100, np.r_[np.full(200, a[0]), a])), "held-start"),
-    "two releases": said(arrays(lambda t, a: (np.arange(2 * t.size) / 100, np.r_[a, a])), "several-releases"),
+    "two files in one": said(arrays(lambda t, a: (np.arange(2 * t.size) / 100, np.r_[a, a])), "missed-counts"),
+    "taken and let go again": said(arrays(lambda t, a: _again(a)), "several-releases"),
     "scaled": said(arrays(lambda t, a: (t, 1.8 * a)), "angle-scale"),
 }  # fmt: skip
 

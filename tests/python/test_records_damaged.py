@@ -90,7 +90,7 @@ def test_a_clean_record_has_nothing_odd(tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
     path.write_text(sound(), encoding="utf-8")
     (run,) = pendmap.read_experiment(path).runs
-    assert {finding.what for finding in run.findings} == {"counts-seen"}
+    assert {finding.what for finding in run.findings} <= {"counts-seen"}
     assert run.trusted.all()
 
 

@@ -30,6 +30,9 @@ JITTER: Final = 0.02
 """Spread of the intervals over their median that is worth saying: at 2 % of 10 ms a pendulum of
 6 rad/s is 0.03 degrees elsewhere at the bottom of a swing of half a radian."""
 
+MOST_OUT: Final = 0.3
+"""Share of the stamps out of order beyond which what is left is no record."""
+
 COARSE: Final = 0.2
 """Share of repeated stamps from which the clock is coarser than the sampling."""
 
@@ -150,12 +153,38 @@ def _ordered(work: Work) -> None:
             " first of each kept"
         )
         work.say("time-duplicate", text, mended=True, at=repeated)
+        work.keep(np.delete(np.arange(work.time.size), repeated))
     kept = _longest_rising(work.time)
-    out = np.setdiff1d(np.arange(work.time.size), np.union1d(kept, repeated))
-    if out.size:
-        text = f"{counted(out.size, 'time stamp')} out of order, left out"
+    out = np.setdiff1d(np.arange(work.time.size), kept)
+    if not out.size:
+        return
+    order = np.argsort(work.time, kind="stable")
+    if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
+        text = f"{counted(out.size, 'row')} out of order in time: put where the times say"
         work.say("time-backwards", text, mended=True, at=out)
+        work.keep(order)
+        work.keep(np.concatenate([[True], np.diff(work.time) > 0]))
+        return
+    if out.size > MOST_OUT * work.time.size:
+        raise InputError(
+            f"{work.where}: {out.size} of {work.time.size} times are out of order, and in order the"
+            " angles make no motion: allowed are times in order"
+        )
+    text = f"{counted(out.size, 'time stamp')} out of order, left out"
+    work.say("time-backwards", text, mended=True, at=out)
     work.keep(kept)
+
+
+def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
+    """Whether samples that were moved fit between their new neighbours as all others do."""
+    if theta.size < 5 or not np.all(np.isfinite(theta)):
+        return False
+    bend = np.abs(np.diff(theta, 2))
+    usual = float(np.quantile(bend, 0.9)) if at.size < theta.size / 4 else 0.0
+    if not usual:  # most were moved: a motion has bends that are small against its way
+        return bool(np.median(bend) < 0.1 * np.ptp(theta))
+    moved = bend[np.clip(at - 1, 0, bend.size - 1)]
+    return bool(np.all(moved <= 3 * usual))
 
 
 def _longest_rising(time: Floats) -> NDArray[np.intp]:

@@ -29,6 +29,9 @@ STILL: Final = 8.0
 """Standard deviations of noise within which a whole period must stay to be no motion: white
 noise spans 5 or 6 in a hundred samples."""
 
+SMALL: Final = 0.1
+"""Radians within which readings that are no smoother than noise are no motion."""
+
 RISE: Final = 0.1
 """Share of the largest swing by which a free swing grows only if somebody helps."""
 
@@ -42,18 +45,41 @@ CERTAIN: Final = 4.0
 """Standard errors that an offset must have to be said."""
 
 
-def check(work: Work) -> None:
-    """Divide a free record into stretches and trust the longest swing alone; say the offset."""
+def moves(work: Work) -> bool:
+    """Whether anything moves; if not, that is said.
+
+    Raises
+    ------
+    InputError
+        If all readings are the same.
+    """
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
-    noise = _noise(work)
-    limit = max(STILL * noise, 2.5 * work.count)
+    if np.ptp(work.theta) == 0:
+        raise InputError(f"{work.where}: the angle never changes: allowed is a motion")
+    noise, limit = _limits(work)
     good = work.theta[work.trusted]
-    if good.size < 4 or np.ptp(good) <= limit:
-        if np.ptp(work.theta) == 0:
-            raise InputError(f"{work.where}: the angle never changes: allowed is a motion")
-        work.say("no-motion", f"nothing moves: all angles within {np.ptp(good):.3g} rad")
-        return
+    still = good.size < 4 or (noise > 0.7 * float(np.std(good)) and np.ptp(good) < SMALL)
+    if not still and np.ptp(good) > limit:
+        return True
+    spread = float(np.ptp(good)) if good.size else 0.0
+    work.say("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
+    work.segments = [Segment("rest", low, high, used=False)]
+    return False
+
+
+def _limits(work: Work) -> tuple[float, float]:
+    """Return the noise, and the span within which nothing moves."""
+    noise = _noise(work)
+    # Where the sampling is slow the residuals are motion: they must not hide it.
+    reach = 0.4 * float(np.ptp(work.theta))
+    return noise, min(reach, max(STILL * noise, 2.5 * work.count))
+
+
+def check(work: Work) -> None:
+    """Divide a free record into stretches and trust the longest swing alone; say the offset."""
+    noise, limit = _limits(work)
+    good = work.theta[work.trusted]
     if work.plan.kind != "free":
         return
     middle = middle_of(work.time[work.trusted], good)
@@ -63,21 +89,23 @@ def check(work: Work) -> None:
     if period is None:
         work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
         return
-    stretches = _still(work, period, limit)
-    parts = _moving(work, stretches)
+    ends = np.flatnonzero(work.trusted)
+    span = (int(ends[0]), int(ends[-1]) + 1)
+    stretches = _still(work, period, limit, span)
+    parts = _moving(span, stretches)
     parts = [piece for part in parts for piece in _releases(work, part, middle, limit)]
     if not parts:
         return
     held = _held_short(work, parts[0], period, noise)
     if held is not None:
         parts[0] = (held, parts[0][1])
-    _settle(work, parts, middle)
+    _settle(work, parts, middle, span)
     _offset(work, parts, limit)
 
 
 def _noise(work: Work) -> float:
     fit = local_fit(work.time, work.theta)
-    return min(normal_scale(fit.residual), 0.05 * float(np.ptp(work.theta)))
+    return normal_scale(fit.residual)
 
 
 def _known_period(work: Work) -> float | None:
@@ -87,14 +115,16 @@ def _known_period(work: Work) -> float | None:
     return 2 * math.pi / w0 if w0 else None
 
 
-def _still(work: Work, period: float, limit: float) -> list[tuple[int, int]]:
-    """Return stretches, of a period and more, in which nothing moves."""
+def _still(
+    work: Work, period: float, limit: float, span: tuple[int, int]
+) -> list[tuple[int, int]]:
+    """Return stretches within ``span``, of a period and more, in which nothing moves."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    theta = work.theta.copy()
-    bad = ~work.trusted
+    theta, time = work.theta[slice(*span)].copy(), work.time[slice(*span)]
+    bad = ~work.trusted[slice(*span)]
     if bad.any():
-        theta[bad] = np.interp(work.time[bad], work.time[~bad], theta[~bad])
+        theta[bad] = np.interp(time[bad], time[~bad], theta[~bad])
     width = max(round(period / float(np.median(np.diff(work.time)))), 5) | 1
     if width >= theta.size:
         return []
@@ -105,13 +135,13 @@ def _still(work: Work, period: float, limit: float) -> list[tuple[int, int]]:
     still[:half], still[-half:] = still[half], still[-half - 1]
     low, high = true_runs(still)
     return [
-        (max(int(a) - (half if a > 0 else 0), 0), min(int(b) + half, theta.size))
+        (span[0] + max(int(a) - half, 0), span[0] + min(int(b) + half, theta.size))
         for a, b in zip(low, high, strict=True)
     ]
 
 
-def _moving(work: Work, still: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    edges = [0, *(place for stretch in still for place in stretch), work.time.size]
+def _moving(span: tuple[int, int], still: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    edges = [span[0], *(place for stretch in still for place in stretch), span[1]]
     pairs = zip(edges[::2], edges[1::2], strict=True)
     return [(a, b) for a, b in pairs if b - a > 5]
 
@@ -170,20 +200,26 @@ def _held_short(work: Work, part: tuple[int, int], period: float, noise: float) 
     return low + max(int(np.searchsorted(time, time[left[0]] - usual)), 0)
 
 
-def _settle(work: Work, parts: list[tuple[int, int]], middle: float) -> None:
+def _settle(
+    work: Work, parts: list[tuple[int, int]], middle: float, span: tuple[int, int]
+) -> None:
     """Name the stretches, trust the longest swing, and say so."""
     longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
     trusted = np.zeros(work.time.size, bool)
     trusted[parts[longest][0] : parts[longest][1]] = True
     segments = []
-    at = 0
+    if span[0] > 0:
+        segments.append(_segment(work, "motion", 0, span[0], used=False))
+    at = span[0]
     for k, (low, high) in enumerate(parts):
         if low > at:
             segments.append(_between(work, at, low, middle, first=k == 0))
         segments.append(_segment(work, "motion", low, high, used=k == longest))
         at = high
-    if at < work.time.size:
-        segments.append(_between(work, at, work.time.size, middle, first=False))
+    if at < span[1]:
+        segments.append(_between(work, at, span[1], middle, first=False))
+    if span[1] < work.time.size:
+        segments.append(_segment(work, "motion", span[1], work.time.size, used=False))
     work.segments = segments
     work.trusted &= trusted
     if len(parts) > 1:
@@ -237,7 +273,8 @@ def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
         error = 1.6 * normal_scale(middles - value) / math.sqrt(middles.size)
         error = max(error, work.count / math.sqrt(12 * middles.size))
         said = f"it swings about {value:+.3g} +- {error:.1g} rad: an offset of the zero"
-    if abs(_folded(value)) > max(CERTAIN * error, 1e-5):
+    known = any(finding.what == "zero-offset" for finding in work.findings)
+    if abs(_folded(value)) > max(CERTAIN * error, 1e-5) and not known:
         work.say("zero-offset", f"{said}; left to the fit")
 
 

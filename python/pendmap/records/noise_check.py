@@ -1,4 +1,4 @@
-"""What the noise itself tells: a clock that is not what its stamps say, noise with a memory."""
+"""What the noise itself tells: a clock that is not what its stamps say."""
 
 from __future__ import annotations
 
@@ -17,13 +17,9 @@ __all__ = ["check"]
 GROWS: Final = 2.0
 """Times that the noise of the fastest quarter is that of the slowest before it is said."""
 
-SMOOTH: Final = 1.15
-"""Reading of the quartic over that of the next degree that speaks of noise with a memory: white
-noise has 1.00 +- 0.02."""
-
 
 def check(work: Work) -> None:
-    """Say so where noise grows with speed, or is alike from sample to sample."""
+    """Say so where noise grows with speed."""
     floor = noise_of(work.time, work.theta, trusted=work.trusted, count=work.count)
     if not math.isfinite(floor.sigma) or floor.limited_by_count or not floor.by_speed:
         return

@@ -100,10 +100,11 @@ def _run(
     angle.make(work)
     if not work.peaks_only:
         samples.check(work)
-        scale.check(work)
-        motion.check(work)
-        signs.check(work)
-        noise_check.check(work)
+        if motion.moves(work):
+            scale.check(work)
+            motion.check(work)
+            signs.check(work)
+            noise_check.check(work)
     work.refuse_short()
     return Run(
         name=name,

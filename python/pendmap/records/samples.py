@@ -1,4 +1,4 @@
-"""Samples that lie: outliers, readings that clip or freeze; the step they come in."""
+"""Samples that lie: readings that clip or freeze; the step they come in."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.local_fit import POINTS, local_fit
-from pendmap.records.noise import DEGREES, broad_scale, normal_scale
+from pendmap.records import false_samples
 from pendmap.records.runs_of import equal_runs
-from pendmap.records.steps import find_steps
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -21,19 +19,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 __all__ = ["check", "step_of"]
-
-SPIKE: Final = 10.0
-"""Local standard deviations of a residual that make an outlier. White noise reaches 6 once in
-5e8 samples; the rest is for noise with long tails, as real encoders have."""
-
-NEARBY: Final = 151
-"""Samples around each that its scale comes from: more than a false stretch, less than a decay."""
-
-PASSES: Final = 12
-"""Times that outliers are looked for; each finds one of those that stand close together."""
-
-MOST_SPIKES: Final = 0.1
-"""Share of samples beyond which they are no outliers, but what the sensor does."""
 
 SAME: Final = 5
 """Equal readings in a row that may be a clipped or frozen sensor."""
@@ -50,8 +35,7 @@ def check(work: Work) -> None:
     work.count = _count(work)
     _clipped(work)
     _frozen(work)
-    _spikes(work)
-    find_steps(work)
+    false_samples.find(work)
 
 
 def _count(work: Work) -> float:
@@ -100,68 +84,6 @@ def step_of(theta: Floats) -> float:
     away = away - phase
     away -= np.round(away)
     return step if float(np.sqrt(np.mean(away**2))) < LATTICE else 0.0
-
-
-def _spikes(work: Work) -> None:
-    """Mark single samples, and few together, that their neighbours contradict."""
-    theta = work.theta.copy()
-    false = ~work.trusted
-    if false.any() and not false.all():
-        theta[false] = np.interp(work.time[false], work.time[~false], theta[~false])
-    found = np.zeros(theta.size, bool)
-    degree, points = _degree(work.time, theta)
-    for _ in range(PASSES):
-        fit = local_fit(work.time, theta, degree=degree, points=points)
-        size = np.abs(fit.residual)
-        if size.size < 2 * POINTS:
-            return
-        limit = SPIKE * _scale(size) + 2 * work.count
-        # What is false shows in every window that it is part of, most in its own.
-        highest = _highest(size, fit.neighbours)
-        at = fit.middle[(size > limit) & (size >= highest)]
-        at = at[~found[at]]
-        if not at.size:
-            break
-        found[at] = True
-        theta[found] = np.interp(work.time[found], work.time[~found], theta[~found])
-        if np.mean(found) > MOST_SPIKES:
-            text = f"more than {100 * MOST_SPIKES:.0f} % of the samples contradict their neighbours"
-            work.say("not-smooth", text)
-            return
-    found &= np.abs(work.theta - theta) > 2 * work.count
-    at = np.flatnonzero(found & work.trusted)
-    # A step of the reading looks like an outlier on either side: that is for the steps to find.
-    if at.size:
-        worst = float(np.max(np.abs(work.theta - theta)[at]))
-        work.trusted[at] = False
-        text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} rad: not for fitting"
-        work.say("outliers", text, at=at)
-
-
-def _degree(time: Floats, theta: Floats) -> tuple[int, int]:
-    """Return the polynomial that leaves least: higher ones where the sampling is slow."""
-    best, least = DEGREES[0], math.inf
-    for degree, points in DEGREES[:3]:
-        scale = normal_scale(local_fit(time, theta, degree=degree, points=points).residual)
-        if scale < 0.7 * least:
-            best, least = (degree, points), scale
-    return best
-
-
-def _scale(size: Floats) -> Floats:
-    """Return the standard deviation around each residual, robust, never under the record's."""
-    from scipy.ndimage import median_filter
-
-    near: Floats = 1.4826 * median_filter(size, size=min(NEARBY, size.size), mode="nearest")
-    floor = broad_scale(size)
-    return np.maximum(near, max(floor, 1e-9))
-
-
-def _highest(size: Floats, reach: int) -> Floats:
-    from scipy.ndimage import maximum_filter1d
-
-    highest: Floats = maximum_filter1d(size, 2 * reach + 1, mode="nearest")
-    return highest
 
 
 def _clipped(work: Work) -> None:
@@ -215,10 +137,11 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
     """
     before = slice(max(low - 4, 0), low)
     after = slice(high, high + 4)
-    slopes = []
-    for part in (before, after):
-        if work.theta[part].size > 1 and np.ptp(work.time[part]) > 0:
-            slopes.append(abs(np.ptp(work.theta[part]) / np.ptp(work.time[part])))
+    slopes = [
+        float(np.ptp(work.theta[part]) / np.ptp(work.time[part]))
+        for part in (before, after)
+        if work.theta[part].size > 1
+    ]
     if not slopes:
         return False
     half = (work.time[high - 1] - work.time[low]) / 2

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records.noise import normal_scale
 from pendmap.records.swings import swings
 from pendmap.records.zero import turn_to_rest
 
@@ -160,7 +161,7 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
     error = float(spread[1] / answer[0])
     # 1 for radians; readings that are k times the angle show about 1/k^2.
     if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
-        factor = math.sqrt(share) if share > 0 else 0.0
+        factor = _factor(found)
         degrees = " (degrees?)" if share < 0.1 else ""
         text = (
             f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
@@ -168,6 +169,18 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
             f" {factor:.2g} times the reading{degrees}, or another force acts"
         )
         work.say("angle-scale", text)
+
+
+def _factor(found: Periods) -> float:
+    """Return what the readings are to be multiplied by for the periods of a pendulum."""
+    best, least = 1.0, math.inf
+    for factor in np.geomspace(0.01, 3.0 / float(np.max(found.amplitude)), 300).tolist():
+        grown = _growth(factor * found.amplitude)
+        away = found.period / grown
+        spread = normal_scale(away - np.median(away)) / float(np.median(away))
+        if spread < least:
+            best, least = factor, spread
+    return best
 
 
 def _growth(amplitude: Floats) -> Floats:

@@ -52,10 +52,10 @@ def turn_to_rest(work: Work) -> None:
     quarters = round(off / (math.pi / 2))
     gauge = quarters * math.pi / 2
     if quarters and abs(off - gauge) < QUARTER:
-        work.theta -= gauge
+        work.theta -= turns + gauge
         text = f"the gauge is turned by {90 * quarters} degrees: it swings about {off:.4g} rad"
         work.say("gauge-turned", f"{text}, turned back", mended=True)
         return
-    work.theta -= off
+    work.theta -= turns + off
     text = f"it swings about {off:.4g} rad, the rest is elsewhere than the zero: taken off"
     work.say("zero-offset", text, mended=True)
