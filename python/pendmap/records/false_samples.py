@@ -55,6 +55,11 @@ WHOLE: Final = 0.25
 MOST: Final = 20
 """Jumps beyond which it is not counts that are missed."""
 
+TURN: Final = 2 * math.pi
+
+SLIP: Final = 0.1
+"""Radians by which a jump may miss whole turns and be one: the angle is the same either way."""
+
 APART: Final = 0.5
 """Radians of a jump from which two recordings may stand in one file."""
 
@@ -131,7 +136,7 @@ def _degree(time: Floats, theta: Floats) -> tuple[int, int]:
 
 def _judge(
     time: Floats, theta: Floats, k: int, sigma: float, count: float
-) -> tuple[slice, _Jump | None]:
+) -> tuple[slice | NDArray[np.intp], _Jump | None]:
     """Return which samples around ``k`` are false, and the jump there, if there is one."""
     low, high = max(k - SIDE, 0), min(k + SIDE + 1, theta.size)
     t, part = time[low:high] - time[k], theta[low:high] - theta[k]
@@ -151,7 +156,8 @@ def _judge(
         if low == 0 and first + 1 < 4:
             return slice(0, group.stop), None
         return slice(group.start, theta.size) if high == theta.size else group, None
-    x = np.concatenate([t[before], t[after]]) / max(abs(t[0]), abs(t[-1]))
+    width = max(abs(t[0]), abs(t[-1]))
+    x = np.concatenate([t[before], t[after]]) / width
     jumped = np.concatenate([np.zeros(first + 1), np.ones(part.size - last - 1)])
     columns = np.column_stack([np.vander(x, 4), jumped])
     values = np.concatenate([part[before], part[after]])
@@ -162,7 +168,10 @@ def _judge(
     size = float(answer[-1])
     if abs(size) > CLEAR * error:
         return group, _Jump(low + last + 1, size, error)
-    return group, None
+    # Between two outliers there may be samples that are sound.
+    inner = slice(first + 1, last + 1)
+    bridged = np.abs(part[inner] - np.vander(t[inner] / width, 4) @ answer[:-1])
+    return low + first + 1 + np.flatnonzero(bridged > 5 * error / gain + count), None
 
 
 def _smooth(x: Floats, y: Floats) -> Floats:
@@ -200,6 +209,14 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
     if len(jumps) > MOST:
         text = f"{counted(len(jumps), 'jump')} of the reading that stay: the zero wanders"
         work.say("missed-counts", text, at=places)
+        return
+    turns = [round(jump.size / TURN) for jump in jumps]
+    off = [abs(j.size - n * TURN) for j, n in zip(jumps, turns, strict=True)]
+    if all(turns) and max(off) < SLIP:
+        for at, number in zip(places, turns, strict=True):
+            work.theta[at:] -= number * TURN
+        text = f"{counted(len(jumps), 'jump')} of the reading by whole turns, taken back"
+        work.say("turns-slipped", text, mended=True, at=places)
         return
     whole = [_whole(jump, work.count) for jump in jumps]
     if all(whole):

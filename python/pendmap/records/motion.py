@@ -185,6 +185,8 @@ def _releases(
 def _held_short(work: Work, part: tuple[int, int], period: float, noise: float) -> int | None:
     """Return where a motion begins that was held for less than a period before."""
     low = part[0]
+    if not work.trusted[low : low + 5].all():
+        return None
     theta, time = work.theta[low : part[1]], work.time[low : part[1]]
     start = float(np.median(theta[:5]))
     seen = max(6 * noise, 1.5 * work.count, 1e-4)

@@ -153,7 +153,7 @@ def _rescale(work: Work, factor: float) -> None:
 def _curvature(work: Work, found: Periods, largest: float) -> None:
     """Say so where the period does not grow with the swing as a pendulum's does."""
     grown = _growth(found.amplitude)
-    if largest > 3.0 or np.ptp(grown) < 2e-3 or found.period.size < 2 * FEWEST:
+    if largest > 3.0 or np.ptp(grown) < 2e-3 or found.period.size < FEWEST + 2:
         return
     columns = np.column_stack([np.ones(grown.size), grown - 1])
     answer, spread = _robust_line(columns, found.period)
