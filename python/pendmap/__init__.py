@@ -25,6 +25,15 @@ from pendmap.model.library import EffectDefinition, EffectParameter, effects
 if TYPE_CHECKING:
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins, basins_of
+    from pendmap.records import (
+        Experiment,
+        Finding,
+        NoiseFloor,
+        Run,
+        Segment,
+        noise_floor,
+        read_experiment,
+    )
     from pendmap.store import load, save
     from pendmap.trajectory import advance, simulate
 
@@ -34,16 +43,23 @@ __all__ = [
     "Effect",
     "EffectDefinition",
     "EffectParameter",
+    "Experiment",
+    "Finding",
     "Grid",
     "InputError",
+    "NoiseFloor",
     "Pendulum",
     "Rig",
+    "Run",
+    "Segment",
     "advance",
     "basins",
     "basins_of",
     "effects",
     "load",
     "load_model",
+    "noise_floor",
+    "read_experiment",
     "save",
     "save_model",
     "simulate",
@@ -51,11 +67,18 @@ __all__ = [
 
 _HOMES = {
     "Axis": "grid",
+    "Experiment": "records",
+    "Finding": "records",
     "Grid": "grid",
+    "NoiseFloor": "records",
+    "Run": "records",
+    "Segment": "records",
     "advance": "trajectory",
     "basins": "maps",
     "basins_of": "maps",
     "load": "store",
+    "noise_floor": "records",
+    "read_experiment": "records",
     "save": "store",
     "simulate": "trajectory",
 }

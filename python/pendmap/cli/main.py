@@ -23,6 +23,7 @@ _COMMANDS = {
     "effects": "Show the library of effects: formula, parameters, which data reveal each.",
     "simulate": "Integrate one trajectory: time history, phase plane, Poincaré section.",
     "basins": "Map the basins of attraction.",
+    "look": "Say what a record holds: channels, rate, noise, releases, what is odd about it.",
     "rig": "Write an experiment of a virtual rig, its truth beside it.",
     "plot": "Draw a result again, without computing.",
     "view": "Open a recording in the Rerun viewer.",

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, records, style, trajectory
-from pendmap.figures.records import Record
+from pendmap.figures import basins, record, style, trajectory
+from pendmap.figures import runs as runs_figure
+from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
 
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["SUFFIXES", "Record", "draw", "draw_records"]
+    from pendmap.records import Experiment
+
+__all__ = ["SUFFIXES", "RunPanel", "draw", "draw_record", "draw_runs"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
@@ -94,14 +97,57 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     return Path(path)
 
 
-def draw_records(
-    runs: Sequence[Record], path: str | os.PathLike[str], *, title: str, subtitle: str
+def draw_record(
+    experiment: Experiment,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Draw what an experiment holds into a file.
+
+    Of one record: the angle with what is for fitting and what is not, the findings at their places
+    and in words, the intervals of its clock, its noise against speed. Of several runs: a strip
+    each.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What ``pendmap.read_experiment`` returned.
+    path : str or path
+        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
+    size : (float, float), optional
+        Width and height in inches; by default as large as the parts need.
+    dpi : float, optional
+        Pixels per inch, 200 by default.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix and an impossible size or resolution.
+    OSError
+        If the file cannot be written.
+    """
+    resolution = style.resolution(dpi)
+    style.check_size(size, resolution)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(record.figure(experiment, size=size, dpi=resolution), part)
+    return Path(path)
+
+
+def draw_runs(
+    runs: Sequence[RunPanel], path: str | os.PathLike[str], *, title: str, subtitle: str
 ) -> Path:
     """Draw the records of an experiment into a file: a panel a run, measured angle against time.
 
     Parameters
     ----------
-    runs : sequence of Record
+    runs : sequence of RunPanel
         One or more.
     path : str or path
         As of :func:`draw`.
@@ -123,6 +169,6 @@ def draw_records(
     if not runs:
         raise InputError("runs is []: allowed is one record or more")
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
-        made = records.figure(runs, title=title, subtitle=subtitle, dpi=style.resolution(None))
+        made = runs_figure.figure(runs, title=title, subtitle=subtitle, dpi=style.resolution(None))
         style.write(made, part)
     return Path(path)

@@ -73,7 +73,7 @@ class Identification:
     def rig(self) -> Rig:
         """The pendulum that was found; what the method does not know is 0, and so is a negative
         damping, which no pendulum has.
-        """  # noqa: D205, D400, D415 (one sentence)
+        """  # noqa: D205 (one sentence)
         known = {n: e.value for n, e in self.estimates.items() if n in Rig.numbers()}
         for name in ("c_over_m", "Tr"):
             if name in known:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Record", "figure"]
+__all__ = ["RunPanel", "figure"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -43,7 +43,7 @@ _COLOUR = "#1d3557"
 
 
 @dataclass(frozen=True)
-class Record:
+class RunPanel:
     """One run as it was measured.
 
     Attributes
@@ -59,8 +59,8 @@ class Record:
     angle: Floats
 
 
-def figure(records: Sequence[Record], *, title: str, subtitle: str, dpi: float) -> Figure:
-    """Return the figure of one record or more; see :func:`pendmap.figures.draw_records`."""
+def figure(records: Sequence[RunPanel], *, title: str, subtitle: str, dpi: float) -> Figure:
+    """Return the figure of one record or more; see :func:`pendmap.figures.draw_runs`."""
     columns = min(len(records), 2 if len(records) <= FEW else 3)
     rows = -(-len(records) // columns)
     wide = PANEL[0] * (2 if columns == 1 else 1)
@@ -77,7 +77,7 @@ def figure(records: Sequence[Record], *, title: str, subtitle: str, dpi: float) 
     return made
 
 
-def _draw(axes: Axes, record: Record) -> None:
+def _draw(axes: Axes, record: RunPanel) -> None:
     axes.plot(*_curve(record), color=_COLOUR, lw=0.7)
     begin, end = float(record.time[0]), float(record.time[-1])
     axes.set_xlim(begin, max(end, begin + 1e-3))
@@ -89,7 +89,7 @@ def _draw(axes: Axes, record: Record) -> None:
     axes.set_title(record.title, fontsize=size * min(1.0, room / style.inches(record.title, size)))
 
 
-def _curve(record: Record) -> tuple[Floats, Floats]:
+def _curve(record: RunPanel) -> tuple[Floats, Floats]:
     """Return the line of a record: broken where samples are lost, thinned where there are many."""
     time, angle = record.time, record.angle
     if time.size > 2 * BINS:

@@ -1,0 +1,45 @@
+"""``pendmap look``: what a record holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from pendmap.cli.types import OutputFile
+from pendmap.files import held_interrupts
+
+__all__ = ["command"]
+
+
+@click.command("look")
+@click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
+@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option("--quiet", is_flag=True, help="No summary.")
+def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> None:
+    """Say what a record holds and what is odd about it, before anything is fitted.
+
+    A FILE (CSV or other text, Parquet) has a time and an angle; a FOLDER has an experiment.toml.
+    Channels, rate, noise without a model, releases and rest, gaps, outliers, missed counts,
+    units: what is certain is mended as it is read, and said. The files stay as they are.
+    """
+    from pendmap.records import read_experiment
+    from pendmap.records.summary import as_json as fields
+    from pendmap.records.summary import as_text
+
+    experiment = read_experiment(path)
+    if plot is not None:
+        from pendmap import figures
+
+        with held_interrupts():
+            figures.draw_record(experiment, plot)
+    if as_json:
+        from pendmap.cli.show import plain
+
+        click.echo(json.dumps(plain(fields(experiment)), allow_nan=False))
+    elif not quiet:
+        click.echo(as_text(experiment))
+        if plot is not None:
+            click.echo(f"Written: {plot}")

@@ -1,0 +1,17 @@
+"""Records of experiments: read, understood, checked; nothing is ever written beside them."""
+
+from __future__ import annotations
+
+from pendmap.records.experiment import Experiment, Finding, Run, Segment
+from pendmap.records.noise import NoiseFloor, noise_floor
+from pendmap.records.reader import read_experiment
+
+__all__ = [
+    "Experiment",
+    "Finding",
+    "NoiseFloor",
+    "Run",
+    "Segment",
+    "noise_floor",
+    "read_experiment",
+]

@@ -1,0 +1,142 @@
+"""The angle, from whichever channel tells it: read, integrated, or seen in a picture."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.records.circle import circle_angle
+from pendmap.records.swings import swings
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["make"]
+
+TURN: Final = 2 * math.pi
+
+BAND: Final = 1.01
+"""Turns that wrapped readings span at most, a count or some noise beyond one."""
+
+JUMP: Final = 0.75
+"""Turns between neighbours that are a wrap: a true half turn from one sample to the next could
+not be told from it anyway."""
+
+LARGEST: Final = 1e5
+"""Radians beyond which a number is no pendulum's angle: ten thousand turns."""
+
+
+def make(work: Work) -> None:
+    """Make the angle from the channels that there are; leave out rows without one.
+
+    Raises
+    ------
+    InputError
+        If none of them tells it.
+    """
+    if "peaks" in work.extra and "no angle" in work.extra:
+        work.theta = work.extra.pop("peaks")
+        work.peaks_only = True
+    elif "no angle" in work.extra:
+        _derived(work)
+    work.extra.pop("no angle", None)
+    _finite(work, "angle", work.theta)
+    _sane(work)
+    if not work.peaks_only:
+        _unwrap(work)
+
+
+def _finite(work: Work, what: str, *values: Floats) -> None:
+    """Leave out rows where a channel that is needed has no number."""
+    good = np.all([np.isfinite(v) for v in values], axis=0)
+    missing = np.flatnonzero(~good)
+    if missing.size:
+        text = f"{counted(missing.size, 'row')} without a number for the {what} left out"
+        work.say("angle-missing", text, mended=True, at=missing)
+        work.keep(good)
+    work.refuse_short()
+
+
+def _sane(work: Work) -> None:
+    """Leave out numbers that no angle has."""
+    huge = np.abs(work.theta) > LARGEST
+    if huge.any():
+        text = f"{counted(int(huge.sum()), 'number')} beyond {LARGEST:g} rad left out"
+        work.say("angle-huge", text, mended=True, at=np.flatnonzero(huge))
+        work.keep(~huge)
+        work.refuse_short()
+
+
+def _derived(work: Work) -> None:
+    if "pixel_x" in work.extra:
+        x, y = work.extra["pixel_x"], work.extra["pixel_y"]
+        _finite(work, "position", x, y)
+        x, y = work.extra.pop("pixel_x"), work.extra.pop("pixel_y")
+        found = circle_angle(work.time, x, y, work.where)
+        work.theta = found.theta
+        work.say("angle-from-pixels", found.text, mended=True)
+        if found.doubt:
+            work.say("circle-uncertain", found.doubt)
+        return
+    if "velocity" in work.extra:
+        _finite(work, "velocity", work.extra["velocity"])
+        work.theta = _integrated(work, work.extra["velocity"])
+        text = "the angle is the velocity integrated; its zero is the middle of the swing"
+        work.say("angle-integrated", text, mended=True)
+        return
+    raise InputError(
+        f"{work.where}: an acceleration alone tells no angle, where the sensor sits is not known:"
+        " allowed is an angle, a velocity (gyroscope) or pixel_x and pixel_y beside it"
+    )
+
+
+def _integrated(work: Work, velocity: Floats) -> Floats:
+    """Integrate a velocity; a straight line that the sensor's bias adds is taken out."""
+    from scipy.interpolate import CubicSpline
+
+    velocity = np.where(np.abs(velocity) > LARGEST, 0.0, velocity)
+    time = work.time - work.time[0]
+    theta: Floats = CubicSpline(time, velocity).antiderivative()(time)
+    if np.ptp(theta - np.median(theta)) > 2 * TURN:
+        return np.asarray(theta - theta[-1])  # it turns: where it hangs is not seen here
+    middle = _middles(time, theta)
+    if middle is None:
+        return np.asarray(theta - np.median(theta))
+    line = np.polyfit(*middle, 1)
+    return np.asarray(theta - np.polyval(line, time))
+
+
+def _middles(time: Floats, theta: Floats) -> tuple[Floats, Floats] | None:
+    """Return times and values halfway between turning points of either side."""
+    trend = np.polyval(np.polyfit(time, theta, 1), time)
+    found = swings(time, theta - trend)
+    if found.peak_time.size < 4:
+        return None
+    peaks = found.peak + np.interp(found.peak_time, time, trend)
+    # Halves of (1, 2, 1): what the decay does to a plain mean of two turns cancels.
+    value = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
+    return found.peak_time[1:-1], value
+
+
+def _unwrap(work: Work) -> None:
+    """Undo the jumps of a sensor that shows an angle within one turn."""
+    steps = np.diff(work.theta)
+    jumps = np.flatnonzero(np.abs(steps) > JUMP * TURN)
+    span = float(np.ptp(work.theta))
+    if not jumps.size or span > BAND * TURN or span < 0.9 * TURN:
+        return
+    work.theta = np.unwrap(work.theta)
+    text = f"the sensor wraps: {counted(jumps.size, 'jump')} of one turn undone"
+    work.say("angle-wrapped", text, mended=True, at=jumps + 1)
+    fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.999))
+    if fastest > math.pi / 2:
+        text = f"up to {fastest:.2g} rad from sample to sample: turns may be miscounted"
+        work.say("unwrapping-uncertain", text)

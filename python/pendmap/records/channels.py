@@ -1,0 +1,241 @@
+"""Which column is which channel, in SI."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import re
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap import checks
+from pendmap.errors import InputError
+from pendmap.records.experiment import Finding
+from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from pendmap.records.description import Column, Description, RunPlan
+    from pendmap.records.text import Table
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Channels", "channels_of"]
+
+ANGLES: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
+"""Channels that tell of the angle, one way or another."""
+
+_MOST_NAMED: Final = 8
+"""Columns that a message lists."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Channels:
+    """The channels of a table.
+
+    Parameters
+    ----------
+    values : mapping of str to ndarray, shape (rows,)
+        By channel, in SI; the time is always there.
+    columns : mapping of str to str
+        The heading of each.
+    declared : frozenset of str
+        Channels whose unit or scale somebody declared in [columns].
+    pivot : mapping of str to ndarray, or None
+        The pivot's motion in SI.
+    pivot_unit : str or None
+        What it is: ``"m/s2"``, ``"m/s"`` or ``"m"``.
+    findings : tuple of Finding
+        What had to be guessed.
+    """
+
+    values: Mapping[str, Floats]
+    columns: Mapping[str, str]
+    declared: frozenset[str] = frozenset()
+    pivot: Mapping[str, Floats] | None = None
+    pivot_unit: str | None = None
+    findings: tuple[Finding, ...] = ()
+
+
+def channels_of(table: Table, description: Description, plan: RunPlan, where: str) -> Channels:
+    """Choose the columns: those that [columns] names, the default names, then names like them.
+
+    Raises
+    ------
+    InputError
+        If a column that is named is not there, or there is no time or nothing of the angle.
+    """
+    asked = description.columns
+    places: dict[str, int] = {}
+    for channel, column in asked.items():
+        name = column.name or CHANNELS[channel].default
+        if column.name is None and name not in table.names:
+            continue  # unit, scale or zero of a column that is to be found by its usual names
+        places[channel] = _place(name, table, f"{where}: [columns]: {channel}")
+    for channel, kind in CHANNELS.items():
+        if channel not in places and kind.default in table.names:
+            places[channel] = table.names.index(kind.default)
+    findings = _guess(table, places)
+    _check(places, table, where)
+    values, units = {}, {}
+    for channel, place in places.items():
+        given = asked.get(channel)
+        values[channel] = _in_si(channel, table, place, given, description, where)
+        units[channel] = table.names[place] or f"column {place + 1}"
+    declared = {c for c, column in asked.items() if column.unit or column.scale}
+    pivot, unit = _pivot(table, plan, where)
+    return Channels(values, units, frozenset(declared), pivot, unit, tuple(findings))
+
+
+def _place(name: str, table: Table, where: str) -> int:
+    if name in table.names:
+        return table.names.index(name)
+    bare = [name_and_unit(head)[0] for head in table.names]
+    if bare.count(name) == 1:
+        return bare.index(name)
+    if not table.headed:
+        raise InputError(f"{where}: {checks.shown(name)}: the file has no line of names")
+    near = difflib.get_close_matches(name, table.names, 1, 0.6)
+    perhaps = f"is perhaps {near[0]!r}: " if near else ""
+    raise InputError(
+        f"{where}: no column {checks.shown(name)}: allowed {perhaps}are {_listed(table)}"
+    )
+
+
+def _listed(table: Table) -> str:
+    names = [name[:40] or "(no name)" for name in table.names]
+    more = f", ... ({len(names)} in all)" if len(names) > _MOST_NAMED else ""
+    return ", ".join(map(repr, names[:_MOST_NAMED])) + more
+
+
+def _guess(table: Table, places: dict[str, int]) -> list[Finding]:
+    """Find what is missing by names like the usual ones, or without names by position."""
+    guessed: dict[str, int] = {}
+    if not table.headed:
+        return _by_position(table, places)
+    split = [name_and_unit(head) for head in table.names]
+    for channel, kind in CHANNELS.items():
+        if channel in places:
+            continue
+        fitting = []
+        for k, (name, unit) in enumerate(split):
+            if k in places.values() or k in guessed.values():
+                continue
+            if not any(re.fullmatch(pattern, plain(name)) for pattern in kind.names):
+                continue
+            if unit is None or kind.has(unit):
+                fitting.append(k)
+        if fitting:
+            guessed[channel] = _best(channel, fitting, table)
+    needed = any(channel in places for channel in ANGLES)
+    if needed and "time" in places:
+        guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
+    # A picture's coordinates beside an angle are what the angle was made from.
+    if "angle" in places or "angle" in guessed:
+        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
+    if ("pixel_x" in guessed or "pixel_x" in places) != (
+        "pixel_y" in guessed or "pixel_y" in places
+    ):
+        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
+    places.update(guessed)
+    if not guessed or not {"time", *ANGLES} & set(guessed):
+        return []
+    said = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
+    return [Finding("columns-guessed", f"by their names {said}")]
+
+
+def _best(channel: str, fitting: list[int], table: Table) -> int:
+    """Return the axis of a sensor that moves most; of all else the first column."""
+    if channel not in {"velocity", "acceleration"} or len(fitting) == 1:
+        return fitting[0]
+    spread = [np.nan_to_num(np.nanstd(_safe(table.values[:, k]))) for k in fitting]
+    return fitting[int(np.argmax(spread))]
+
+
+def _safe(values: Floats) -> Floats:
+    return np.where(np.isfinite(values), values, 0.0)
+
+
+def _by_position(table: Table, places: dict[str, int]) -> list[Finding]:
+    free = [k for k in range(table.values.shape[1]) if k not in places.values()]
+    said = []
+    for channel in ("time", "angle"):
+        if channel in places or not free:
+            continue
+        k = next((k for k in free if _rises(table.values[:, k])), None)
+        if channel == "angle" or k is None:
+            if any(other in places for other in ANGLES):
+                continue
+            k = free[0]
+        places[channel] = k
+        free.remove(k)
+        said.append(f"column {k + 1} is {'the time in s' if channel == 'time' else 'the angle'}")
+    return [Finding("columns-guessed", f"no line of names: {', '.join(said)}")] if said else []
+
+
+def _rises(values: Floats) -> bool:
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(steps.size and np.mean(steps > 0) > 0.9)
+
+
+def _check(places: dict[str, int], table: Table, where: str) -> None:
+    advice = "experiment.toml names others in [columns]"
+    if "time" not in places:
+        raise InputError(
+            f"{where}: no column of times: allowed is t_s or one like it; there are"
+            f" {_listed(table)}; {advice}"
+        )
+    if not any(channel in places for channel in ANGLES):
+        raise InputError(
+            f"{where}: no column of angles: allowed is theta_rad or one like it; there are"
+            f" {_listed(table)}; {advice}"
+        )
+    for one, other in (("time", "angle"), ("pixel_x", "pixel_y")):
+        if one in places and places[one] == places.get(other):
+            name = table.names[places[one]]
+            raise InputError(f"{where}: {one} and {other} are both {name!r}: allowed are two")
+    if ("pixel_x" in places) != ("pixel_y" in places):
+        raise InputError(f"{where}: pixel_x without pixel_y: allowed are both or neither")
+
+
+def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
+    channel: str,
+    table: Table,
+    place: int,
+    column: Column | None,
+    description: Description,
+    where: str,
+) -> Floats:
+    raw = table.values[:, place]
+    kind = CHANNELS[channel]
+    where = f"{where}: {channel}"
+    zero = column.zero if column else 0.0
+    if column and column.scale is not None:
+        return np.asarray((raw - zero) * column.scale)
+    unit = column.unit if column else None
+    if unit is None:
+        name, unit = name_and_unit(table.names[place])
+        # A column called "volts" or "counts" says its unit by its name.
+        unit = unit or (name if re.fullmatch("volts?|counts?|adc", plain(name)) else None)
+    if unit is None:
+        return np.asarray(raw - zero)
+    counts = description.known.get("encoder_counts")
+    if counts and re.fullmatch("counts?|ticks?", plain(unit)):
+        return np.asarray((raw - zero) * 2 * np.pi / counts)
+    return np.asarray((raw - zero) * kind.factor(unit, where))
+
+
+def _pivot(table: Table, plan: RunPlan, where: str) -> tuple[dict[str, Floats] | None, str | None]:
+    if plan.pivot is None:
+        return None, None
+    unit, factor = PIVOT_UNITS[plan.pivot["unit"]]
+    found = {}
+    for way in ("vertical", "horizontal"):
+        if way in plan.pivot:
+            place = _place(plan.pivot[way], table, f"{where}: pivot: {way}")
+            found[way] = np.asarray(table.values[:, place] * factor)
+    return found, unit

@@ -1,0 +1,232 @@
+"""The clock: stamps that are missing, repeat, jump, run backwards or jitter."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["mend"]
+
+GAP: Final = 1.6
+"""Intervals in units of the median from which samples are missing: one lost sample makes 2."""
+
+RESET: Final = 10
+"""Intervals that a clock falls back by when it starts again, and the samples each part has."""
+
+JITTER: Final = 0.02
+"""Spread of the intervals over their median that is worth saying: at 2 % of 10 ms a pendulum of
+6 rad/s is 0.03 degrees elsewhere at the bottom of a swing of half a radian."""
+
+MOST_OUT: Final = 0.3
+"""Share of the stamps out of order beyond which what is left is no record."""
+
+COARSE: Final = 0.2
+"""Share of repeated stamps from which the clock is coarser than the sampling."""
+
+WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
+"""Seconds after which counters of 16 and 32 bits in us, ms (or s) begin again."""
+
+
+def mend(work: Work) -> None:
+    """Make the times strictly increasing, and say what was wrong.
+
+    Raises
+    ------
+    InputError
+        If no two stamps are in order.
+    """
+    _finite(work)
+    if work.time.size < 2:
+        work.refuse_short()
+    _wrapped(work)
+    _restarted(work)
+    _coarse(work)
+    _ordered(work)
+    if work.time.size < 2 or not work.time[-1] > work.time[0]:
+        raise InputError(f"{work.where}: the times do not increase: allowed are times in order")
+    _spacing(work)
+
+
+def _finite(work: Work) -> None:
+    missing = np.flatnonzero(~np.isfinite(work.time))
+    if missing.size == work.time.size:
+        raise InputError(f"{work.where}: has no row with a time: allowed are numbers")
+    if missing.size:
+        text = f"{counted(missing.size, 'row')} without a time left out"
+        work.say("time-missing", text, mended=True, at=missing)
+        work.keep(np.isfinite(work.time))
+
+
+def _wrapped(work: Work) -> None:
+    """Continue a counter of the clock that began again at 0."""
+    steps = np.diff(work.time)
+    usual = float(np.median(np.abs(steps)))
+    for wrap in WRAPS:
+        slack = max(20 * usual, 1e-9)
+        at = np.flatnonzero(np.abs(steps + wrap) < slack)
+        if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
+            work.time[1:] += wrap * np.cumsum(np.isin(np.arange(steps.size), at))
+            text = f"the clock's counter began again {counted(at.size, 'time')}, continued"
+            work.say("time-wrapped", text, mended=True, at=at + 1)
+            return
+
+
+def _restarted(work: Work) -> None:
+    """Keep the longest stretch of a clock that starts again."""
+    steps = np.diff(work.time)
+    rising = steps[steps > 0]
+    if not rising.size:
+        return
+    usual = float(np.median(rising))
+    falls = np.flatnonzero(steps < -RESET * usual) + 1
+    edges = [0, *falls.tolist(), work.time.size]
+    # One false stamp falls back too; it is no start: what follows runs from where it left off.
+    starts = [0]
+    for k, low in enumerate(edges[1:-1], 1):
+        part = work.time[low : edges[k + 1]]
+        before = work.time[starts[-1] : low]
+        again = part.size > RESET and np.median(part[:RESET]) < np.median(before[-RESET:])
+        if again and before.size > RESET:
+            starts.append(low)
+    if len(starts) == 1:
+        return
+    edges = [*starts, work.time.size]
+    sizes = np.diff(edges)
+    best = int(np.argmax(sizes))
+    text = (
+        f"the clock starts again {counted(len(starts) - 1, 'time')}: of {len(starts)} parts the"
+        f" longest is used, rows {work.rows[edges[best]]} to {work.rows[edges[best + 1] - 1]}"
+    )
+    work.say("time-restarts", text, mended=False, at=np.asarray(starts[1:]))
+    work.keep(np.arange(edges[best], edges[best + 1]))
+
+
+def _coarse(work: Work) -> None:
+    """Spread stamps evenly where several samples share each of them."""
+    steps = np.diff(work.time)
+    same = np.mean(steps == 0) if steps.size else 0.0
+    if same < COARSE or same == 1 or np.any(steps < 0):
+        return
+    rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)
+    if np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9:
+        return  # the samples are repeated with their stamps
+    place = np.arange(work.time.size)
+    slope, start = np.polyfit(place, work.time - work.time[0], 1)
+    tick = float(np.median(steps[steps > 0]))
+    away = work.time - work.time[0] - (start + slope * place)
+    if slope <= 0 or np.max(np.abs(away)) > 1.5 * tick:
+        return  # samples are lost besides: left to the rest
+    work.time = work.time[0] + start + slope * place
+    text = (
+        f"{100 * same:.0f} % of the stamps repeat the one before: spread evenly, {1 / slope:.6g} Hz"
+    )
+    work.say("time-coarse", text, mended=True)
+
+
+def _ordered(work: Work) -> None:
+    steps = np.diff(work.time)
+    if np.all(steps > 0):
+        return
+    backwards = np.flatnonzero(steps < 0) + 1
+    if backwards.size and np.all(steps < 0):
+        work.keep(np.arange(work.time.size)[::-1])
+        work.say("time-backwards", "the rows run backwards in time: turned round", mended=True)
+        return
+    repeated = np.flatnonzero(steps == 0) + 1
+    if repeated.size:
+        alike = np.sum(work.theta[repeated] == work.theta[repeated - 1])
+        text = (
+            f"{counted(repeated.size, 'time stamp')} twice ({alike} with the same reading): the"
+            " first of each kept"
+        )
+        work.say("time-duplicate", text, mended=True, at=repeated)
+        work.keep(np.delete(np.arange(work.time.size), repeated))
+    kept = _longest_rising(work.time)
+    out = np.setdiff1d(np.arange(work.time.size), kept)
+    if not out.size:
+        return
+    order = np.argsort(work.time, kind="stable")
+    if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
+        text = f"{counted(out.size, 'row')} out of order in time: put where the times say"
+        work.say("time-backwards", text, mended=True, at=out)
+        work.keep(order)
+        work.keep(np.concatenate([[True], np.diff(work.time) > 0]))
+        return
+    if out.size > MOST_OUT * work.time.size:
+        raise InputError(
+            f"{work.where}: {out.size} of {work.time.size} times are out of order, and in order the"
+            " angles make no motion: allowed are times in order"
+        )
+    text = f"{counted(out.size, 'time stamp')} out of order, left out"
+    work.say("time-backwards", text, mended=True, at=out)
+    work.keep(kept)
+
+
+def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
+    """Whether samples that were moved fit between their new neighbours as all others do."""
+    if theta.size < 5 or not np.all(np.isfinite(theta)):
+        return False
+    bend = np.abs(np.diff(theta, 2))
+    usual = float(np.quantile(bend, 0.9)) if at.size < theta.size / 4 else 0.0
+    if not usual:  # most were moved: a motion has bends that are small against its way
+        return bool(np.median(bend) < 0.1 * np.ptp(theta))
+    moved = bend[np.clip(at - 1, 0, bend.size - 1)]
+    return bool(np.all(moved <= 3 * usual))
+
+
+def _longest_rising(time: Floats) -> NDArray[np.intp]:
+    """Return the places of the longest strictly rising subsequence: the fewest are left out."""
+    tails: list[float] = []
+    ends: list[int] = []
+    before = np.full(time.size, -1, np.intp)
+    for k, value in enumerate(time.tolist()):
+        at = bisect_left(tails, value)
+        before[k] = ends[at - 1] if at else -1
+        if at == len(tails):
+            tails.append(value)
+            ends.append(k)
+        else:
+            tails[at] = value
+            ends[at] = k
+    place, chain = ends[-1], []
+    while place >= 0:
+        chain.append(place)
+        place = int(before[place])
+    return np.asarray(chain[::-1], np.intp)
+
+
+def _spacing(work: Work) -> None:
+    """Say what the intervals show: gaps, jitter."""
+    steps = np.diff(work.time)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP * usual)
+    if gaps.size > steps.size / 4:
+        text = f"the samples are uneven: intervals from {steps.min():.3g} to {steps.max():.3g} s"
+        work.say("time-uneven", text)
+        return
+    if gaps.size:
+        lost = int(np.sum(np.round(steps[gaps] / usual) - 1))
+        worst = gaps[int(np.argmax(steps[gaps]))]
+        text = (
+            f"{counted(gaps.size, 'gap')}, about {counted(lost, 'sample')} missing; the longest"
+            f" {steps[worst]:.3g} s at {work.time[worst]:.6g} s"
+        )
+        work.say("time-gap", text, at=gaps)
+    even = np.delete(steps, gaps)
+    spread = math.sqrt(float(np.mean((even - usual) ** 2)))
+    if spread > JITTER * usual:
+        text = f"the intervals jitter by {spread:.2g} s rms, {100 * spread / usual:.0f} % of {usual:.4g} s"
+        work.say("time-jitter", text)

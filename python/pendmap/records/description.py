@@ -1,0 +1,269 @@
+"""``experiment.toml``: what somebody who did the experiment says about it."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import tomllib
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap import checks
+from pendmap.errors import InputError
+from pendmap.records.units import CHANNELS, PIVOT_UNITS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from pendmap.records.experiment import Kind
+
+__all__ = ["ALONE", "NAME", "Column", "Description", "Reader", "RunPlan", "read_description"]
+
+NAME: Final = "experiment.toml"
+
+_RIG: Final = ("gravity", "length_m", "w0", "encoder_counts")
+_TOP: Final = ("rig", "columns", "reader", "run")
+_COLUMN: Final = ("name", "unit", "scale", "zero")
+_READER: Final = ("delimiter", "decimal", "skip_rows")
+_RUN: Final = (
+    *("file", "kind", "lab_time_s", "from_s", "to_s"),
+    *("hold_out", "drive", "pivot"),
+)
+_DRIVE: Final = ("p", "Omega", "phi")
+_PIVOT: Final = ("vertical", "horizontal", "unit")
+_MOST_SKIPPED: Final = 1_000_000
+_MOST_COUNTS: Final = 10**9
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """Where a channel stands: the column's name, its unit, rad (or other SI) a unit, zero."""
+
+    name: str | None = None
+    unit: str | None = None
+    scale: float | None = None
+    zero: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Reader:
+    """How files are written, where it cannot be seen from them."""
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    skip_rows: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class RunPlan:
+    """One ``[[run]]``."""
+
+    file: str
+    kind: Kind = "free"
+    lab_time_s: float = 0.0
+    from_s: float | None = None
+    to_s: float | None = None
+    hold_out: bool = False
+    drive: Mapping[str, float | None] | None = None
+    pivot: Mapping[str, str] | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Description:
+    """All of the file."""
+
+    known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    columns: Mapping[str, Column] = dataclasses.field(default_factory=dict)
+    reader: Reader = Reader()
+    runs: tuple[RunPlan, ...] = ()
+
+
+ALONE: Final = Description()
+"""What is known of a file that comes without a description."""
+
+
+def read_description(path: Path) -> Description:
+    """Read an ``experiment.toml``.
+
+    Raises
+    ------
+    InputError
+        On one line that names the file: not TOML, a key that is not known (with the one that was
+        perhaps meant), a value of the wrong kind or outside its range.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not a TOML file: {' '.join(str(error).split())}") from None
+    try:
+        return _description(content)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _description(content: dict[str, Any]) -> Description:
+    _keys(content, _TOP, "", "[rig], [columns], [reader] and [[run]]")
+    runs = content.get("run")
+    if not isinstance(runs, list) or not runs:
+        raise InputError('has no [[run]]: allowed is one or more, each with file = "run_00.csv"')
+    plans = []
+    for count, table in enumerate(runs, 1):
+        where = f"[[run]] {count}"
+        plans.append(_run(_table(table, where), where))
+    return Description(
+        _rig(_table(content.get("rig", {}), "[rig]")),
+        _columns(_table(content.get("columns", {}), "[columns]")),
+        _reader(_table(content.get("reader", {}), "[reader]")),
+        tuple(plans),
+    )
+
+
+def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, allowed: str = "") -> None:
+    for key in table:
+        if key in known:
+            continue
+        near = difflib.get_close_matches(key.lower(), [k.lower() for k in known], 1, 0.55)
+        meant = next((k for k in known if near and k.lower() == near[0]), None)
+        perhaps = f"is perhaps {meant}: " if meant else ""
+        shown = key if key.isidentifier() else checks.shown(key)
+        place = f"{where}: " if where else ""
+        raise InputError(
+            f"{place}{shown} is not known: allowed {perhaps}are {allowed or ', '.join(known)}"
+        )
+
+
+def _table(value: object, where: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{where} is {checks.shown(value)}: allowed is a table")
+    return value
+
+
+def _rig(table: dict[str, Any]) -> dict[str, Any]:
+    _keys(table, _RIG, "[rig]")
+    known: dict[str, Any] = {}
+    for name, value in table.items():
+        if name == "encoder_counts":
+            known[name] = checks.whole(f"[rig]: {name}", value, 1, _MOST_COUNTS)
+        else:
+            known[name] = _positive(f"[rig]: {name}", value)
+    return known
+
+
+def _positive(name: str, value: object) -> float:
+    number = checks.number(name, value)
+    if number <= 0:
+        raise InputError(f"{name} is {number:g}: allowed is more than 0")
+    return number
+
+
+def _text(name: str, value: object) -> str:
+    if not isinstance(value, str) or not value:
+        raise InputError(f"{name} is {checks.shown(value)}: allowed is a text")
+    return value
+
+
+def _columns(table: dict[str, Any]) -> dict[str, Column]:
+    _keys(table, tuple(CHANNELS), "[columns]")
+    return {channel: _column(channel, value) for channel, value in table.items()}
+
+
+def _column(channel: str, value: object) -> Column:
+    where = f"[columns]: {channel}"
+    if isinstance(value, str):
+        return Column(name=_text(where, value))
+    if not isinstance(value, dict):
+        allowed = f'allowed is a table like {channel} = {{ name = "...", unit = "..." }}'
+        raise InputError(f"{where} is {checks.shown(value)}: {allowed}")
+    _keys(value, _COLUMN, where)
+    name = _text(f"{where}: name", value["name"]) if "name" in value else None
+    unit = _text(f"{where}: unit", value["unit"]) if "unit" in value else None
+    scale = None
+    if "scale" in value:
+        scale = checks.number(f"{where}: scale", value["scale"])
+        if scale == 0:
+            raise InputError(f"{where}: scale is 0: allowed is any other number")
+    zero = checks.number(f"{where}: zero", value.get("zero", 0.0))
+    column = Column(name, unit, scale, zero)
+    if unit is not None and scale is None:
+        CHANNELS[channel].factor(unit, where)  # refuses what is not known, before files are read
+    return column
+
+
+def _reader(table: dict[str, Any]) -> Reader:
+    _keys(table, _READER, "[reader]")
+    delimiter, decimal = table.get("delimiter"), table.get("decimal")
+    if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1):
+        allowed = 'one character, like ";" or "\\t"'
+        raise InputError(f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is {allowed}")
+    if decimal not in {None, ".", ","}:
+        raise InputError(f'[reader]: decimal is {checks.shown(decimal)}: allowed is "." or ","')
+    if delimiter is not None and delimiter in '"\r\n\0+-.0123456789eE':
+        raise InputError(
+            f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is what numbers do not need"
+        )
+    if delimiter is not None and delimiter == decimal:
+        raise InputError("[reader]: delimiter and decimal are the same: allowed are different ones")
+    skip = checks.whole("[reader]: skip_rows", table.get("skip_rows", 0), 0, _MOST_SKIPPED)
+    return Reader(delimiter, decimal, skip)
+
+
+def _run(table: dict[str, Any], where: str) -> RunPlan:
+    _keys(table, _RUN, where)
+    if "file" not in table:
+        raise InputError(f'{where}: file is missing: allowed is like file = "run_00.csv"')
+    drive = _drive(table["drive"], where) if "drive" in table else None
+    pivot = _pivot(table["pivot"], where) if "pivot" in table else None
+    kind = table.get("kind", "forced" if drive or pivot else "free")
+    if kind not in {"free", "forced"}:
+        raise InputError(f'{where}: kind is {checks.shown(kind)}: allowed is "free" or "forced"')
+    if kind == "free" and drive:
+        raise InputError(f'{where}: kind is "free" and there is a drive: allowed is one of them')
+    if drive and pivot:
+        raise InputError(f"{where}: drive and pivot: allowed is one of them")
+    limits = {}
+    for name in ("from_s", "to_s"):
+        limits[name] = checks.number(f"{where}: {name}", table[name]) if name in table else None
+    low, high = limits["from_s"], limits["to_s"]
+    if low is not None and high is not None and low >= high:
+        raise InputError(f"{where}: from_s is {low:g}: allowed is less than to_s, {high:g}")
+    return RunPlan(
+        file=_text(f"{where}: file", table["file"]),
+        kind=kind,
+        lab_time_s=checks.number(f"{where}: lab_time_s", table.get("lab_time_s", 0.0)),
+        from_s=low,
+        to_s=high,
+        hold_out=checks.flag(f"{where}: hold_out", table.get("hold_out", False)),
+        drive=drive,
+        pivot=pivot,
+    )
+
+
+def _drive(value: object, where: str) -> dict[str, float | None]:
+    table = _table(value, f"{where}: drive")
+    _keys(table, _DRIVE, f"{where}: drive")
+    for name in ("p", "Omega"):
+        if name not in table:
+            example = "drive = { p = 0.2, Omega = 12.1 }"
+            raise InputError(f"{where}: drive: {name} is missing: allowed is like {example}")
+    numbers: dict[str, float | None] = {
+        name: checks.number(f"{where}: drive: {name}", value) for name, value in table.items()
+    }
+    _positive(f"{where}: drive: Omega", numbers["Omega"])
+    return {"phi": None} | numbers
+
+
+def _pivot(value: object, where: str) -> dict[str, str]:
+    table = _table(value, f"{where}: pivot")
+    _keys(table, _PIVOT, f"{where}: pivot")
+    if not {"vertical", "horizontal"} & set(table):
+        example = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
+        raise InputError(f"{where}: pivot names no column: allowed is like {example}")
+    named = {key: _text(f"{where}: pivot: {key}", text) for key, text in table.items()}
+    named.setdefault("unit", "m/s2")
+    if named["unit"] not in PIVOT_UNITS:
+        shown = checks.shown(named["unit"])
+        known = ", ".join(PIVOT_UNITS)
+        raise InputError(f"{where}: pivot: unit is {shown}: allowed are {known}")
+    return named

@@ -1,0 +1,167 @@
+"""What an experiment holds: runs, and what was found in them."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Experiment", "Finding", "Run", "Segment"]
+
+Kind = Literal["free", "forced"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """Something about a record that its owner should know.
+
+    Parameters
+    ----------
+    what : str
+        A key that stays, like ``"time-gap"``.
+    text : str
+        One line for people.
+    mended : bool
+        Whether the arrays of the run have it mended. What is not mended is as in the file.
+    where : str
+        Run, rows of the file or times, as far as it can be placed.
+    from_s, to_s : float or None
+        The times that it spans, where it can be drawn.
+    """
+
+    what: str
+    text: str
+    mended: bool = False
+    where: str = ""
+    from_s: float | None = None
+    to_s: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Segment:
+    """A stretch of a record and what the pendulum does there.
+
+    Parameters
+    ----------
+    what : str
+        ``"held"`` before a release, ``"motion"``, ``"rest"`` after it, ``"handled"`` between two
+        releases.
+    from_s, to_s : float
+        Its first and last time, s.
+    used : bool
+        Whether its samples are for fitting.
+    """
+
+    what: str
+    from_s: float
+    to_s: float
+    used: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """One record, in SI, cleaned as far as that is certain.
+
+    Parameters
+    ----------
+    name : str
+        How messages call it.
+    file : str
+        The file it comes from.
+    kind : str
+        ``"free"`` or ``"forced"``.
+    time : ndarray, shape (N,)
+        s, as in the file, strictly increasing.
+    theta : ndarray, shape (N,)
+        rad, from the downward rest, unwrapped, finite.
+    trusted : ndarray of bool, shape (N,)
+        False where a sample is not for fitting: outlier, missed count, clipped, held by hand, at
+        rest, handled between two releases.
+    lab_time_s : float
+        When the run began in the laboratory.
+    hold_out : bool
+        Whether it is kept back from fits.
+    velocity : ndarray, shape (N,), or None
+        rad/s, where it was measured.
+    acceleration : ndarray, shape (N,), or None
+        m/s^2 (or rad/s^2), where it was measured beside the angle.
+    drive : mapping or None
+        ``p``, ``Omega`` and ``phi`` (``None``: to be fitted) of a(t) = p cos(Omega t + phi).
+    pivot : mapping of str to ndarray, or None
+        Recorded motion of the pivot in SI: ``vertical`` and ``horizontal``, each (N,), positive
+        upward and toward positive theta.
+    pivot_unit : str or None
+        ``"m/s2"``, ``"m/s"`` or ``"m"``: what the pivot's columns are.
+    findings : tuple of Finding
+        What was found in it.
+    peaks_only : bool
+        Whether the samples are turning points alone.
+    segments : tuple of Segment
+        Its stretches in order.
+    channels : mapping of str to str
+        Which channel comes from which column.
+    count_rad : float
+        Smallest step of the readings, rad; 0 where none can be seen.
+    sha256 : str
+        Of the file.
+    """
+
+    name: str
+    file: str
+    kind: Kind
+    time: Floats
+    theta: Floats
+    trusted: NDArray[np.bool_]
+    lab_time_s: float = 0.0
+    hold_out: bool = False
+    velocity: Floats | None = None
+    acceleration: Floats | None = None
+    drive: Mapping[str, float | None] | None = None
+    pivot: Mapping[str, Floats] | None = None
+    pivot_unit: str | None = None
+    findings: tuple[Finding, ...] = ()
+    peaks_only: bool = False
+    segments: tuple[Segment, ...] = ()
+    channels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    count_rad: float = 0.0
+    sha256: str = ""
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second, from the median interval."""
+        import numpy as np
+
+        return float(1 / np.median(np.diff(self.time))) if self.time.size > 1 else 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """Runs of one rig.
+
+    Parameters
+    ----------
+    path : Path
+        The file or folder.
+    runs : tuple of Run
+        In the order of the experiment.
+    known : mapping
+        What ``[rig]`` says: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``.
+    findings : tuple of Finding
+        What concerns the experiment and no run alone.
+    sha256 : mapping of str to str
+        Of each file that was read.
+    """
+
+    path: Path
+    runs: tuple[Run, ...]
+    known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    sha256: Mapping[str, str] = dataclasses.field(default_factory=dict)

@@ -1,0 +1,251 @@
+"""Outliers, and jumps that stay: counts that an encoder missed, turns that it slipped.
+
+A push changes the velocity of a pendulum, never its angle at once: a jump of the angle that stays
+is the sensor's, one that goes back is an outlier. Where a sample is far from the polynomial through
+its neighbours, the differences between samples tell the two apart: a jump makes one of them
+false, an outlier those before and behind it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.records.local_fit import POINTS, local_fit
+from pendmap.records.noise import DEGREES, broad_scale, normal_scale
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["find"]
+
+SPIKE: Final = 10.0
+"""Local standard deviations of a residual that are looked into. White noise reaches 6 once in
+5e8 samples; the rest is for noise with long tails, as real encoders have."""
+
+NEARBY: Final = 151
+"""Samples around each that its scale comes from: more than a false stretch, less than a decay."""
+
+PASSES: Final = 8
+"""Times that false samples are looked for; each may uncover what stood beside another."""
+
+MOST_SPIKES: Final = 0.1
+"""Share of samples beyond which they are no outliers, but what the sensor does."""
+
+SIDE: Final = 10
+"""Samples on each side that a sample is judged by."""
+
+TOGETHER: Final = 6
+"""False samples that may stand together and be told from the motion."""
+
+CLEAR: Final = 7.0
+"""Standard errors that make a jump."""
+
+WHOLE: Final = 0.25
+"""Counts by which a jump may miss a whole number of them and be mended by that number."""
+
+MOST: Final = 20
+"""Jumps beyond which it is not counts that are missed."""
+
+TURN: Final = 2 * math.pi
+
+SLIP: Final = 0.1
+"""Radians by which a jump may miss whole turns and be one: the angle is the same either way."""
+
+APART: Final = 0.5
+"""Radians of a jump from which two recordings may stand in one file."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Jump:
+    """The zero moves by ``size`` +- ``error`` rad before sample ``at``."""
+
+    at: int
+    size: float
+    error: float
+
+
+def find(work: Work) -> None:
+    """Mark outliers; mend jumps by whole counts, of others keep the longest part; and say so."""
+    if work.time.size < 2 * POINTS:
+        return
+    theta = work.theta.copy()
+    bad = ~work.trusted
+    if bad.all():
+        return
+    theta[bad] = np.interp(work.time[bad], work.time[~bad], theta[~bad])
+    false, jumps = np.zeros(theta.size, bool), list[_Jump]()
+    # Around what is clipped or frozen already the motion has corners of its own.
+    seen = np.convolve(bad, np.ones(2 * SIDE + 1), "same") > 0.5
+    for _ in range(PASSES):
+        at, scale = _suspects(work, theta)
+        at, scale = at[~seen[at]], scale[~seen[at]]
+        if not at.size:
+            break
+        if at.size + np.count_nonzero(false) > MOST_SPIKES * theta.size:
+            text = f"more than {100 * MOST_SPIKES:.0f} % of the samples contradict their neighbours"
+            work.say("not-smooth", text)
+            return
+        for k, sigma in zip(at.tolist(), scale.tolist(), strict=True):
+            group, jump = _judge(work.time, theta, k, sigma, work.count)
+            false[group] = True
+            if jump is not None:
+                jumps.append(jump)
+                theta[jump.at :] -= jump.size
+            seen[k] = True
+        if not false.all():
+            theta[false] = np.interp(work.time[false], work.time[~false], theta[~false])
+    _outliers(work, theta, false, jumps)
+    _moved(work, sorted(jumps, key=lambda jump: jump.at))
+
+
+def _suspects(work: Work, theta: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Return samples far from their neighbours, and the standard deviation around each."""
+    from scipy.ndimage import maximum_filter1d, median_filter
+
+    degree, points = _degree(work.time, theta)
+    fit = local_fit(work.time, theta, degree=degree, points=points)
+    size = np.abs(fit.residual)
+    if size.size < POINTS:
+        return np.empty(0, np.intp), np.empty(0)
+    near = 1.4826 * median_filter(size, size=min(NEARBY, size.size), mode="nearest")
+    scale = np.maximum(near, max(broad_scale(size), 1e-9))
+    # What is false shows in every window that it is part of, most in its own.
+    highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
+    which = (size > SPIKE * scale + 2 * work.count) & (size >= highest)
+    return fit.middle[which], scale[which]
+
+
+def _degree(time: Floats, theta: Floats) -> tuple[int, int]:
+    """Return the polynomial that leaves least: higher ones where the sampling is slow."""
+    best, least = DEGREES[0], math.inf
+    for degree, points in DEGREES[:3]:
+        scale = normal_scale(local_fit(time, theta, degree=degree, points=points).residual)
+        if scale < 0.7 * least:
+            best, least = (degree, points), scale
+    return best
+
+
+def _judge(
+    time: Floats, theta: Floats, k: int, sigma: float, count: float
+) -> tuple[slice | NDArray[np.intp], _Jump | None]:
+    """Return which samples around ``k`` are false, and the jump there, if there is one."""
+    low, high = max(k - SIDE, 0), min(k + SIDE + 1, theta.size)
+    t, part = time[low:high] - time[k], theta[low:high] - theta[k]
+    step = np.diff(t)
+    middle = (t[1:] + t[:-1]) / 2
+    away = np.abs(_smooth(middle, np.diff(part) / step) * step)
+    limit = max(5 * normal_scale(away), 3 * sigma) + count
+    near = np.abs(np.arange(away.size) + 0.5 - (k - low)) <= TOGETHER
+    odd = np.flatnonzero((away > limit) & near)
+    if not odd.size:
+        return slice(0), None
+    first, last = int(odd[0]), int(odd[-1])
+    group = slice(low + first + 1, low + last + 1)
+    before, after = slice(0, first + 1), slice(last + 1, part.size)
+    if min(first + 1, part.size - last - 1) < 4:
+        # At an end of the record nobody can tell; the shorter side is not believed.
+        if low == 0 and first + 1 < 4:
+            return slice(0, group.stop), None
+        return slice(group.start, theta.size) if high == theta.size else group, None
+    width = max(abs(t[0]), abs(t[-1]))
+    x = np.concatenate([t[before], t[after]]) / width
+    jumped = np.concatenate([np.zeros(first + 1), np.ones(part.size - last - 1)])
+    columns = np.column_stack([np.vander(x, 4), jumped])
+    values = np.concatenate([part[before], part[after]])
+    answer = np.linalg.lstsq(columns, values, rcond=None)[0]
+    rest = float(np.sqrt(np.mean((values - columns @ answer) ** 2)))
+    gain = math.sqrt(float(np.linalg.pinv(columns.T @ columns)[-1, -1]))
+    error = gain * max(sigma, rest, count / math.sqrt(12))
+    size = float(answer[-1])
+    if abs(size) > CLEAR * error:
+        return group, _Jump(low + last + 1, size, error)
+    # Between two outliers there may be samples that are sound.
+    inner = slice(first + 1, last + 1)
+    bridged = np.abs(part[inner] - np.vander(t[inner] / width, 4) @ answer[:-1])
+    return low + first + 1 + np.flatnonzero(bridged > 5 * error / gain + count), None
+
+
+def _smooth(x: Floats, y: Floats) -> Floats:
+    """Return what ``y`` is away from the cubic of least absolute distances."""
+    columns = np.vander(x / max(float(np.max(np.abs(x))), 1e-300), 4)
+    weights = np.ones(y.size)
+    away = y
+    for _ in range(10):
+        weighted = columns * weights[:, None]
+        answer = np.linalg.lstsq(weighted.T @ columns, weighted.T @ y, rcond=None)[0]
+        away = y - columns @ answer
+        weights = 1 / np.maximum(np.abs(away), 1e-6 * float(np.max(np.abs(away))) + 1e-300)
+        weights /= float(np.max(weights))
+    return away
+
+
+def _outliers(work: Work, theta: Floats, false: NDArray[np.bool_], jumps: list[_Jump]) -> None:
+    at = np.flatnonzero(false & work.trusted)
+    if not at.size:
+        return
+    moved = np.zeros(theta.size)
+    for jump in jumps:
+        moved[jump.at :] += jump.size
+    worst = float(np.max(np.abs(work.theta - moved - theta)[at]))
+    work.trusted[at] = False
+    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} rad: not for fitting"
+    work.say("outliers", text, at=at)
+
+
+def _moved(work: Work, jumps: list[_Jump]) -> None:
+    """Mend jumps by a whole number of counts; of others keep the longest part."""
+    if not jumps:
+        return
+    places = np.asarray([jump.at for jump in jumps], np.intp)
+    if len(jumps) > MOST:
+        text = f"{counted(len(jumps), 'jump')} of the reading that stay: the zero wanders"
+        work.say("missed-counts", text, at=places)
+        return
+    turns = [round(jump.size / TURN) for jump in jumps]
+    off = [abs(j.size - n * TURN) for j, n in zip(jumps, turns, strict=True)]
+    if all(turns) and max(off) < SLIP:
+        for at, number in zip(places, turns, strict=True):
+            work.theta[at:] -= number * TURN
+        text = f"{counted(len(jumps), 'jump')} of the reading by whole turns, taken back"
+        work.say("turns-slipped", text, mended=True, at=places)
+        return
+    whole = [_whole(jump, work.count) for jump in jumps]
+    if all(whole):
+        for at, count in zip(places, whole, strict=True):
+            work.theta[at:] -= count * work.count
+        said = ", ".join(f"{count:+d}" for count in whole[:4])
+        text = f"{counted(len(jumps), 'jump')} of the reading by {said} counts, taken back"
+        work.say("missed-counts", text, mended=True, at=places)
+        return
+    edges = [0, *places.tolist(), work.time.size]
+    longest = int(np.argmax(np.diff(edges)))
+    keep = np.zeros(work.time.size, bool)
+    keep[edges[longest] : edges[longest + 1]] = True
+    work.trusted &= keep
+    said = ", ".join(f"{jump.size:+.3g}" for jump in jumps[:4])
+    or_else = ""
+    if max(abs(jump.size) for jump in jumps) > APART:
+        or_else = ", or another recording begins"
+    text = (
+        f"{counted(len(jumps), 'jump')} of the reading ({said} rad) that stay{or_else}:"
+        f" {work.time[edges[longest]]:.6g} to {work.time[edges[longest + 1] - 1]:.6g} s is for"
+        " fitting"
+    )
+    work.say("missed-counts", text, at=places)
+
+
+def _whole(jump: _Jump, count: float) -> int:
+    """Return the counts of a jump, 0 where they are not certain."""
+    if not count or jump.error > WHOLE * count:
+        return 0
+    number = round(jump.size / count)
+    return number if abs(jump.size / count - number) < WHOLE else 0

@@ -1,0 +1,280 @@
+"""What the pendulum does in a free record: held, released, swinging, at rest, released again."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.records.experiment import Segment
+from pendmap.records.local_fit import local_fit
+from pendmap.records.noise import normal_scale
+from pendmap.records.runs_of import true_runs
+from pendmap.records.scale import periods_of
+from pendmap.records.swings import swings
+from pendmap.records.zero import middle_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["check"]
+
+STILL: Final = 8.0
+"""Standard deviations of noise within which a whole period must stay to be no motion: white
+noise spans 5 or 6 in a hundred samples."""
+
+SMALL: Final = 0.1
+"""Radians within which readings that are no smoother than noise are no motion."""
+
+RISE: Final = 0.1
+"""Share of the largest swing by which a free swing grows only if somebody helps."""
+
+HELD: Final = 1.5
+"""Times longer than a release from rest takes to be seen, from where it was held before."""
+
+UPRIGHT: Final = 2.7
+"""Angle in rad beyond which a pendulum leaves so slowly that a hold cannot be told."""
+
+CERTAIN: Final = 4.0
+"""Standard errors that an offset must have to be said."""
+
+
+def moves(work: Work) -> bool:
+    """Whether anything moves; if not, that is said.
+
+    Raises
+    ------
+    InputError
+        If all readings are the same.
+    """
+    low, high = float(work.time[0]), float(work.time[-1])
+    work.segments = [Segment("motion", low, high, used=True)]
+    if np.ptp(work.theta) == 0:
+        raise InputError(f"{work.where}: the angle never changes: allowed is a motion")
+    noise, limit = _limits(work)
+    good = work.theta[work.trusted]
+    still = good.size < 4 or (noise > 0.7 * float(np.std(good)) and np.ptp(good) < SMALL)
+    if not still and np.ptp(good) > limit:
+        return True
+    spread = float(np.ptp(good)) if good.size else 0.0
+    work.say("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
+    work.segments = [Segment("rest", low, high, used=False)]
+    return False
+
+
+def _limits(work: Work) -> tuple[float, float]:
+    """Return the noise, and the span within which nothing moves."""
+    noise = _noise(work)
+    # Where the sampling is slow the residuals are motion: they must not hide it.
+    reach = 0.4 * float(np.ptp(work.theta))
+    return noise, min(reach, max(STILL * noise, 2.5 * work.count))
+
+
+def check(work: Work) -> None:
+    """Divide a free record into stretches and trust the longest swing alone; say the offset."""
+    noise, limit = _limits(work)
+    good = work.theta[work.trusted]
+    if work.plan.kind != "free":
+        return
+    middle = middle_of(work.time[work.trusted], good)
+    middle = float(np.median(good)) if middle is None else middle
+    found = periods_of(work, middle)
+    period = found.small if found else _known_period(work)
+    if period is None:
+        work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
+        return
+    ends = np.flatnonzero(work.trusted)
+    span = (int(ends[0]), int(ends[-1]) + 1)
+    stretches = _still(work, period, limit, span)
+    parts = _moving(span, stretches)
+    parts = [piece for part in parts for piece in _releases(work, part, middle, limit)]
+    if not parts:
+        return
+    held = _held_short(work, parts[0], period, noise)
+    if held is not None:
+        parts[0] = (held, parts[0][1])
+    _settle(work, parts, middle, span)
+    _offset(work, parts, limit)
+
+
+def _noise(work: Work) -> float:
+    fit = local_fit(work.time, work.theta)
+    return normal_scale(fit.residual)
+
+
+def _known_period(work: Work) -> float | None:
+    w0 = work.known.get("w0")
+    if not w0 and "gravity" in work.known and "length_m" in work.known:
+        w0 = math.sqrt(work.known["gravity"] / work.known["length_m"])
+    return 2 * math.pi / w0 if w0 else None
+
+
+def _still(work: Work, period: float, limit: float, span: tuple[int, int]) -> list[tuple[int, int]]:
+    """Return stretches within ``span``, of a period and more, in which nothing moves."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    theta, time = work.theta[slice(*span)].copy(), work.time[slice(*span)]
+    bad = ~work.trusted[slice(*span)]
+    if bad.any():
+        theta[bad] = np.interp(time[bad], time[~bad], theta[~bad])
+    width = max(round(period / float(np.median(np.diff(work.time)))), 5) | 1
+    if width >= theta.size:
+        return []
+    highest = maximum_filter1d(theta, width, mode="nearest")
+    spread = highest - minimum_filter1d(theta, width, mode="nearest")
+    still = np.asarray(spread <= limit, bool)
+    half = width // 2
+    still[:half], still[-half:] = still[half], still[-half - 1]
+    low, high = true_runs(still)
+    return [
+        (span[0] + max(int(a) - half, 0), span[0] + min(int(b) + half, theta.size))
+        for a, b in zip(low, high, strict=True)
+    ]
+
+
+def _moving(span: tuple[int, int], still: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    edges = [span[0], *(place for stretch in still for place in stretch), span[1]]
+    pairs = zip(edges[::2], edges[1::2], strict=True)
+    return [(a, b) for a, b in pairs if b - a > 5]
+
+
+def _releases(
+    work: Work, part: tuple[int, int], middle: float, limit: float
+) -> list[tuple[int, int]]:
+    """Divide a motion where the swing grows: somebody took the pendulum and let it go again."""
+    low, high = part
+    good = np.flatnonzero(work.trusted[low:high]) + low
+    if good.size < 5:
+        return []
+    half = swings(work.time[good], work.theta[good] - middle, least=limit)
+    size = np.abs(half.peak)
+    if size.size < 4:
+        return [part]
+    # Neighbours together: an offset makes every other half cycle larger.
+    pairs = np.maximum(size[:-1], size[1:])
+    rise = max(RISE * float(size.max()), 2 * limit)
+    cuts: list[tuple[int, int]] = []
+    least, at = pairs[0], 0
+    k = 1
+    while k < pairs.size:
+        if pairs[k] < least:
+            least, at = pairs[k], k
+        elif pairs[k] > least + rise:
+            top = k
+            while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
+                top += 1
+            peak = top + int(size[top + 1] > size[top]) if top + 1 < size.size else top
+            stop = int(np.searchsorted(work.time, half.peak_time[min(at + 1, size.size - 1)]))
+            go = int(np.searchsorted(work.time, half.peak_time[peak]))
+            cuts.append((stop, go))
+            least, at, k = pairs[top], top, top
+        k += 1
+    edges = [low, *(place for cut in cuts for place in cut), high]
+    pieces = zip(edges[::2], edges[1::2], strict=True)
+    return [(a, b) for a, b in pieces if b - a > 5]
+
+
+def _held_short(work: Work, part: tuple[int, int], period: float, noise: float) -> int | None:
+    """Return where a motion begins that was held for less than a period before."""
+    low = part[0]
+    if not work.trusted[low : low + 5].all():
+        return None
+    theta, time = work.theta[low : part[1]], work.time[low : part[1]]
+    start = float(np.median(theta[:5]))
+    seen = max(6 * noise, 1.5 * work.count, 1e-4)
+    left = np.flatnonzero(np.abs(theta - start) > seen)
+    w0 = 2 * math.pi / period
+    if not left.size or abs(start) > UPRIGHT or abs(math.sin(start)) < 0.05:
+        return None
+    usual = math.sqrt(2 * seen / (w0**2 * abs(math.sin(start))))
+    interval = float(np.median(np.diff(work.time)))
+    still = float(time[left[0]] - time[0])
+    if still <= HELD * usual + 4 * interval:
+        return None
+    return low + max(int(np.searchsorted(time, time[left[0]] - usual)), 0)
+
+
+def _settle(work: Work, parts: list[tuple[int, int]], middle: float, span: tuple[int, int]) -> None:
+    """Name the stretches, trust the longest swing, and say so."""
+    longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
+    trusted = np.zeros(work.time.size, bool)
+    trusted[parts[longest][0] : parts[longest][1]] = True
+    segments = []
+    if span[0] > 0:
+        segments.append(_segment(work, "motion", 0, span[0], used=False))
+    at = span[0]
+    for k, (low, high) in enumerate(parts):
+        if low > at:
+            segments.append(_between(work, at, low, middle, first=k == 0))
+        segments.append(_segment(work, "motion", low, high, used=k == longest))
+        at = high
+    if at < span[1]:
+        segments.append(_between(work, at, span[1], middle, first=False))
+    if span[1] < work.time.size:
+        segments.append(_segment(work, "motion", span[1], work.time.size, used=False))
+    work.segments = segments
+    work.trusted &= trusted
+    if len(parts) > 1:
+        low, high = parts[longest]
+        span = (float(work.time[low]), float(work.time[high - 1]))
+        text = f"{len(parts)} releases: the longest swing is used, {span[0]:.6g} to {span[1]:.6g} s"
+        work.say("several-releases", text, span=span)
+    first, last = segments[0], segments[-1]
+    if first.what == "held":
+        text = f"held until {first.to_s:.6g} s, not for fitting"
+        work.say("held-start", text, span=(first.from_s, first.to_s))
+    if last.what == "rest" and len(segments) > 1:
+        text = f"at rest from {last.from_s:.6g} s, not for fitting"
+        work.say("rest-tail", text, span=(last.from_s, last.to_s))
+
+
+def _between(work: Work, low: int, high: int, middle: float, *, first: bool) -> Segment:
+    """Name what is no swing: at the rest or held elsewhere."""
+    reach = float(np.max(np.abs(work.theta[work.trusted] - middle)))
+    level = work.theta[low:high]
+    far = abs(float(np.median(level)) - middle) > 0.1 * reach
+    moved = float(np.ptp(level)) > 0.2 * reach
+    what = "handled" if moved and not first else "held" if far or first else "rest"
+    return _segment(work, what, low, high, used=False)
+
+
+def _segment(work: Work, what: str, low: int, high: int, *, used: bool) -> Segment:
+    return Segment(what, float(work.time[low]), float(work.time[high - 1]), used)
+
+
+def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
+    """Say where it rests, or about what it swings, if that is not 0."""
+    last = work.segments[-1]
+    if last.what == "rest":
+        tail = work.theta[work.time >= last.from_s]
+        value = float(np.mean(tail))
+        error = float(np.std(tail)) / math.sqrt(tail.size)
+        error = max(error, work.count / math.sqrt(12))
+        said = f"it rests at {_folded(value):+.3g} rad: an offset, or what friction holds"
+    else:
+        low, high = max(parts, key=lambda part: part[1] - part[0])
+        good = np.flatnonzero(work.trusted[low:high]) + low
+        theta = work.theta[good]
+        turns = 2 * math.pi * round(float(np.median(theta[theta.size // 2 :])) / (2 * math.pi))
+        peaks = swings(work.time[good], theta - turns, least=limit).peak
+        if peaks.size < 8:
+            return
+        middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
+        middles = middles[middles.size // 2 :]  # small swings: no friction's asymmetry, no turns
+        value = float(np.median(middles))
+        error = 1.6 * normal_scale(middles - value) / math.sqrt(middles.size)
+        error = max(error, work.count / math.sqrt(12 * middles.size))
+        said = f"it swings about {value:+.3g} +- {error:.1g} rad: an offset of the zero"
+    known = any(finding.what == "zero-offset" for finding in work.findings)
+    if abs(_folded(value)) > max(CERTAIN * error, 1e-5) and not known:
+        work.say("zero-offset", f"{said}; left to the fit")
+
+
+def _folded(angle: float) -> float:
+    return angle - 2 * math.pi * round(angle / (2 * math.pi))

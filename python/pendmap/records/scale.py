@@ -1,0 +1,235 @@
+"""The scale of angle and time, from what only a pendulum does: its period grows with its swing.
+
+    T(A) = T0 (2/pi) K(sin(A/2))
+
+A pendulum of 1 rad takes 6.6 % longer for a period than one of small swings. Readings in degrees
+that are taken for radians show the period of a small swing at all sizes, and sizes that no swing
+has.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.records.noise import normal_scale
+from pendmap.records.swings import swings
+from pendmap.records.zero import turn_to_rest
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Periods", "check", "periods_of"]
+
+DEGREE: Final = math.pi / 180
+
+LONGEST: Final = 60.0
+"""Seconds of a period that no pendulum in a laboratory has: it would hang 900 m high."""
+
+SHORTEST: Final = 0.02
+"""Seconds of a period that no pendulum has: 0.1 mm of length."""
+
+SAMPLES: Final = 8.0
+"""Samples a period under which the shape of a swing is lost; 2 are the least of any frequency."""
+
+UNLIKE: Final = 0.25
+"""Share by which a period may miss what is known of the rig: a starting value may be wrong."""
+
+FEWEST: Final = 6
+"""Periods that a relation is taken from."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Periods:
+    """Periods of a free swing against its size.
+
+    Parameters
+    ----------
+    amplitude : ndarray, shape (M,)
+        Of the reading, from its middle.
+    period : ndarray, shape (M,)
+        s.
+    """
+
+    amplitude: Floats
+    period: Floats
+
+    @property
+    def small(self) -> float:
+        """The period of the smallest swings, s: the median of the last third by size."""
+        third = np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
+        return float(np.median(self.period[third]))
+
+
+def check(work: Work) -> None:
+    """Mend milliseconds and degrees where nothing else is possible; say what does not agree."""
+    if work.plan.kind != "free":
+        _slow_sampling(work, None)
+        return
+    middle = float(np.median(work.theta[work.theta.size // 2 :]))
+    found = periods_of(work, middle)
+    if found is not None:
+        found = _seconds(work, found)
+        found = _radians(work, found)
+        _known(work, found)
+    _slow_sampling(work, found)
+    turn_to_rest(work)
+
+
+def periods_of(work: Work, middle: float) -> Periods | None:
+    """Return the periods of a record about its middle; none where there are too few."""
+    good = work.trusted
+    time, theta = work.time[good], work.theta[good] - middle
+    if time.size < 4 * FEWEST:
+        return None
+    noise = float(np.median(np.abs(np.diff(theta, 2)))) if theta.size > 2 else 0.0
+    reach = float(np.quantile(np.abs(theta), 0.98))
+    least = max(2.5 * work.count, min(4 * noise, 0.3 * reach), 0.02 * reach)
+    half = swings(time, theta, least=least)
+    if half.peak.size < FEWEST + 2:
+        return None
+    size = np.abs(half.peak)
+    # The mean of neighbours takes out a middle that is a little off, for odd and even half cycles.
+    amplitude = (size[:-2] + 2 * size[1:-1] + size[2:]) / 4
+    period = half.period
+    steady = np.abs(period / np.median(period) - 1) < 0.6
+    inside = steady & (amplitude > 4 * least)
+    if np.count_nonzero(inside) >= FEWEST:
+        steady = inside
+    if np.count_nonzero(steady) < FEWEST:
+        return None
+    return Periods(amplitude[steady], period[steady])
+
+
+def _seconds(work: Work, found: Periods) -> Periods:
+    """Take milliseconds (or less) for what they are."""
+    small = found.small
+    for name, factor in (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)):
+        if small <= LONGEST or not SHORTEST < small * factor < LONGEST:
+            continue
+        if "time" in work.declared:
+            text = f"a period of {small:.4g} s: times look like {name}, [columns] says otherwise"
+            work.say("time-unit", text)
+            return found
+        work.time *= factor
+        text = f"the times are {name}: as seconds the period would be {small:.4g} s"
+        work.say("time-unit", text, mended=True)
+        return Periods(found.amplitude, found.period * factor)
+    if not SHORTEST < small < LONGEST:
+        work.say("time-unit", f"a period of {small:.4g} s is no pendulum's: the unit is doubtful")
+    return found
+
+
+def _radians(work: Work, found: Periods) -> Periods:
+    """Take degrees for what they are; say what scale the periods speak for."""
+    largest = float(np.max(found.amplitude))
+    about = float(np.median(found.amplitude))
+    if largest > math.pi and about > 0:
+        degrees = largest * DEGREE <= math.pi
+        declared = "angle" in work.declared
+        text = f"swings of {largest:.4g} rad are no pendulum's"
+        if not degrees or declared:
+            work.say("angle-unit", f"{text}: the unit or the scale is wrong")
+            return found
+        _rescale(work, DEGREE)
+        work.say("angle-unit", f"the angles are degrees: {text}", mended=True)
+        return Periods(found.amplitude * DEGREE, found.period)
+    _curvature(work, found, largest)
+    return found
+
+
+def _rescale(work: Work, factor: float) -> None:
+    work.theta *= factor
+    work.count *= factor
+
+
+def _curvature(work: Work, found: Periods, largest: float) -> None:
+    """Say so where the period does not grow with the swing as a pendulum's does."""
+    grown = _growth(found.amplitude)
+    if largest > 3.0 or np.ptp(grown) < 2e-3 or found.period.size < FEWEST + 2:
+        return
+    columns = np.column_stack([np.ones(grown.size), grown - 1])
+    answer, spread = _robust_line(columns, found.period)
+    share = float(answer[1] / answer[0])
+    error = float(spread[1] / answer[0])
+    # 1 for radians; readings that are k times the angle show about 1/k^2.
+    if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
+        factor = _factor(found)
+        degrees = " (degrees?)" if share < 0.1 else ""
+        text = (
+            f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
+            f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is about"
+            f" {factor:.2g} times the reading{degrees}, or another force acts"
+        )
+        work.say("angle-scale", text)
+
+
+def _factor(found: Periods) -> float:
+    """Return what the readings are to be multiplied by for the periods of a pendulum."""
+    best, least = 1.0, math.inf
+    for factor in np.geomspace(0.01, 3.0 / float(np.max(found.amplitude)), 300).tolist():
+        grown = _growth(factor * found.amplitude)
+        away = found.period / grown
+        spread = normal_scale(away - np.median(away)) / float(np.median(away))
+        if spread < least:
+            best, least = factor, spread
+    return best
+
+
+def _growth(amplitude: Floats) -> Floats:
+    """Return T(A)/T0 by the arithmetic-geometric mean."""
+    a, b = np.ones_like(amplitude), np.abs(np.cos(amplitude / 2))
+    for _ in range(8):
+        a, b = (a + b) / 2, np.sqrt(a * b)
+    return np.asarray(1 / a)
+
+
+def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return coefficients and standard errors with outliers weighed down (Huber)."""
+    weights = np.ones(values.size)
+    for _ in range(8):
+        root = np.sqrt(weights)[:, None]
+        answer = np.linalg.lstsq(columns * root, values * root[:, 0], rcond=None)[0]
+        away = np.abs(values - columns @ answer)
+        scale = max(1.4826 * float(np.median(away)), 1e-12)
+        weights = np.minimum(1.0, 1.345 * scale / np.maximum(away, 1e-12))
+    inverse = np.linalg.pinv((columns * weights[:, None]).T @ columns)
+    return np.asarray(answer, float), scale * np.sqrt(np.diag(inverse))
+
+
+def _known(work: Work, found: Periods) -> None:
+    """Compare the period with what is known of the rig."""
+    w0 = work.known.get("w0")
+    said = f"w0 = {w0:g} rad/s" if w0 else ""
+    if not w0 and "gravity" in work.known and "length_m" in work.known:
+        w0 = math.sqrt(work.known["gravity"] / work.known["length_m"])
+        said = "gravity and length_m"
+    if not w0:
+        return
+    expected = 2 * math.pi / w0
+    seen = found.small
+    if float(np.min(found.amplitude)) < math.pi:
+        smallest = found.amplitude[np.argsort(found.amplitude)[: max(found.period.size // 3, 1)]]
+        seen /= float(np.median(_growth(np.minimum(smallest, 3.0))))
+    if abs(seen / expected - 1) > UNLIKE:
+        text = f"small swings take {seen:.4g} s, by {said} {expected:.4g} s: one of them is wrong"
+        work.say("period-unlike-rig", text)
+
+
+def _slow_sampling(work: Work, found: Periods | None) -> None:
+    interval = float(np.median(np.diff(work.time)))
+    if found is not None and found.small / interval < SAMPLES:
+        text = f"{found.small / interval:.1f} samples a period: the shape of the swing is lost"
+        work.say("sampling-slow", text)
+        return
+    fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.99))
+    if fastest > 1.0:
+        text = f"up to {fastest:.2g} rad from sample to sample: too slow for this motion"
+        work.say("sampling-slow", text)

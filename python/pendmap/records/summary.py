@@ -1,0 +1,137 @@
+"""What a record holds, as JSON and as text."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap.records.noise import noise_floor
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pendmap.records.experiment import Experiment, Finding, Run
+    from pendmap.records.noise import NoiseFloor
+
+__all__ = ["as_json", "as_text", "noise_said"]
+
+
+def as_json(experiment: Experiment) -> dict[str, Any]:
+    """Return the JSON object of ``pendmap look``.
+
+    Each of ``runs`` has ``channels``, ``rate_hz``, ``noise``, ``segments`` and ``findings``. So has
+    the whole: of one run, its own; of several, the median rate, the largest noise, and everything
+    with the run that it belongs to.
+    """
+    runs = [_run(run) for run in experiment.runs]
+    whole: dict[str, Any] = {"path": str(experiment.path), "known": dict(experiment.known)}
+    if len(runs) == 1:
+        (only,) = runs
+        whole |= {key: only[key] for key in ("channels", "rate_hz", "noise", "segments")}
+    else:
+        loudest = max(runs, key=lambda run: np.nan_to_num(run["noise"]["sigma"]))
+        whole["channels"] = {key: text for run in runs for key, text in run["channels"].items()}
+        whole["rate_hz"] = float(np.median([run["rate_hz"] for run in runs]))
+        whole["noise"] = loudest["noise"] | {"run": loudest["name"]}
+        whole["segments"] = [{"run": r["name"], **s} for r in runs for s in r["segments"]]
+    findings = [{"run": r["name"], **found} for r in runs for found in r["findings"]]
+    whole["findings"] = [_finding(found) for found in experiment.findings] + findings
+    whole["runs"] = runs
+    return whole
+
+
+def _run(run: Run) -> dict[str, Any]:
+    noise = dataclasses.asdict(noise_floor(run))
+    used = run.theta[run.trusted]
+    return {
+        "name": run.name,
+        "file": run.file,
+        "sha256": run.sha256,
+        "kind": run.kind,
+        "lab_time_s": run.lab_time_s,
+        "hold_out": run.hold_out,
+        "drive": None if run.drive is None else dict(run.drive),
+        "channels": dict(run.channels),
+        "samples": int(run.time.size),
+        "trusted": int(run.trusted.sum()),
+        "from_s": float(run.time[0]),
+        "to_s": float(run.time[-1]),
+        "rate_hz": run.rate_hz,
+        "theta_min": float(used.min()) if used.size else None,
+        "theta_max": float(used.max()) if used.size else None,
+        "count_rad": run.count_rad or None,
+        "peaks_only": run.peaks_only,
+        "noise": noise,
+        "segments": [dataclasses.asdict(segment) for segment in run.segments],
+        "findings": [_finding(found) for found in run.findings],
+    }
+
+
+def _finding(found: Finding) -> dict[str, Any]:
+    return dataclasses.asdict(found)
+
+
+def as_text(experiment: Experiment) -> str:
+    """Return what a record holds, in lines for people."""
+    lines = []
+    if experiment.known:
+        known = ", ".join(f"{name} {value:g}" for name, value in experiment.known.items())
+        lines.append(f"rig       {known}")
+    lines += [f"- {found.text}  [{found.what}]" for found in experiment.findings]
+    for run in experiment.runs:
+        if lines:
+            lines.append("")
+        lines += _lines(run)
+    return "\n".join(lines)
+
+
+def _lines(run: Run) -> Iterator[str]:
+    held = ", held out" if run.hold_out else ""
+    yield f"{run.name} ({run.kind}{held})"
+    channels = ", ".join(f"{channel} from {column!r}" for channel, column in run.channels.items())
+    yield f"  channels  {channels}"
+    span = f"{run.time[0]:.6g} to {run.time[-1]:.6g} s"
+    what = "turning point" if run.peaks_only else "sample"
+    rate = "" if run.peaks_only else f" at {run.rate_hz:.5g} Hz"
+    yield f"  samples   {run.time.size} {what}s{rate}, {span}; {run.trusted.sum()} for fitting"
+    yield f"  angle     {run.theta.min():.4g} to {run.theta.max():.4g} rad{_steps(run)}"
+    if run.drive is not None:
+        phi = run.drive["phi"]
+        phase = "phi to be fitted" if phi is None else f"phi = {phi:g}"
+        yield f"  drive     p = {run.drive['p']:g}, Omega = {run.drive['Omega']:g} rad/s, {phase}"
+    if not run.peaks_only:
+        yield f"  noise     {noise_said(noise_floor(run))}"
+    for segment in run.segments:
+        used = "for fitting" if segment.used else "not for fitting"
+        yield f"  {segment.what:<9} {segment.from_s:.6g} to {segment.to_s:.6g} s, {used}"
+    mended = sum(found.mended for found in run.findings)
+    count = counted(len(run.findings), "finding")
+    yield f"  {count}, {mended} of them mended" if run.findings else "  nothing odd was found"
+    for found in run.findings:
+        mark = "mended: " if found.mended else ""
+        where = f" ({found.where})" if found.where.startswith(("row", "line")) else ""
+        yield f"  - {mark}{found.text}{where}  [{found.what}]"
+
+
+def _steps(run: Run) -> str:
+    if not run.count_rad:
+        return ""
+    return f", in steps of {run.count_rad:.4g} rad ({2 * math.pi / run.count_rad:.5g} a turn)"
+
+
+def noise_said(noise: NoiseFloor) -> str:
+    """Return the noise in words."""
+    if not math.isfinite(noise.sigma):
+        return "too few samples to tell"
+    degrees = math.degrees(noise.sigma)
+    said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} rad ({degrees:.2g} degrees)"
+    if noise.limited_by_count:
+        return f"{said}, that of counting: the record shows no more"
+    slow, fast = noise.by_speed[0], noise.by_speed[-1]
+    if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
+        said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high speed"
+    return said

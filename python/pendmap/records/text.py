@@ -1,0 +1,267 @@
+"""Text as loggers write it: encoding, separators, decimal commas, headers, broken lines."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import re
+from collections import Counter
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.records.experiment import Finding
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.records.description import Reader
+
+__all__ = ["Table", "decoded", "parsed"]
+
+LOOKED_AT: Final = 400
+"""Lines, from all over a file, that its separators are found from."""
+
+ENOUGH: Final = 0.5
+"""Share of the lines that must be rows of numbers; a log with more noise than that is none."""
+
+MOST_CONTROLS: Final = 0.02
+"""Share of control characters above which a file is no text."""
+
+MOST_NULS: Final = 0.2
+"""Share of NUL bytes above which a file is no text: a logger that loses power leaves some."""
+
+WAYS: Final = (
+    *((";", ","), ("\t", ","), ("\t", "."), (";", "."), (",", ".")),
+    *(("|", "."), (" ", "."), (" ", ","), (",", ",")),
+)
+"""Separators with decimal signs, in the order in which they are believed."""
+
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_NOTHING: Final = frozenset(
+    ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity")
+)
+_CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """Columns of numbers, and where they stand in the file.
+
+    Parameters
+    ----------
+    names : tuple of str
+        What heads each column; empty texts where there is no header.
+    values : ndarray, shape (rows, columns)
+        ``nan`` where there is no number.
+    rows : ndarray of int, shape (rows,)
+        Line of the file, from 1 (of a Parquet file: row of the table).
+    findings : tuple of Finding
+        What was odd about the text.
+    headed : bool
+        Whether there is a header.
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    rows: NDArray[np.intp]
+    findings: tuple[Finding, ...] = ()
+    headed: bool = True
+
+
+def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
+    """Return a file's text; NUL bytes of an interrupted logger are left out, and said.
+
+    Raises
+    ------
+    InputError
+        If it is no text.
+    """
+    findings: list[Finding] = []
+    if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
+        raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
+    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+        return data.decode("utf-16", errors="replace"), findings
+    nuls = data.count(b"\0")
+    if nuls > MOST_NULS * len(data) and data[1::2].count(b"\0") > 0.9 * nuls:
+        return data.decode("utf-16-le", errors="replace"), findings
+    if nuls > MOST_NULS * len(data):
+        raise InputError(f"{where}: is no text: allowed are CSV (or other text) and Parquet")
+    if nuls:
+        data = data.replace(b"\0", b"")
+        text = f"{counted(nuls, 'NUL byte')} left out"
+        findings.append(Finding("nul-bytes", text, mended=True))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    if len(_CONTROLS.findall(text)) > MOST_CONTROLS * len(text):
+        raise InputError(f"{where}: is no text: allowed are CSV (or other text) and Parquet")
+    return text, findings
+
+
+def parsed(text: str, reader: Reader, where: str) -> Table:
+    """Return the table that a text holds.
+
+    Raises
+    ------
+    InputError
+        If there are no rows of two numbers or more.
+    """
+    import pandas as pd
+
+    whole = text.endswith(("\n", "\r"))
+    lines = [(k, line) for k, line in enumerate(re.split(r"\r\n|\n|\r", text), 1) if line.strip()]
+    lines = [(k, line) for k, line in lines if k > reader.skip_rows]
+    if not lines:
+        raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
+    delimiter, decimal, width = _way(lines, reader, where)
+    fits = [_fits(line, delimiter, decimal, width) for _, line in lines]
+    first = fits.index(True)
+    findings = []
+    if fits[-1] and not whole and _cut(lines, fits, delimiter):
+        fits[-1] = False
+        findings.append(Finding("half-line", "the last line breaks off and is left out", True))  # noqa: FBT003
+    names, headed = _header([line for _, line in lines[:first]], delimiter, width)
+    if headed and len(names) != width:
+        raise InputError(
+            f"{where}: {len(names)} columns have names and {width} have numbers: allowed are as"
+            " many; decimal commas need another delimiter, like ;"
+        )
+    dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
+    if dropped and not (findings and len(dropped) == 1):
+        shown = ", ".join(map(str, dropped[:3])) + (", ..." if len(dropped) > 3 else "")
+        said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
+        findings.append(Finding("unreadable-lines", said, True, f"line {shown}"))  # noqa: FBT003
+    rows = [k for (k, _), fit in zip(lines, fits, strict=True) if fit]
+    kept = "\n".join(line.strip(" ") for (_, line), fit in zip(lines, fits, strict=True) if fit)
+    try:
+        frame = pd.read_csv(
+            io.StringIO(kept),
+            sep=r"\s+" if delimiter == " " else delimiter,
+            header=None,
+            names=list(range(width)),
+            index_col=False,
+            dtype=str,
+            keep_default_na=False,
+            skipinitialspace=True,
+        )
+    except (ValueError, pd.errors.ParserError) as error:
+        raise InputError(f"{where}: cannot be read: {' '.join(str(error).split())}") from None
+    values = np.column_stack([_numbers(frame[k], decimal) for k in range(width)])
+    return Table(names, values, np.asarray(rows), tuple(findings), headed)
+
+
+def _numbers(column: object, decimal: str) -> NDArray[np.float64]:
+    import pandas as pd
+
+    texts = pd.Series(column).astype(str).str.strip()
+    if decimal != ".":
+        texts = texts.str.replace(decimal, ".", regex=False)
+    numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
+    numbers[~np.isfinite(numbers)] = np.nan
+    return np.asarray(numbers)
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        try:
+            return [part.strip() for part in next(csv.reader([line], delimiter=delimiter))]
+        except (csv.Error, StopIteration):
+            return [line]
+    return [part.strip() for part in line.split(delimiter)]
+
+
+def _is_row(parts: list[str], decimal: str) -> int:
+    """Return how many numbers a line has; 0 if anything in it is neither number nor nothing."""
+    numbers = 0
+    for part in parts:
+        text = part if decimal == "." else part.replace(decimal, ".", 1) if "." not in part else "?"
+        if _NUMBER.fullmatch(text):
+            numbers += 1
+        elif part.lower() not in _NOTHING:
+            return 0
+    return numbers
+
+
+def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str, str, int]:
+    """Return delimiter, decimal sign and number of columns: whatever makes most lines rows."""
+    step = max(len(lines) // LOOKED_AT, 1)
+    sample = [line for _, line in lines[::step]]
+    best: tuple[float, tuple[str, str, int]] = (0.0, (",", ".", 0))
+    ways = [
+        (reader.delimiter or delimiter, reader.decimal or decimal) for delimiter, decimal in WAYS
+    ]
+    for delimiter, decimal in dict.fromkeys(ways):
+        if delimiter == decimal and not any('"' in line for line in sample):
+            continue
+        widths = Counter(
+            len(parts)
+            for parts in (_split(line, delimiter) for line in sample)
+            if len(parts) > 1 and _is_row(parts, decimal) > 1
+        )
+        if widths:
+            width, count = widths.most_common(1)[0]
+            if count > best[0]:
+                best = (float(count), (delimiter, decimal, width))
+    if best[0] < ENOUGH * len(sample) and best[0] < len(sample) - _HEADS:
+        raise InputError(
+            f"{where}: has no rows of numbers in two columns or more: allowed is CSV with a time"
+            " and an angle; what it is separated by may stand in [reader] of experiment.toml"
+        )
+    if best[0] == 0:
+        raise InputError(
+            f"{where}: has no rows of numbers in two columns or more: allowed is CSV with a time"
+            " and an angle"
+        )
+    return best[1]
+
+
+_HEADS: Final = 30
+"""Lines that may stand above the numbers of a short file."""
+
+
+def _fits(line: str, delimiter: str, decimal: str, width: int) -> bool:
+    parts = _split(line, delimiter)
+    return len(parts) == width and _is_row(parts, decimal) > 0
+
+
+def _cut(lines: list[tuple[int, str]], fits: list[bool], delimiter: str) -> bool:
+    """Whether a last line without an end has fewer digits than all before it have."""
+    before = [line for (_, line), fit in zip(lines[-21:-1], fits[-21:-1], strict=True) if fit]
+    last = _split(lines[-1][1], delimiter)[-1]
+    digits = {_decimals(_split(line, delimiter)[-1]) for line in before}
+    return len(digits) == 1 and _decimals(last) < next(iter(digits))
+
+
+def _decimals(number: str) -> int:
+    return len(re.split(r"[.,]", number)[1]) if re.search(r"[.,]", number) else 0
+
+
+def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ...], bool]:
+    """Return the names above the numbers, a line of units under them included."""
+    heads = [_split(line.lstrip("#% "), delimiter) for line in lines[-3:]]
+    heads = [[part.strip('"') for part in head] for head in heads if len(head) > 1]
+    if heads and delimiter == "," and len(heads[-1]) != width and len(heads[-1]) * 2 == width:
+        return tuple(heads[-1]), True  # decimal commas between commas: refused by the caller
+    heads = [head for head in heads if len(head) == width and any(head)]
+    if not heads:
+        return ("",) * width, False
+    names = heads[-1]
+    if len(heads) > 1 and all(re.fullmatch(r"[\(\[]?[^\d\s]{0,6}\d?[\)\]]?", n) for n in names):
+        units = [name.strip("()[] ") for name in names]
+        above = heads[-2]
+        if any(_unit(unit) for unit in units) and any(len(name) > 0 for name in above):
+            names = [f"{a} [{u}]" if u else a for a, u in zip(above, units, strict=True)]
+    return tuple(names), True
+
+
+def _unit(text: str) -> bool:
+    from pendmap.records.units import CHANNELS
+
+    return len(text) > 0 and any(channel.has(text) for channel in CHANNELS.values())

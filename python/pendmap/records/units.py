@@ -1,0 +1,212 @@
+"""The channels of a record, the units they come in, and the names that tools give them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from typing import TYPE_CHECKING, Final
+
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["CHANNELS", "PIVOT_UNITS", "Channel", "name_and_unit", "plain"]
+
+PIVOT_UNITS: Final = {
+    "m/s2": ("m/s2", 1.0),
+    "g": ("m/s2", 9.80665),
+    "m/s": ("m/s", 1.0),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+}
+"""Units of a recorded pivot: what they are in SI, and how much of it."""
+
+_TURN: Final = 2 * math.pi
+_DEGREE: Final = math.pi / 180
+
+
+@dataclasses.dataclass(frozen=True)
+class Channel:
+    """What a column may hold.
+
+    Parameters
+    ----------
+    unit : str
+        In SI.
+    units : mapping of str to float
+        How much of SI each unit is, by its plain spelling.
+    default : str
+        The column's name where nothing is said.
+    names : tuple of str
+        Patterns of other names, plain (lower case, without unit).
+    """
+
+    unit: str
+    units: Mapping[str, float]
+    default: str
+    names: tuple[str, ...]
+
+    def factor(self, unit: str, where: str) -> float:
+        """Return how much of SI a unit is.
+
+        Raises
+        ------
+        InputError
+            If it is not one of this channel's.
+        """
+        spelled = _spelling(unit)
+        if spelled in self.units:
+            return self.units[spelled]
+        if spelled in _RAW:
+            raise InputError(
+                f"{where}: unit is {unit!r}: allowed beside it is scale, {self.unit} per {unit},"
+                " in [columns] of experiment.toml"
+            )
+        raise InputError(
+            f"{where}: unit is {unit!r}: allowed are {', '.join(self.units)}, or a scale,"
+            f" {self.unit} per unit"
+        )
+
+    def has(self, unit: str) -> bool:
+        """Whether a text is one of the channel's units, raw ones included."""
+        return _spelling(unit) in self.units or _spelling(unit) in _RAW
+
+
+_RAW: Final = ("v", "mv", "volt", "volts", "count", "counts", "tick", "ticks", "adc", "lsb")
+
+_TIMES: Final = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "usec", "micros", "microsecond", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nsec", "nanoseconds"), 1e-9),
+    **dict.fromkeys(("min", "minutes"), 60.0),
+    **dict.fromkeys(("h", "hours"), 3600.0),
+}
+_ANGLES: Final = {
+    **dict.fromkeys(("rad", "radian", "radians"), 1.0),
+    "mrad": 1e-3,
+    **dict.fromkeys(("deg", "degree", "degrees", "grad", "°"), _DEGREE),
+    **dict.fromkeys(("rev", "turn", "turns", "revolutions"), _TURN),
+}
+_SPEEDS: Final = {
+    **dict.fromkeys(("rad/s", "rads", "1/s"), 1.0),
+    "mrad/s": 1e-3,
+    **dict.fromkeys(("deg/s", "°/s", "dps", "degs"), _DEGREE),
+    "rpm": _TURN / 60,
+    **dict.fromkeys(("rev/s", "rps"), _TURN),
+}
+_ACCELERATIONS: Final = {
+    **dict.fromkeys(("m/s2", "m/s/s", "ms-2", "m/ss"), 1.0),
+    "g": 9.80665,
+    "rad/s2": 1.0,
+}
+_LENGTHS: Final = {
+    **dict.fromkeys(("px", "pixel", "pixels"), 1.0),
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+}
+
+CHANNELS: Final = {
+    "time": Channel(
+        "s",
+        _TIMES,
+        "t_s",
+        (
+            "t",
+            "time",
+            "zeit",
+            "temps",
+            "tiempo",
+            "tempo",
+            "time ?stamp",
+            "elapsed( time)?",
+            "clock",
+            "seconds_elapsed",
+        ),
+    ),
+    "angle": Channel(
+        "rad",
+        _ANGLES,
+        "theta_rad",
+        (
+            "theta",
+            "θ",
+            "th",
+            "angle",
+            "winkel",
+            "alpha",
+            "phi",
+            "φ",
+            "encoder",
+            "ang(le)? ?pos(ition)?",
+            "angular position",
+            "volts?",
+            "voltage",
+            "counts?",
+            "adc",
+        ),
+    ),
+    "velocity": Channel(
+        "rad/s",
+        _SPEEDS,
+        "velocity_rad_s",
+        (
+            "omega",
+            "ω",
+            "(angular )?velocity",
+            "theta ?dot",
+            "dtheta",
+            "gyro(scope)?( ?[xyz])?",
+            "rot(ation)? ?rate( ?[xyz])?",
+            "w[xyz]?",
+            "omega filtered",
+        ),
+    ),
+    "acceleration": Channel(
+        "m/s2",
+        _ACCELERATIONS,
+        "acceleration_m_s2",
+        ("(linear )?acc(el|eleration)?( ?[xyz])?", "a[xyz]?"),
+    ),
+    "pixel_x": Channel("px", _LENGTHS, "pixel_x", ("x", "pixel ?x", "x ?pixel", "px x", "pos ?x")),
+    "pixel_y": Channel("px", _LENGTHS, "pixel_y", ("y", "pixel ?y", "y ?pixel", "px y", "pos ?y")),
+    "peaks": Channel("rad", _ANGLES, "peak_rad", ("peaks?", "amplitudes?", "turning points?")),
+    "trigger": Channel("1", {"1": 1.0, "v": 1.0}, "trigger", ("trigger", "trig", "sync")),
+}
+"""By name, in the order in which columns are tried."""
+
+_IN_BRACKETS: Final = re.compile(r"^(?P<name>.*?)\s*[\(\[\{](?P<unit>[^\)\]\}]*)[\)\]\}]\s*$")
+_AFTER: Final = re.compile(r"^(?P<name>[^/]+?)\s*(?:/\s*|,\s*|\s+in\s+)(?P<unit>.+)$")
+_BEHIND: Final = re.compile(r"^(?P<name>.+?)[_ ](?P<unit>[a-zµ°]+(?:_s2?)?)$", re.IGNORECASE)
+
+
+def _spelling(unit: str) -> str:
+    """Return a unit as the tables above spell it."""
+    text = unit.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
+    text = text.replace("µ", "u").replace("μ", "u").replace("·", "").replace(" ", "")
+    text = text.replace("º", "°").replace("s⁻¹", "/s").replace("s-1", "/s")
+    return re.sub(r"_s(2?)$", r"/s\1", text)
+
+
+def plain(name: str) -> str:
+    """Return a name as the patterns spell it."""
+    return " ".join(name.strip().lower().replace("_", " ").replace("-", " ").split())
+
+
+def name_and_unit(header: str) -> tuple[str, str | None]:
+    """Split what heads a column into name and unit.
+
+    >>> name_and_unit("Time (s)"), name_and_unit("t/ms"), name_and_unit("theta_rad")
+    (('Time', 's'), ('t', 'ms'), ('theta', 'rad'))
+    """
+    for pattern in (_IN_BRACKETS, _AFTER, _BEHIND):
+        match = pattern.match(header.strip())
+        if match and any(c.has(match["unit"]) for c in CHANNELS.values()):
+            return match["name"].strip(), match["unit"].strip()
+    match = _IN_BRACKETS.match(header.strip())
+    if match:  # a unit that nobody knows is named when it is needed
+        return match["name"].strip(), match["unit"].strip() or None
+    return header.strip(), None

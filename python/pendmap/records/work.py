@@ -1,0 +1,143 @@
+"""A record on its way from the table to a run: what each check sees and may change."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.records.experiment import Finding, Segment
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from pendmap.records.channels import Channels
+    from pendmap.records.description import RunPlan
+    from pendmap.records.text import Table
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["FEWEST", "Work"]
+
+FEWEST = 5
+"""Samples that a record must have; fewer show no swing."""
+
+_FEWEST_PEAKS = 3
+
+
+@dataclasses.dataclass
+class Work:
+    """One record while it is read; all arrays have one length.
+
+    ``extra`` holds further channels by name, those of the pivot as ``pivot:vertical`` and
+    ``pivot:horizontal``.
+    """
+
+    where: str
+    plan: RunPlan
+    known: Mapping[str, Any]
+    declared: frozenset[str]
+    time: Floats
+    theta: Floats
+    rows: NDArray[np.intp]
+    extra: dict[str, Floats]
+    trusted: NDArray[np.bool_]
+    findings: list[Finding]
+    segments: list[Segment] = dataclasses.field(default_factory=list)
+    count: float = 0.0
+    peaks_only: bool = False
+
+    @classmethod
+    def begin(
+        cls,
+        where: str,
+        plan: RunPlan,
+        known: Mapping[str, Any],
+        channels: Channels,
+        table: Table,
+    ) -> Work:
+        """Take the channels of a table; nothing is an angle yet unless a channel is one."""
+        extra = {name: values.copy() for name, values in channels.values.items() if name != "time"}
+        for way, values in (channels.pivot or {}).items():
+            extra[f"pivot:{way}"] = values.copy()
+        time = channels.values["time"].copy()
+        return cls(
+            where=where,
+            plan=plan,
+            known=known,
+            declared=channels.declared,
+            time=time,
+            theta=extra.pop("angle", np.zeros(time.size)),
+            rows=table.rows.copy(),
+            extra=extra | ({} if "angle" in channels.values else {"no angle": np.zeros(time.size)}),
+            trusted=np.ones(time.size, bool),
+            findings=[*table.findings, *channels.findings],
+        )
+
+    def say(
+        self,
+        what: str,
+        text: str,
+        *,
+        mended: bool = False,
+        at: NDArray[np.intp] | None = None,
+        span: tuple[float, float] | None = None,
+    ) -> None:
+        """Note a finding, at samples or over a span of time."""
+        where = ""
+        if at is not None and at.size:
+            shown = ", ".join(str(int(self.rows[k])) for k in at[:3])
+            where = f"{'rows' if at.size > 1 else 'row'} {shown}{', ...' if at.size > 3 else ''}"
+            span = span or (float(self.time[at[0]]), float(self.time[at[-1]]))
+        if span is not None and not all(map(math.isfinite, span)):
+            span = None
+        low, high = span or (None, None)
+        self.findings.append(Finding(what, text, mended, where, low, high))
+
+    def keep(self, which: NDArray[Any]) -> None:
+        """Keep some samples, in the order given."""
+        self.time, self.theta = self.time[which], self.theta[which]
+        self.rows, self.trusted = self.rows[which], self.trusted[which]
+        self.extra = {name: values[which] for name, values in self.extra.items()}
+
+    def cut(self, low: float | None, high: float | None) -> None:
+        """Keep the part of the file that the run is said to be."""
+        if low is None and high is None:
+            return
+        first, last = float(self.time[0]), float(self.time[-1])
+        low, high = -math.inf if low is None else low, math.inf if high is None else high
+        self.keep((self.time >= low) & (self.time <= high))
+        if self.time.size < FEWEST:
+            raise InputError(
+                f"{self.where}: from_s and to_s leave {self.time.size} samples: allowed are times"
+                f" within {first:g} to {last:g} s"
+            )
+
+    def refuse_short(self) -> None:
+        """Refuse what is too short for a record.
+
+        Raises
+        ------
+        InputError
+            If there are fewer samples than show a swing.
+        """
+        least = _FEWEST_PEAKS if self.peaks_only else FEWEST
+        if self.time.size < least:
+            raise InputError(
+                f"{self.where}: has {self.time.size} samples with time and angle: allowed are"
+                f" {least} and more"
+            )
+
+    def pivot(self) -> dict[str, Floats] | None:
+        """The pivot's recorded motion, if there is any."""
+        found = {
+            name.removeprefix("pivot:"): values
+            for name, values in self.extra.items()
+            if name.startswith("pivot:")
+        }
+        return found or None

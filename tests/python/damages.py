@@ -1,0 +1,287 @@
+"""What can become of a record on its way: each kind made from a clean one."""
+
+from __future__ import annotations
+
+import dataclasses
+import gzip
+import io
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from recorded import COUNT, text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["DAMAGES", "DESCRIPTIONS", "Damage"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Damage:
+    """A kind of damage: what makes it, which findings it must lead to, or how it is refused."""
+
+    make: Callable[[str], str | bytes]
+    says: tuple[str, ...] | None = ()
+    refused: str = ""
+    suffix: str = ".csv"
+
+
+def arrays(change: Callable[[Floats, Floats], tuple[Floats, Floats]]) -> Callable[[str], str]:
+    """Change the numbers of a record."""
+
+    def make(sound: str) -> str:
+        time, theta = np.loadtxt(io.StringIO(sound), delimiter=",", skiprows=1).T
+        return text(change(time.copy(), theta.copy()), form="%.10g")
+
+    return make
+
+
+def lines(change: Callable[[list[str]], list[str]]) -> Callable[[str], str]:
+    """Change the lines of a record; the first is its header."""
+    return lambda sound: "\n".join(change(sound.splitlines())) + "\n"
+
+
+def at(values: Floats, places: object, new: object) -> Floats:
+    """Put values at places."""
+    values[places] = new  # type: ignore[index]
+    return values
+
+
+def every(row: str, k: int) -> Callable[[str], str]:
+    """Put a row between every k rows."""
+    return lines(
+        lambda rows: [
+            part
+            for n, line in enumerate(rows)
+            for part in ([line, row] if n and n % k == 0 else [line])
+        ]
+    )
+
+
+def parquet(change: Callable[[pd.DataFrame], pd.DataFrame]) -> Callable[[str], bytes]:
+    """Write a record as Parquet."""
+
+    def make(sound: str) -> bytes:
+        buffer = io.BytesIO()
+        change(pd.read_csv(io.StringIO(sound))).to_parquet(buffer)
+        return buffer.getvalue()
+
+    return make
+
+
+def bad(make: Callable[[str], str | bytes], refused: str, suffix: str = ".csv") -> Damage:
+    """What is refused."""
+    return Damage(make, None, refused, suffix)
+
+
+def said(make: Callable[[str], str | bytes], *keys: str, suffix: str = ".csv") -> Damage:
+    """What is read, and said."""
+    return Damage(make, keys, suffix=suffix)
+
+
+def _again(a: Floats) -> tuple[Floats, Floats]:
+    """A hand takes the pendulum, carries it back in 1 s, holds it 0.3 s, and lets it go."""
+    carried = a[-1] + (a[0] - a[-1]) * (1 - np.cos(np.pi * np.arange(100) / 100)) / 2
+    theta = np.r_[a, carried, np.full(30, a[0]), a[:600]]
+    return np.arange(theta.size) / 100, theta
+
+
+def _lossy(t: Floats, a: Floats, share: float) -> tuple[Floats, Floats]:
+    kept = np.random.default_rng(3).random(t.size) > share
+    return t[kept], a[kept]
+
+
+def _swapped(t: Floats) -> Floats:
+    t[[300, 301]] = t[[301, 300]]
+    return t
+
+
+RNG = np.random.default_rng(7)
+MISSING = ("-", "NaN", "nan", "", "null", "N/A", "inf", "-inf", "#N/A")
+
+TEXTS = {
+    "empty": bad(lambda _: "", "is empty"),
+    "blanks": bad(lambda _: " \n\n \t\n", "is empty"),
+    "nul bytes alone": bad(lambda _: b"\0" * 500, "is empty"),
+    "only a header": bad(lambda s: s.splitlines()[0] + "\n", "no rows of numbers"),
+    "one row": bad(lambda s: "\n".join(s.splitlines()[:2]), "1 samples"),
+    "two rows": bad(lambda s: "\n".join(s.splitlines()[:3]), "2 samples"),
+    "four rows": bad(lambda s: "\n".join(s.splitlines()[:5]), "4 samples"),
+    "one column": bad(lambda s: "\n".join(r.split(",")[0] for r in s.splitlines()), "no rows"),
+    "random bytes": bad(lambda _: RNG.bytes(5000), ""),
+    "a picture": bad(lambda _: b"\x89PNG\r\n\x1a\n" + RNG.bytes(3000), ""),
+    "a workbook": bad(lambda _: b"PK\x03\x04" + RNG.bytes(3000), "Excel"),
+    "an old workbook": bad(lambda _: b"\xd0\xcf\x11\xe0" + RNG.bytes(3000), "Excel"),
+    "compressed": bad(lambda s: gzip.compress(s.encode()), "compressed"),
+    "hdf5": bad(lambda _: b"\x89HDF\r\n\x1a\n" + RNG.bytes(300), "HDF5"),
+    "matlab": bad(lambda _: b"MATLAB 5.0 MAT-file" + bytes(300), "MATLAB"),
+    "prose": bad(lambda _: "It was a dark and stormy night;\nthe rain fell.\n" * 40, "no rows"),
+    "html": bad(lambda _: "<html><body>\n<p>404, not found</p>\n</body></html>\n", "no rows"),
+    "json": bad(lambda _: '{"t_s": [0, 1, 2],\n "theta_rad": [1, 2, 3]}\n', "no rows"),
+    "other names": bad(lambda s: s.replace("t_s,theta_rad", "foo,bar"), "no column of times"),
+    "no angle": bad(lambda s: s.replace("theta_rad", "humidity"), "no column of angles"),
+    "volts": bad(lambda s: s.replace("theta_rad", "volts"), "scale"),
+    "furlongs": bad(lambda s: s.replace("theta_rad", "theta (furlongs)"), "furlongs"),
+    "acceleration alone": bad(lambda s: s.replace("theta_rad", "acc_x (m/s2)"), "acceleration"),
+    "decimal commas between commas": bad(
+        lambda s: s.splitlines()[0] + "\n" + s.split("\n", 1)[1].replace(".", ","), "delimiter"
+    ),
+    "half a line": said(lambda s: s[:-9], "half-line"),
+    "half a line without the angle": said(lambda s: s + "10.01", "unreadable-lines"),
+    "nul bytes at the end": said(lambda s: s.encode() + b"\0" * 60, "nul-bytes"),
+    "nul bytes inside": said(lambda s: s.encode().replace(b"\n", b"\0\n", 50), "nul-bytes"),
+    "noise lines at the start": said(lambda s: "boot v1.2\n~~\xff?\nok\n" + s),
+    "a message between rows": said(every("WARNING: buffer 80 % full", 100), "unreadable-lines"),
+    "headers again": said(every("t_s,theta_rad", 200), "unreadable-lines"),
+    "a column too many in places": said(every("1.0,2.0,3.0", 300), "unreadable-lines"),
+    "a trailing comma": said(lambda s: s.replace("\n", ",\n")),
+    "windows lines": said(lambda s: s.replace("\n", "\r\n")),
+    "old mac lines": said(lambda s: s.replace("\n", "\r")),
+    "mixed lines": said(lambda s: s.replace("\n", "\r\n", 300)),
+    "a mark before the text": said(lambda s: b"\xef\xbb\xbf" + s.encode()),
+    "utf-16": said(lambda s: s.encode("utf-16")),
+    "utf-16 without a mark": said(lambda s: s.encode("utf-16-le")),
+    "latin-1": said(lambda s: s.replace("theta_rad", "Winkel [°]").encode("latin-1")),
+    "empty lines": said(lambda s: s.replace("\n", "\n\n")),
+    "blanks around": said(lambda s: s.replace(",", "  ,  ").replace("\n", "  \n")),
+    "quotes": said(lambda s: '"' + s.strip().replace(",", '","').replace("\n", '"\n"') + '"\n'),
+    "semicolons": said(lambda s: s.replace(",", ";")),
+    "tabs": said(lambda s: s.replace(",", "\t")),
+    "blanks between": said(lambda s: s.replace(",", "   ")),
+    "decimal commas": said(lambda s: s.replace(",", ";").replace(".", ",")),
+    "quoted decimal commas": said(
+        lambda s: "\n".join(
+            ",".join(f'"{part}"'.replace(".", ",") for part in row.split(","))
+            for row in s.splitlines()
+        )
+    ),
+    "no header": said(lambda s: s.split("\n", 1)[1], "columns-guessed"),
+    "comments": said(lambda s: "# pendulum 3\n# 2024-05-01\n" + s),
+    "a line of units": said(lambda s: s.replace("t_s,theta_rad", "t,theta\ns,rad"), "columns-guessed"),
+    **{
+        f"missing as {word or 'nothing'}": said(
+            lines(lambda r, w=word: [x if k % 97 else x.split(",")[0] + "," + w for k, x in enumerate(r, 1)]),
+            "angle-missing",
+        )
+        for word in MISSING
+    },
+    "parquet": said(parquet(lambda f: f), suffix=".parquet"),
+    "parquet with dates": said(
+        parquet(lambda f: f.assign(t_s=pd.Timestamp(2024, 5, 1) + pd.to_timedelta(f.t_s, "s"))),
+        suffix=".parquet",
+    ),
+    "parquet with words": bad(
+        parquet(lambda f: f.assign(theta_rad="x")), "0 samples", ".parquet"
+    ),
+    "parquet without rows": bad(parquet(lambda f: f.iloc[:0]), "is empty", ".parquet"),
+    "parquet cut": bad(lambda s: parquet(lambda f: f)(s)[:900], "Parquet", ".parquet"),
+    "csv called parquet": bad(lambda s: s, "Parquet", ".parquet"),
+}  # fmt: skip
+
+TIMES = {
+    "times not there": bad(arrays(lambda t, a: (t * np.nan, a)), "no rows of numbers"),
+    "times all equal": bad(arrays(lambda t, a: (t * 0, a)), "do not increase"),
+    "some times missing": said(arrays(lambda t, a: (at(t, slice(50, 60), np.nan), a)), "time-missing"),
+    "times backwards": said(arrays(lambda t, a: (t[::-1], a[::-1])), "time-backwards"),
+    "two rows exchanged": said(arrays(lambda t, a: (_swapped(t), a)), "time-backwards"),
+    "rows shuffled": bad(arrays(lambda t, a: (RNG.permutation(t), a)), "out of order"),
+    "rows in another order": said(arrays(lambda t, a: tuple(RNG.permutation(np.c_[t, a]).T)), "time-backwards"),
+    "one false stamp": said(arrays(lambda t, a: (at(t, 400, 1e9), a)), "time-backwards"),
+    "one stamp of zero": said(arrays(lambda t, a: (at(t, 400, 0.0), a)), "time-backwards"),
+    "a repeated row": said(every("0.500000,0.1", 2000)),
+    "stamps twice": said(arrays(lambda t, a: (np.repeat(t, 2), np.repeat(a, 2))), "time-duplicate"),
+    "a coarse clock": said(arrays(lambda t, a: (np.floor(t / 0.03) * 0.03, a)), "time-coarse"),
+    "jitter": said(arrays(lambda t, a: (t + RNG.normal(0, 1e-3, t.size), a)), "time-jitter"),
+    "a gap": said(arrays(lambda t, a: (np.delete(t, slice(300, 350)), np.delete(a, slice(300, 350)))), "time-gap"),
+    "many gaps": said(arrays(lambda t, a: _lossy(t, a, 0.05)), "time-gap"),
+    "uneven": said(arrays(lambda t, a: _lossy(t, a, 0.4)), "time-uneven"),
+    "milliseconds": said(arrays(lambda t, a: (t * 1e3, a)), "time-unit"),
+    "microseconds": said(arrays(lambda t, a: (t * 1e6, a)), "time-unit"),
+    "a clock that starts again": said(arrays(lambda t, a: (np.where(t < 4, t, t - 4), a)), "time-restarts"),
+    "a counter of 16 bits": said(arrays(lambda t, a: ((t + 60) % 65.536, a)), "time-wrapped"),
+    "since 1970": said(arrays(lambda t, a: (np.round(t, 2) + 1_700_000, a))),
+    "negative times": said(arrays(lambda t, a: (t - 100, a))),
+    "sampled slowly": said(arrays(lambda t, a: (t[::15], a[::15])), "sampling-slow"),
+    "time twice": bad(lambda s: "t_s,theta_rad\n" + "\n".join(r.split(",")[0] + "," + r.split(",")[0] + "e9" for r in s.splitlines()[1:]), ""),
+}  # fmt: skip
+
+ANGLES = {
+    "no angles": bad(arrays(lambda t, a: (t, a * np.nan)), "no rows of numbers"),
+    "an angle that never changes": bad(arrays(lambda t, a: (t, a * 0 + 0.3)), "never changes"),
+    "noise alone": said(arrays(lambda t, a: (t, RNG.normal(0, 1e-3, t.size))), "no-motion"),
+    "huge": bad(arrays(lambda t, a: (t, a * 1e200)), "samples"),
+    "one huge": said(arrays(lambda t, a: (t, at(a, 500, 1e300))), "angle-missing"),
+    "one large": said(arrays(lambda t, a: (t, at(a, 500, 1e9))), "angle-huge"),
+    "one outlier": said(arrays(lambda t, a: (t, at(a, 500, 3.0))), "outliers"),
+    "two outliers together": said(arrays(lambda t, a: (t, at(a, [500, 501], [3.0, -2.0]))), "outliers"),
+    "many outliers": said(arrays(lambda t, a: (t, at(a, slice(20, None, 60), 2.5))), "outliers"),
+    "zeros for lost samples": said(arrays(lambda t, a: (t, at(a, [62, 131, 340, 541], 0.0))), "outliers"),
+    "missed counts": said(arrays(lambda t, a: (t, a + 40 * COUNT * (t > 4))), "missed-counts"),
+    "missed counts twice": said(arrays(lambda t, a: (t, a + 60 * COUNT * (t > 4) - 50 * COUNT * (t > 7))), "missed-counts"),
+    "a zero that jumps": said(arrays(lambda t, a: (t, a + 0.1234 * (t > 4))), "missed-counts"),
+    "degrees": said(arrays(lambda t, a: (t, np.degrees(a))), "angle-unit"),
+    "turned by 90 degrees": said(arrays(lambda t, a: (t, a + math.pi / 2)), "gauge-turned"),
+    "turned by 180 degrees": said(arrays(lambda t, a: (t, a + math.pi)), "gauge-turned"),
+    "zero far off": said(arrays(lambda t, a: (t, a + 0.5)), "zero-offset"),
+    "zero a little off": said(arrays(lambda t, a: (t, a + 0.02)), "zero-offset"),
+    "wrapped": said(arrays(lambda t, a: (t, np.mod(a, 2 * math.pi))), "angle-wrapped"),
+    "clipped": said(arrays(lambda t, a: (t, np.clip(a, -0.7, 0.7))), "clipped"),
+    "frozen": said(arrays(lambda t, a: (t, at(a, slice(425, 440), a[425]))), "frozen"),
+    "coarse counts": said(arrays(lambda t, a: (t, np.round(a / 0.049) * 0.049)), "counts-seen"),
+    "held at the start": said(arrays(lambda t, a: (np.arange(t.size + 200) / 100, np.r_[np.full(200, a[0]), a])), "held-start"),
+    "two files in one": said(arrays(lambda t, a: (np.arange(2 * t.size) / 100, np.r_[a, a])), "missed-counts"),
+    "taken and let go again": said(arrays(lambda t, a: _again(a)), "several-releases"),
+    "scaled": said(arrays(lambda t, a: (t, 1.8 * a)), "angle-scale"),
+}  # fmt: skip
+
+DAMAGES = TEXTS | TIMES | ANGLES
+
+RUN = '[[run]]\nfile = "run.csv"\n'
+DESCRIPTIONS = {
+    "not toml": ("[rig\n", "not a TOML file"),
+    "no runs": ("[rig]\nw0 = 6\n", r"\[\[run\]\]"),
+    "one table run": ('[run]\nfile = "run.csv"\n', r"\[\[run\]\]"),
+    "run without file": ("[[run]]\nkind = 'free'\n", "file is missing"),
+    "file that is not there": ('[[run]]\nfile = "other.csv"\n', "other.csv"),
+    "folder for a file": ('[[run]]\nfile = "."\n', "is a folder"),
+    "unknown table": (RUN + "[rigs]\nw0 = 6\n", "is perhaps rig"),
+    "unknown rig key": (RUN + "[rig]\nlength = 0.2\n", "is perhaps length_m"),
+    "unknown run key": (RUN + "lab_time = 3\n", "is perhaps lab_time_s"),
+    "unknown channel": (RUN + '[columns]\nangles = "a"\n', "is perhaps angle"),
+    "unknown column key": (RUN + '[columns]\nangle = { nam = "a" }\n', "is perhaps name"),
+    "unknown drive key": (RUN + "drive = { p = 0.2, omega = 3 }\n", "is perhaps Omega"),
+    "unknown reader key": (RUN + "[reader]\nskip = 2\n", "is perhaps skip_rows"),
+    "kind": (RUN + "kind = 'driven'\n", "allowed is"),
+    "free and driven": (RUN + "kind = 'free'\ndrive = { p = 1, Omega = 3 }\n", "one of them"),
+    "drive without Omega": (RUN + "drive = { p = 0.2 }\n", "Omega is missing"),
+    "drive backwards": (RUN + "drive = { p = 0.2, Omega = -3 }\n", "more than 0"),
+    "drive and pivot": (
+        RUN + "drive = { p = 1, Omega = 3 }\npivot = { vertical = 'a' }\n", "one of them",
+    ),
+    "pivot of no column": (RUN + "pivot = { unit = 'm' }\n", "names no column"),
+    "pivot's unit": (RUN + "pivot = { vertical = 'a', unit = 'inch' }\n", "unit is 'inch'"),
+    "pivot's column": (RUN + "pivot = { vertical = 'theta_rd' }\n", "is perhaps 'theta_rad'"),
+    "text for a number": (RUN + "[rig]\nw0 = 'six'\n", "allowed is a number"),
+    "negative gravity": (RUN + "[rig]\ngravity = -9.81\n", "more than 0"),
+    "counts with a part": (RUN + "[rig]\nencoder_counts = 4096.5\n", "whole number"),
+    "part that is turned": (RUN + "from_s = 5\nto_s = 2\n", "less than to_s"),
+    "part outside": (RUN + "from_s = 500\n", "within 0 to 10 s"),
+    "hold out": (RUN + "hold_out = 1\n", "True or False"),
+    "delimiter of two": (RUN + "[reader]\ndelimiter = ';;'\n", "one character"),
+    "delimiter that numbers need": (RUN + "[reader]\ndelimiter = '.'\n", "numbers"),
+    "decimal": (RUN + "[reader]\ndecimal = ';'\n", "allowed is"),
+    "skip all": (RUN + "[reader]\nskip_rows = 100000\n", "is empty"),
+    "scale of zero": (RUN + "[columns]\nangle = { scale = 0 }\n", "any other number"),
+    "unit nobody knows": (RUN + "[columns]\nangle = { unit = 'gon' }\n", "'gon'"),
+    "volts without scale": (RUN + "[columns]\nangle = { unit = 'V' }\n", "scale"),
+    "column that is not there": (RUN + "[columns]\nangle = { name = 'thta_rad' }\n", "perhaps"),
+    "one column twice": (RUN + "[columns]\nangle = { name = 't_s' }\n", "are both"),
+    "infinite": (RUN + "lab_time_s = inf\n", "finite"),
+}  # fmt: skip

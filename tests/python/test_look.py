@@ -1,0 +1,174 @@
+"""``pendmap look``, as a user meets it, and its figure."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from matplotlib.text import Text
+
+import pendmap
+from pendmap.figures import record, style
+from recorded import clean, text
+
+if TYPE_CHECKING:
+    from conftest import Run
+
+RECORDS = os.environ.get("PENDMAP_RECORDS")
+FIELDS = {"channels", "rate_hz", "noise", "segments", "findings"}
+
+
+def odd(folder: Path) -> Path:
+    """A record with much to say about it."""
+    time, theta = clean(duration=30.0)
+    rng = np.random.default_rng(1)
+    readings = np.concatenate([np.full(200, theta[0]), theta])
+    time = np.arange(readings.size) / 100 + rng.normal(0, 4e-4, readings.size)
+    readings[rng.choice(3000, 12)] += 0.6
+    kept = np.r_[0:1500, 1570 : readings.size]
+    path = folder / "odd.csv"
+    path.write_text(text((time[kept], readings[kept] + 0.02)), encoding="utf-8")
+    return path
+
+
+def folder_of(tmp_path: Path, runs: int) -> Path:
+    folder = tmp_path / "lab"
+    folder.mkdir()
+    entries = []
+    for k in range(runs):
+        (folder / f"run_{k:02d}.csv").write_text(text(clean(start=0.5 + 0.1 * k)), encoding="utf-8")
+        entries.append(f'[[run]]\nfile = "run_{k:02d}.csv"\nlab_time_s = {60 * k}\n')
+    (folder / "experiment.toml").write_text(
+        "[rig]\nw0 = 6.2\n" + "".join(entries), encoding="utf-8"
+    )
+    return folder
+
+
+def test_json_keeps_the_contract(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("look", odd(tmp_path), "--json")
+    assert run.returncode == 0, run.stderr
+    result = json.loads(run.stdout, parse_constant=pytest.fail)
+    assert set(result) >= FIELDS
+    assert result["channels"] == {"time": "t_s", "angle": "theta_rad"}
+    assert result["rate_hz"] == pytest.approx(100, rel=0.01)
+    assert 0 < result["noise"]["sigma"] < 0.01
+    assert [segment["what"] for segment in result["segments"]] == ["held", "motion"]
+    keys = {finding["what"] for finding in result["findings"]}
+    assert {"time-gap", "time-jitter", "outliers", "held-start", "zero-offset"} <= keys
+    assert [path.name for path in tmp_path.iterdir()] == ["odd.csv"]
+
+
+def test_a_folder_says_each_run(pendmap_command: Run, tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, 3)
+    result = json.loads(pendmap_command("look", folder, "--json").stdout)
+    assert set(result) >= FIELDS
+    assert [run["name"] for run in result["runs"]] == ["run_00", "run_01", "run_02"]
+    for run in result["runs"]:
+        assert set(run) >= FIELDS
+    said = pendmap_command("look", folder).stdout
+    assert "run_02 (free)" in said
+    assert "w0 6.2" in said
+
+
+def test_text_says_what_json_says(pendmap_command: Run, tmp_path: Path) -> None:
+    path = odd(tmp_path)
+    said = pendmap_command("look", path).stdout
+    for finding in pendmap.read_experiment(path).runs[0].findings:
+        assert finding.text in said
+        assert f"[{finding.what}]" in said
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_a_figure_is_written(pendmap_command: Run, tmp_path: Path, suffix: str) -> None:
+    run = pendmap_command("look", odd(tmp_path), "--plot", f"a{suffix}", "--quiet")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == ""
+    assert (tmp_path / f"a{suffix}").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("nothing.csv", None, "No such file"),
+        ("empty.csv", b"", "is empty"),
+        ("binary.csv", bytes(range(256)) * 30, "no text"),
+        ("words.csv", b"a,b\nc,d\n", "no rows of numbers"),
+        (".", None, "experiment.toml"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    pendmap_command: Run, tmp_path: Path, name: str, content: bytes | None, says: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    run = pendmap_command("look", name, "--plot", "a.png")
+    assert run.returncode == 2
+    assert says in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert not (tmp_path / "a.png").exists()
+
+
+def drawn(experiment: pendmap.Experiment, **given: Any) -> Any:  # noqa: ANN401
+    with rc_context(style.RC):
+        figure = record.figure(experiment, dpi=100.0, **given)
+        figure.canvas.draw()
+    return figure
+
+
+def several(tmp_path: Path) -> dict[str, pendmap.Experiment]:
+    peaks = tmp_path / "peaks.csv"
+    place = 0.5 * np.arange(30)
+    peaks.write_text(text((place, np.exp(-0.03 * place) * (-1.0) ** np.arange(30)), "t_s,peak_rad"))
+    plain = tmp_path / "plain.csv"
+    plain.write_text(text(clean()))
+    few = tmp_path / "few.csv"
+    few.write_text(text(tuple(part[:7] for part in clean())))
+    paths = (odd(tmp_path), plain, peaks, few, folder_of(tmp_path, 4))
+    return {path.stem: pendmap.read_experiment(path) for path in paths}
+
+
+def test_every_word_of_a_figure_has_its_place(tmp_path: Path) -> None:
+    for name, experiment in several(tmp_path).items():
+        figure = drawn(experiment)
+        boxes = []
+        for part in figure.findobj(Text):
+            if not part.get_visible() or not part.get_text().strip():
+                continue
+            box = part.get_window_extent()
+            inside = figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
+            assert inside, (name, part.get_text())
+            assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1, (name, part.get_text())
+            boxes.append((part.get_text(), box))
+        for (one, a), (other, b) in itertools.combinations(boxes, 2):
+            wide = min(a.x1, b.x1) - max(a.x0, b.x0)
+            high = min(a.y1, b.y1) - max(a.y0, b.y0)
+            assert not (wide > 1 and high > 1), (name, one, other)
+
+
+def test_a_figure_too_small_is_refused(tmp_path: Path) -> None:
+    for experiment in several(tmp_path).values():
+        with pytest.raises(pendmap.InputError, match="at least"):
+            drawn(experiment, size=(2.0, 2.0))
+
+
+@pytest.mark.skipif(not RECORDS, reason="PENDMAP_RECORDS names no folder of measured records")
+@pytest.mark.parametrize(
+    ("name", "rate", "count", "noise"),
+    [
+        ("multiarm_single_free_large.csv", 1000, 0.0, 6e-5),
+        ("cartpend_free_long.csv", 50, 2 * np.pi / 4000, 1.7e-3),
+        ("cartpend_forced_cart_pulse.csv", 50, 2 * np.pi / 4000, 0.5e-3),
+    ],
+)
+def test_measured_records(name: str, rate: float, count: float, noise: float) -> None:
+    (run,) = pendmap.read_experiment(Path(RECORDS or "") / name).runs
+    assert run.rate_hz == pytest.approx(rate)
+    assert run.count_rad == pytest.approx(count, rel=1e-3)
+    assert 0.5 < pendmap.noise_floor(run).sigma / noise < 1.5
+    assert run.trusted.mean() > 0.9

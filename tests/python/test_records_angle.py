@@ -1,0 +1,164 @@
+"""What is found of the angle, and what a mend gives back."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import pendmap
+from recorded import COUNT, clean, experiment, found, motion, noisy, read, text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_degrees_become_radians(tmp_path: Path) -> None:
+    time, theta = clean()
+    run = read(tmp_path, text((time, np.degrees(theta))))
+    assert found(run)["angle-unit"].mended
+    np.testing.assert_allclose(run.theta, theta, atol=1e-6)
+
+
+def test_small_degrees_are_known_by_their_periods(tmp_path: Path) -> None:
+    time, theta, _ = motion(start=0.045, duration=30.0)
+    run = read(tmp_path, text((time, np.degrees(noisy(theta, 1e-4, 0)))))
+    finding = found(run)["angle-scale"]
+    assert not finding.mended
+    assert "degrees?" in finding.text
+
+
+def test_a_scale_is_estimated_from_the_periods(tmp_path: Path) -> None:
+    time, theta = clean()
+    said = found(read(tmp_path, text((time, 1.8 * theta))))["angle-scale"].text
+    factor = float(said.split("about ")[1].split()[0])
+    assert factor == pytest.approx(1 / 1.8, rel=0.1)
+
+
+@pytest.mark.parametrize("low", [0.0, -math.pi])
+def test_wrapped_turns_are_unwrapped(tmp_path: Path, low: float) -> None:
+    time, theta, _ = motion(start=0.0, velocity=20.0)
+    wrapped = np.mod(noisy(theta) - low, 2 * math.pi) + low
+    run = read(tmp_path, text((time, wrapped)))
+    assert found(run)["angle-wrapped"].mended
+    turns = run.theta - noisy(theta)
+    np.testing.assert_allclose(turns, turns[0], atol=1e-5)
+
+
+@pytest.mark.parametrize("quarters", [-1, 1, 2])
+def test_a_gauge_is_turned_back(tmp_path: Path, quarters: int) -> None:
+    time, theta = clean()
+    run = read(tmp_path, text((time, theta + quarters * math.pi / 2)))
+    assert found(run)["gauge-turned"].mended
+    np.testing.assert_allclose(run.theta, theta, atol=1e-5)
+
+
+def test_outliers_are_marked_and_nothing_else(tmp_path: Path) -> None:
+    time, theta = clean()
+    at = np.random.default_rng(3).choice(np.arange(20, 1980), 20, replace=False)
+    theta[at] += np.random.default_rng(4).choice([-1, 1], 20) * 0.4
+    run = read(tmp_path, text((time, theta)))
+    assert set(np.flatnonzero(~run.trusted)) == set(at)
+    np.testing.assert_allclose(run.theta, theta, atol=1e-6)
+
+
+def test_outliers_of_the_virtual_rig_do_not_spoil_its_noise(tmp_path: Path) -> None:
+    time, theta, _ = motion(duration=40.0)
+    rng = np.random.default_rng(8)
+    readings = noisy(theta, 0.002)
+    false = rng.random(time.size) < 0.01
+    readings[false] += rng.uniform(0.2, math.pi, int(false.sum()))
+    run = read(tmp_path, text((time, readings)))
+    assert np.mean(run.trusted[~false]) > 0.995
+    assert np.mean(~run.trusted[false]) > 0.95
+    assert pendmap.noise_floor(run).sigma == pytest.approx(0.00205, rel=0.06)
+
+
+def test_missed_counts_are_found_where_they_are(tmp_path: Path) -> None:
+    time, theta = clean()
+    run = read(tmp_path, text((time, theta + 30 * COUNT * (time > 12))))
+    assert found(run)["missed-counts"].where == "row 1203"
+    assert run.trusted[:1200].all()
+    assert not run.trusted[1201:].any()
+
+
+def test_a_slipped_turn_is_taken_back(tmp_path: Path) -> None:
+    time, theta = clean()
+    run = read(tmp_path, text((time, theta + 4 * math.pi * (time > 12))))
+    assert found(run)["turns-slipped"].mended
+    np.testing.assert_allclose(run.theta, theta, atol=1e-5)
+
+
+def test_missed_counts_of_a_fine_record_are_mended(tmp_path: Path) -> None:
+    time, theta, _ = motion(rate=1000.0, duration=12.0)
+    count = 2 * math.pi / 400
+    readings = count * np.round((theta + 0.002 * np.random.default_rng(1).standard_normal(theta.size)) / count)  # fmt: skip
+    lost = readings + 200 * count * (time > 6)
+    description = '[rig]\nencoder_counts = 400\n[[run]]\nfile = "a.csv"\n'
+    (run,) = experiment(tmp_path, description, a=text((time, lost))).runs
+    assert "missed-counts" in found(run)
+
+
+def test_held_released_and_at_rest(tmp_path: Path) -> None:
+    _, theta, _ = motion(start=0.6, duration=75.0)
+    readings = noisy(np.concatenate([np.full(150, theta[0]), theta]))
+    time = np.arange(readings.size) / 100
+    run = read(tmp_path, text((time, readings)))
+    assert [segment.what for segment in run.segments] == ["held", "motion", "rest"]
+    held, _, rest = run.segments
+    assert held.to_s == pytest.approx(1.5, abs=0.1)
+    speed = np.gradient(theta, 0.01)
+    stops = 1.5 + np.flatnonzero(np.abs(speed) > 0.01)[-1] / 100
+    assert stops - 4 < rest.from_s < stops + 1
+    used = time[run.trusted]
+    assert held.to_s < used[0] < 1.7
+    assert used[-1] < rest.from_s
+
+
+def test_of_several_releases_the_longest_is_used(tmp_path: Path) -> None:
+    _, theta = clean()
+    carried = theta[-1] + (theta[0] - theta[-1]) * (1 - np.cos(np.pi * np.arange(120) / 120)) / 2
+    readings = noisy(np.concatenate([theta[:900], np.full(200, theta[900]), theta]))
+    readings = np.concatenate([theta[:900], carried, noisy(np.full(150, theta[0])), theta])
+    time = np.arange(readings.size) / 100
+    run = read(tmp_path, text((time, readings)))
+    assert "several-releases" in found(run)
+    used = time[run.trusted]
+    assert used[0] == pytest.approx(11.7, abs=0.6)
+    assert used[-1] == time[-1]
+
+
+def test_a_velocity_with_the_other_sign_is_turned(tmp_path: Path) -> None:
+    time, theta, speed = motion()
+    for factor, key in ((-1.0, "sign-turned"), (180 / math.pi, "velocity-unit")):
+        content = text((time, noisy(theta), factor * speed), "t_s,theta_rad,gyro_z")
+        run = read(tmp_path, content)
+        assert found(run)[key].mended
+        assert run.velocity is not None
+        np.testing.assert_allclose(run.velocity, speed, atol=2e-4)
+
+
+def test_a_pivot_with_the_right_sign_is_left_alone(tmp_path: Path) -> None:
+    time, theta, _ = motion(drive=(0.3, 12.0, 0.4))
+    push = 0.3 * 9.81 * np.cos(12 * time + 0.4)
+    description = '[[run]]\nfile = "a.csv"\npivot = { vertical = "acc_y" }\n'
+    content = text((time, noisy(theta), push), "t_s,theta_rad,acc_y")
+    (run,) = experiment(tmp_path, description, a=content).runs
+    assert "sign-turned" not in found(run)
+
+
+def test_a_period_unlike_the_rig_is_said(tmp_path: Path) -> None:
+    time, theta = clean()
+    description = '[rig]\nw0 = 3.0\n[[run]]\nfile = "a.csv"\n'
+    (run,) = experiment(tmp_path, description, a=text((time, theta))).runs
+    assert "period-unlike-rig" in found(run)
+
+
+@pytest.mark.parametrize("counts", [128, 1000, 4096])
+def test_counts_are_seen(tmp_path: Path, counts: int) -> None:
+    time, theta, _ = motion(duration=60.0)
+    count = 2 * math.pi / counts
+    run = read(tmp_path, text((time, count * np.round(theta / count))))
+    assert run.count_rad == pytest.approx(count, rel=1e-3)

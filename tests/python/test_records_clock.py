@@ -1,0 +1,108 @@
+"""What is found of the clock, and what a mend gives back."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import pendmap
+from recorded import clean, experiment, found, motion, read, text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6, 1e9])
+def test_milliseconds_become_seconds(tmp_path: Path, factor: float) -> None:
+    time, theta = clean()
+    run = read(tmp_path, text((factor * time, theta), form="%.12g"))
+    assert found(run)["time-unit"].mended
+    np.testing.assert_allclose(run.time, time, rtol=1e-9)
+
+
+def test_a_declared_unit_is_not_overruled(tmp_path: Path) -> None:
+    time, theta = clean()
+    description = '[columns]\ntime = { unit = "s" }\n[[run]]\nfile = "a.csv"\n'
+    (run,) = experiment(tmp_path, description, a=text((1e3 * time, theta))).runs
+    assert not found(run)["time-unit"].mended
+    assert run.time[-1] == pytest.approx(2e4)
+
+
+def test_rows_in_another_order_are_put_in_order(tmp_path: Path) -> None:
+    time, theta = clean()
+    order = np.random.default_rng(1).permutation(time.size)
+    run = read(tmp_path, text((time[order], theta[order])))
+    np.testing.assert_allclose(run.time, time, atol=1e-6)
+    np.testing.assert_allclose(run.theta, theta, atol=1e-6)
+
+
+def test_a_false_stamp_costs_one_sample(tmp_path: Path) -> None:
+    time, theta = clean()
+    for value in (1e9, -1e9, 0.0):
+        time[700] = value
+        run = read(tmp_path, text((time, theta)))
+        assert run.time.size == time.size - 1
+        assert run.trusted.all()
+
+
+def test_a_coarse_clock_is_spread(tmp_path: Path) -> None:
+    time, theta = clean()
+    run = read(tmp_path, text((np.floor(time / 0.03) * 0.03, theta)))
+    assert found(run)["time-coarse"].mended
+    assert run.rate_hz == pytest.approx(100, rel=1e-3)
+    assert np.ptp(run.time - time) < 0.03
+
+
+def test_a_counter_goes_on(tmp_path: Path) -> None:
+    time, theta = clean()
+    run = read(tmp_path, text(((time + 55) % 65.536, theta)))
+    np.testing.assert_allclose(run.time, time + 55, atol=1e-5)
+
+
+def test_a_gap_is_counted(tmp_path: Path) -> None:
+    time, theta = clean()
+    kept = np.r_[0:500, 560:2001]
+    finding = found(read(tmp_path, text((time[kept], theta[kept]))))["time-gap"]
+    assert "about 60 samples" in finding.text
+    assert "0.61 s at 4.99 s" in finding.text
+
+
+def test_jitter_is_measured(tmp_path: Path) -> None:
+    time, theta = clean()
+    late = time + np.random.default_rng(2).normal(0, 5e-4, time.size)
+    said = found(read(tmp_path, text((late, theta))))["time-jitter"].text
+    assert float(said.split("by ")[1].split()[0]) == pytest.approx(5e-4 * 2**0.5, rel=0.1)
+
+
+def test_a_clock_whose_stamps_hide_its_jitter_is_found(tmp_path: Path) -> None:
+    time, _, _ = motion()
+    fine, angle, _ = motion(rate=2000.0)
+    late = time + np.random.default_rng(2).normal(0, 1e-3, time.size)
+    run = read(tmp_path, text((time, np.interp(late, fine, angle))))
+    said = found(run)["noise-grows-with-speed"].text
+    assert float(said.split("stamps by ")[1].split()[0]) == pytest.approx(1e-3, rel=0.3)
+
+
+@pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0])
+@pytest.mark.parametrize("counts", [0, 128, 1024, 8192])
+def test_noise_is_right_within_a_few_per_cent(rate: float, counts: int) -> None:
+    time, theta, _ = motion(rate=rate)
+    for noise in (0.0005, 0.003):
+        count = 2 * np.pi / counts if counts else 0.0
+        readings = theta + np.random.default_rng(4).normal(0, noise, theta.size)
+        readings = count * np.round(readings / count) if counts else readings
+        run = pendmap.Run(
+            "a", "a", "free", time, readings, np.ones(time.size, bool), count_rad=count
+        )
+        floor = pendmap.noise_floor(run)
+        truth = float(np.std(readings - theta))
+        assert abs(floor.sigma / truth - 1) < 0.05 + 3 * 0.8 / np.sqrt(time.size)
+
+
+def test_noise_of_a_rotation(tmp_path: Path) -> None:
+    time, theta, _ = motion(start=0.0, velocity=16.0, rate=30.0)
+    readings = theta + np.random.default_rng(4).normal(0, 0.003, theta.size)
+    floor = pendmap.noise_floor(read(tmp_path, text((time, readings))))
+    assert floor.sigma == pytest.approx(0.003, rel=0.12)

@@ -1,0 +1,162 @@
+"""A hundred kinds of damaged file: each ends in a result that says so, or in one clear line."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import pendmap
+from damages import DAMAGES, DESCRIPTIONS
+from recorded import clean, text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@functools.cache
+def sound() -> str:
+    """A clean record of 10 s."""
+    return text(clean(duration=10.0))
+
+
+def one_line(message: str) -> None:
+    assert message
+    assert "\n" not in message
+    assert len(message) < 400
+    assert "Traceback" not in message
+    for nonsense in ("None", "nan", "array(", "dtype"):
+        assert nonsense not in message, message
+
+
+def consistent(run: pendmap.Run) -> None:
+    """What every run keeps, whatever its file was."""
+    assert run.time.shape == run.theta.shape == run.trusted.shape
+    assert run.time.dtype == run.theta.dtype == np.float64
+    assert run.time.size >= 3
+    assert np.all(np.isfinite(run.time))
+    assert np.all(np.isfinite(run.theta))
+    assert np.all(np.diff(run.time) > 0)
+    for values in (run.velocity, *(run.pivot or {}).values()):
+        assert values is None or values.shape == run.time.shape
+    for finding in run.findings:
+        one_line(finding.text)
+    pendmap.noise_floor(run)
+
+
+def test_there_are_a_hundred_kinds() -> None:
+    assert len(DAMAGES) + len(DESCRIPTIONS) >= 100
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damage_ends_in_a_finding_or_in_one_line(name: str, tmp_path: Path) -> None:
+    damage = DAMAGES[name]
+    path = tmp_path / f"record{damage.suffix}"
+    made = damage.make(sound())
+    path.write_bytes(made if isinstance(made, bytes) else made.encode())
+    before = path.read_bytes(), path.stat().st_mtime_ns
+    try:
+        (run,) = pendmap.read_experiment(path).runs
+    except pendmap.InputError as error:
+        assert damage.says is None, f"{name}: {error}"
+        one_line(str(error))
+        assert str(path) in str(error)
+        assert damage.refused in str(error), str(error)
+    else:
+        consistent(run)
+        keys = {finding.what for finding in run.findings}
+        assert damage.says is not None, f"{name}: was read, with {keys}"
+        assert set(damage.says) <= keys, f"{name}: {[f.text for f in run.findings]}"
+    assert (path.read_bytes(), path.stat().st_mtime_ns) == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("name", DESCRIPTIONS)
+def test_a_damaged_description_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    content, says = DESCRIPTIONS[name]
+    (tmp_path / "run.csv").write_text(sound(), encoding="utf-8")
+    (tmp_path / "experiment.toml").write_bytes(content.encode())
+    with pytest.raises(pendmap.InputError, match=says) as error:
+        pendmap.read_experiment(tmp_path)
+    one_line(str(error.value))
+
+
+def test_a_clean_record_has_nothing_odd(tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    path.write_text(sound(), encoding="utf-8")
+    (run,) = pendmap.read_experiment(path).runs
+    assert {finding.what for finding in run.findings} <= {"counts-seen"}
+    assert run.trusted.all()
+
+
+QUIET = settings(
+    deadline=None,
+    max_examples=120,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+FIELDS = st.one_of(
+    st.floats(width=64).map(repr),
+    st.integers(-(10**20), 10**20).map(str),
+    st.sampled_from(["", "nan", "-inf", "1e400", "1,5", '"', "'", "x", "0", "-0.0", "1e-320"]),
+    st.text(max_size=4),
+)
+ROWS = st.lists(st.lists(FIELDS, min_size=1, max_size=4), max_size=30)
+
+
+def fuzz(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+    try:
+        (run,) = pendmap.read_experiment(path).runs
+    except pendmap.InputError as error:
+        one_line(str(error).replace("nan", "").replace("None", ""))
+    else:
+        consistent(run)
+
+
+@QUIET
+@given(content=st.binary(max_size=400))
+def test_any_bytes(tmp_path: Path, content: bytes) -> None:
+    fuzz(tmp_path / "record.csv", content)
+
+
+@QUIET
+@given(rows=ROWS, separator=st.sampled_from([",", ";", "\t", " ", "|"]))
+def test_any_rows(tmp_path: Path, rows: list[list[str]], separator: str) -> None:
+    lines = ["t_s" + separator + "theta_rad", *(separator.join(row) for row in rows)]
+    fuzz(tmp_path / "record.csv", "\n".join(lines).encode(errors="replace"))
+
+
+@QUIET
+@given(
+    values=st.lists(
+        st.tuples(
+            st.floats(allow_nan=False, allow_infinity=False),
+            st.floats(allow_nan=False, allow_infinity=False),
+        ),
+        min_size=5,
+        max_size=60,
+    ),
+    ordered=st.booleans(),
+)
+def test_any_numbers(tmp_path: Path, values: list[tuple[float, float]], *, ordered: bool) -> None:
+    time = sorted(t for t, _ in values) if ordered else [t for t, _ in values]
+    rows = (f"{t!r},{a!r}" for t, (_, a) in zip(time, values, strict=True))
+    fuzz(tmp_path / "record.csv", "\n".join(itertools.chain(["t_s,theta_rad"], rows)).encode())
+
+
+@QUIET
+@given(
+    at=st.lists(st.integers(0, 20_000), min_size=1, max_size=30),
+    what=st.lists(st.integers(0, 255), min_size=1, max_size=30),
+)
+def test_any_bytes_changed_in_a_record(tmp_path: Path, at: list[int], what: list[int]) -> None:
+    content = bytearray(sound().encode())
+    for place, byte in zip(at, what, strict=False):
+        content[place % len(content)] = byte
+    fuzz(tmp_path / "record.csv", bytes(content))

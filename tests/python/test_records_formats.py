@@ -1,0 +1,195 @@
+"""Files as tools write them, and experiment.toml."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import pendmap
+from recorded import clean, experiment, found, motion, noisy, read, text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pendmap import Run
+
+
+def same(run: Run, *, within: float = 1e-5, duration: float = 20.0) -> None:
+    """Whether a run is the clean record."""
+    time, theta = clean(duration=duration)
+    np.testing.assert_allclose(run.time, time, atol=1e-6)
+    np.testing.assert_allclose(run.theta, theta, atol=within)
+
+
+def phyphox(separator: str, decimal: str) -> str:
+    time, _, speed = motion(duration=40.0)
+    still = np.random.default_rng(5).normal(0, 0.002, (2, time.size))
+    columns = (time, still[0], speed + 0.004, still[1], np.hypot(speed, still[0]))
+    names = ["Time (s)", *(f"Gyroscope {axis} (rad/s)" for axis in "xyz"), "Absolute (rad/s)"]
+    rows = [[f"{value:.9E}".replace(".", decimal) for value in row] for row in zip(*columns, strict=True)]  # fmt: skip
+    head = separator.join(f'"{name}"' for name in names)
+    return "\n".join([head, *(separator.join(row) for row in rows)]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ",")]
+)
+def test_phyphox(tmp_path: Path, separator: str, decimal: str) -> None:
+    run = read(tmp_path, phyphox(separator, decimal))
+    _, theta, speed = motion(duration=40.0)
+    assert run.channels["velocity"] == "Gyroscope y (rad/s)"
+    assert run.velocity is not None
+    np.testing.assert_allclose(run.velocity, speed + 0.004, atol=1e-8)
+    assert np.sqrt(np.mean((run.theta - theta) ** 2)) < 0.02
+    assert found(run)["angle-integrated"].mended
+
+
+@pytest.mark.parametrize(("separator", "decimal"), [("\t", "."), (",", "."), (";", ",")])
+@pytest.mark.parametrize("upward", [True, False])
+def test_tracker(tmp_path: Path, separator: str, decimal: str, *, upward: bool) -> None:
+    time, theta, _ = motion(rate=30.0, duration=20.0)
+    rng = np.random.default_rng(2)
+    x = 320.5 + 210 * np.sin(theta) + rng.normal(0, 0.3, theta.size)
+    y = 80.25 + (-1 if upward else 1) * 210 * np.cos(theta) + rng.normal(0, 0.3, theta.size)
+    rows = [[f"{v:.6E}".replace(".", decimal) for v in row] for row in zip(time, x, y, strict=True)]
+    head = ["mass_A" + separator * 2, separator.join(["t", "x", "y"])]
+    run = read(tmp_path, "\n".join([*head, *(separator.join(row) for row in rows)]) + "\n", "a.txt")
+    assert np.sqrt(np.mean((run.theta - theta) ** 2)) < 0.004
+    assert "radius 21" in found(run)["angle-from-pixels"].text or "radius 20" in found(run)["angle-from-pixels"].text  # fmt: skip
+    assert pendmap.noise_floor(run).sigma == pytest.approx(0.3 / 210, rel=0.1)
+
+
+def test_tracker_with_an_angle(tmp_path: Path) -> None:
+    time, theta = clean()
+    content = text((time, np.sin(theta), -np.cos(theta), np.degrees(theta)), "t,x,y,θ [°]")
+    run = read(tmp_path, "mass A,,,\n" + content)
+    assert set(run.channels) == {"time", "angle"}
+    same(run)
+
+
+def test_a_short_arc_is_said(tmp_path: Path) -> None:
+    time, theta, _ = motion(start=0.08, rate=30.0)
+    noise = np.random.default_rng(2).normal(0, 0.5, (2, theta.size))
+    content = text((time, 100 * np.sin(theta) + noise[0], 100 * np.cos(theta) + noise[1]), "t,x,y")
+    assert "circle-uncertain" in found(read(tmp_path, content))
+
+
+def test_a_serial_logger(tmp_path: Path) -> None:
+    time, theta = clean()
+    lines = [f"{1000 * t:.0f},{a:.5f}" for t, a in zip(time, theta, strict=True)]
+    content = "ets Jul 29 2019\r\nrst:0x1\r\n\x00\x00,-0.\r\nREADY\r\n" + "\r\n".join(lines)
+    run = read(tmp_path, content[:-3].encode(), "log.txt")
+    assert {"nul-bytes", "half-line", "columns-guessed", "time-unit"} <= set(found(run))
+    assert run.time[-1] == pytest.approx(19.99)
+    np.testing.assert_allclose(run.theta, theta[:-1], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("names", "factors"),
+    [
+        ("Time (s),Angle (rad)", (1, 1)),
+        ("t/ms,theta [deg]", (1e3, 180 / math.pi)),
+        ("time_us,angle_deg", (1e6, 180 / math.pi)),
+        ("Zeit [min],Winkel [Umdr]", None),
+        ("t in s,phi in mrad", (1, 1e3)),
+        ("Timestamp (ms),Encoder (rev)", (1e3, 0.5 / math.pi)),
+    ],
+)
+def test_units_in_names(tmp_path: Path, names: str, factors: tuple[float, float] | None) -> None:
+    time, theta = clean()
+    if factors is None:
+        with pytest.raises(pendmap.InputError, match="no column of angles"):
+            read(tmp_path, text((time, theta), names))
+        return
+    run = read(tmp_path, text((time * factors[0], theta * factors[1]), names, "%.9g"))
+    same(run)
+    assert "columns-guessed" in found(run)
+    assert "angle-unit" not in found(run)
+
+
+def test_parquet_is_the_same(tmp_path: Path) -> None:
+    time, theta = clean()
+    pd.DataFrame({"t_s": time, "theta_rad": theta}).to_parquet(tmp_path / "a.parquet")
+    (run,) = pendmap.read_experiment(tmp_path / "a.parquet").runs
+    same(run, within=1e-12)
+    assert run.sha256 == hashlib.sha256((tmp_path / "a.parquet").read_bytes()).hexdigest()
+
+
+def test_everything_of_a_description(tmp_path: Path) -> None:
+    time, theta = clean()
+    volts = 2.5 + theta / 1.2566
+    content = "made by hand\nin spring\nTime;volts\n" + text((1000 * time, volts), "", "%.7f")
+    description = """
+    [rig]
+    gravity = 9.81
+    length_m = 0.2552
+    w0 = 6.2
+    [columns]
+    time = { name = "Time", unit = "ms" }
+    angle = { name = "volts", unit = "V", scale = 1.2566, zero = 2.5 }
+    [reader]
+    delimiter = ";"
+    decimal = ","
+    skip_rows = 2
+    [[run]]
+    file = "a.csv"
+    from_s = 1.2
+    to_s = 8.0
+    [[run]]
+    file = "a.csv"
+    kind = "free"
+    lab_time_s = 150.0
+    from_s = 8.0
+    hold_out = true
+    """
+    semicolons = content.replace(",", ";").replace(".", ",")
+    read_in = experiment(tmp_path, description, a=semicolons)
+    first, second = read_in.runs
+    assert (first.name, second.name) == ("a (1)", "a (2)")
+    assert (first.time[0], first.time[-1]) == (1.2, 8.0)
+    assert (second.lab_time_s, second.hold_out, second.time[0]) == (150.0, True, 8.0)
+    np.testing.assert_allclose(first.theta, theta[120:801], atol=1e-6)
+    assert read_in.known == {"gravity": 9.81, "length_m": 0.2552, "w0": 6.2}
+    assert read_in.sha256["a.csv"] == hashlib.sha256(semicolons.encode()).hexdigest()
+
+
+def test_drives_and_pivots(tmp_path: Path) -> None:
+    time, theta, _ = motion(drive=(0.3, 12.0, 0.4))
+    push = -0.3 * 9.81 * np.cos(12 * time + 0.4)
+    description = """
+    rig = { gravity = 9.81, w0 = 6.2 }
+    [[run]]
+    file = "a.csv"
+    drive = { p = 0.3, Omega = 12.0 }
+    [[run]]
+    file = "a.csv"
+    kind = "forced"
+    pivot = { vertical = "acc_y", unit = "m/s2" }
+    """
+    content = text((time, noisy(theta), push), "t_s,theta_rad,acc_y")
+    first, second = experiment(tmp_path, description, a=content).runs
+    assert first.kind == second.kind == "forced"
+    assert first.drive == {"p": 0.3, "Omega": 12.0, "phi": None}
+    assert second.pivot is not None
+    np.testing.assert_allclose(second.pivot["vertical"], push, atol=1e-6)
+    assert second.pivot_unit == "m/s2"
+    assert "sign-turned" in found(second)  # upward is positive, and it pulls where p is positive
+
+
+def test_peaks_alone(tmp_path: Path) -> None:
+    time = 0.5 * np.arange(30)
+    peaks = np.exp(-0.03 * time) * (-1.0) ** np.arange(30)
+    run = read(tmp_path, text((time, peaks), "t_s,peak_rad"))
+    assert run.peaks_only
+    np.testing.assert_allclose(run.theta, peaks, atol=1e-6)
+    assert math.isnan(pendmap.noise_floor(run).sigma)
+
+
+def test_a_folder_without_a_description(tmp_path: Path) -> None:
+    with pytest.raises(pendmap.InputError, match="has no experiment.toml"):
+        pendmap.read_experiment(tmp_path)
