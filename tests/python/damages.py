@@ -257,7 +257,7 @@ DESCRIPTIONS = {
     "unknown channel": (RUN + '[columns]\nangles = "a"\n', "is perhaps angle"),
     "unknown column key": (RUN + '[columns]\nangle = { nam = "a" }\n', "is perhaps name"),
     "unknown drive key": (RUN + "drive = { p = 0.2, omega = 3 }\n", "is perhaps Omega"),
-    "unknown reader key": (RUN + '[reader]\nskip = 2\n', "is perhaps skip_rows"),
+    "unknown reader key": (RUN + "[reader]\nskip = 2\n", "is perhaps skip_rows"),
     "kind": (RUN + "kind = 'driven'\n", "allowed is"),
     "free and driven": (RUN + "kind = 'free'\ndrive = { p = 1, Omega = 3 }\n", "one of them"),
     "drive without Omega": (RUN + "drive = { p = 0.2 }\n", "Omega is missing"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from scipy.integrate import solve_ivp
 import pendmap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -85,5 +85,3 @@ def experiment(folder: Path, description: str, **files: str) -> pendmap.Experime
     for name, content in files.items():
         (folder / f"{name}.csv").write_text(content, encoding="utf-8")
     return pendmap.read_experiment(folder)
-
-

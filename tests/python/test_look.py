@@ -44,7 +44,9 @@ def folder_of(tmp_path: Path, runs: int) -> Path:
     for k in range(runs):
         (folder / f"run_{k:02d}.csv").write_text(text(clean(start=0.5 + 0.1 * k)), encoding="utf-8")
         entries.append(f'[[run]]\nfile = "run_{k:02d}.csv"\nlab_time_s = {60 * k}\n')
-    (folder / "experiment.toml").write_text("[rig]\nw0 = 6.2\n" + "".join(entries), encoding="utf-8")
+    (folder / "experiment.toml").write_text(
+        "[rig]\nw0 = 6.2\n" + "".join(entries), encoding="utf-8"
+    )
     return folder
 
 

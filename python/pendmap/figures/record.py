@@ -7,6 +7,7 @@ import textwrap
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from matplotlib.ticker import NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
 from pendmap.errors import InputError
@@ -237,19 +238,38 @@ def _intervals(axes: Axes, run: Run) -> None:
         pad = max(0.05 * (high - low), 0.02 * usual)
         edges = np.linspace(low - pad, high + pad, 61)
     axes.hist(steps, edges.tolist(), color=USED, log=True)
-    axes.set_ylim(bottom=0.7)
-    if not wide:
-        style.scale(axes, "x", (float(edges[0]), float(edges[-1])), "interval (ms)")
+    axes.set_ylim(0.7, 1.5 * steps.size)
+    _powers(axes, "y", (0.7, 1.5 * steps.size))
     axes.set_xlim(edges[0], edges[-1])
+    ends = (float(edges[0]), float(edges[-1]))
+    if wide:
+        _powers(axes, "x", ends)
+    else:
+        style.scale(axes, "x", ends, "interval (ms)")
     axes.set_xlabel("interval (ms)")
     axes.set_ylabel("samples", labelpad=2)
     axes.set_title("(b) between turning points" if run.peaks_only else "(b) the clock")
 
 
+def _powers(axes: Axes, which: str, ends: tuple[float, float]) -> None:
+    """Give a logarithmic side a few powers of ten, those within its ends."""
+    low, high = math.ceil(math.log10(ends[0])), math.floor(math.log10(ends[1]))
+    every = max((high - low) // 5 + 1, 1)
+    powers = range(low, high + 1, every)
+    labels = [f"{10.0**k:g}" for k in powers]
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_ticks([10.0**k for k in powers], labels)
+    axis.set_minor_formatter(NullFormatter())
+
+
 def _decay(axes: Axes, run: Run) -> None:
-    axes.plot(run.time, np.maximum(np.abs(run.theta), 1e-12), "o", color=USED, ms=2.5)
+    size = np.maximum(np.abs(run.theta), 1e-9)
+    axes.plot(run.time, size, "o", color=USED, ms=2.5)
     axes.set_yscale("log")
-    axes.set_xlabel("t (s)")
+    ends = (float(size.min()) / 1.5, float(size.max()) * 1.5)
+    axes.set_ylim(*ends)
+    _powers(axes, "y", ends)
+    style.scale(axes, "x", (float(run.time[0]), float(run.time[-1])), "t (s)")
     axes.set_ylabel("|\N{GREEK SMALL LETTER THETA}| (rad)", labelpad=2)
     axes.set_title("(c) the decay")
 
@@ -262,10 +282,10 @@ def _residuals(axes: Axes, run: Run) -> None:
     speed, residual = np.abs(fit.slope[keep]), 1e3 * np.abs(fit.residual[keep])
     stride = max(speed.size // MOST_POINTS, 1)
     axes.set_title("(c) away from nine neighbours")
-    axes.set_xlabel("|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)")
-    axes.set_ylabel("residual (mrad)", labelpad=2)
     if not speed.size or not math.isfinite(noise.sigma):
         axes.text(0.5, 0.5, "too few samples", transform=axes.transAxes, ha="center")
+        axes.set_xticks([])
+        axes.set_yticks([])
         return
     axes.plot(speed[::stride], residual[::stride], ".", color="#a9b8cc", ms=1.5, rasterized=True)
     for part in noise.by_speed:
@@ -273,9 +293,12 @@ def _residuals(axes: Axes, run: Run) -> None:
         level = 1e3 * part.sigma
         axes.plot([part.speed_from, high], [level, level], color=FALSE, lw=1.8)
     top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
-    axes.set_ylim(0, max(top, 1e-9))
+    speeds = "|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)"
     fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
     axes.set_xlim(0, max(fastest * 1.03, 1e-9))
+    axes.set_ylim(0, max(top, 1e-9))
+    style.scale(axes, "x", axes.get_xlim(), speeds)
+    style.scale(axes, "y", axes.get_ylim(), "residual (mrad)")
     axes.text(
         0.98, 0.96, "line: standard deviation", transform=axes.transAxes, ha="right", va="top",
         color=FALSE, fontsize=8.5,

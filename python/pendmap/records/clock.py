@@ -228,5 +228,6 @@ def _spacing(work: Work) -> None:
     even = np.delete(steps, gaps)
     spread = math.sqrt(float(np.mean((even - usual) ** 2)))
     if spread > JITTER * usual:
-        text = f"the intervals jitter by {spread:.2g} s rms, {100 * spread / usual:.0f} % of {usual:.4g} s"
+        share = 100 * spread / usual
+        text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
         work.say("time-jitter", text)

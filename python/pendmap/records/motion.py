@@ -115,9 +115,7 @@ def _known_period(work: Work) -> float | None:
     return 2 * math.pi / w0 if w0 else None
 
 
-def _still(
-    work: Work, period: float, limit: float, span: tuple[int, int]
-) -> list[tuple[int, int]]:
+def _still(work: Work, period: float, limit: float, span: tuple[int, int]) -> list[tuple[int, int]]:
     """Return stretches within ``span``, of a period and more, in which nothing moves."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -202,9 +200,7 @@ def _held_short(work: Work, part: tuple[int, int], period: float, noise: float) 
     return low + max(int(np.searchsorted(time, time[left[0]] - usual)), 0)
 
 
-def _settle(
-    work: Work, parts: list[tuple[int, int]], middle: float, span: tuple[int, int]
-) -> None:
+def _settle(work: Work, parts: list[tuple[int, int]], middle: float, span: tuple[int, int]) -> None:
     """Name the stretches, trust the longest swing, and say so."""
     longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
     trusted = np.zeros(work.time.size, bool)
