@@ -224,7 +224,8 @@ def _spacing(work: Work) -> None:
             f"{counted(gaps.size, 'gap')}, about {counted(lost, 'sample')} missing; the longest"
             f" {steps[worst]:.3g} s at {work.time[worst]:.6g} s"
         )
-        work.say("time-gap", text, at=gaps)
+        span = (float(work.time[worst]), float(work.time[worst + 1]))
+        work.say("time-gap", text, at=gaps, span=span)
     even = np.delete(steps, gaps)
     spread = math.sqrt(float(np.mean((even - usual) ** 2)))
     if spread > JITTER * usual:
