@@ -15,7 +15,8 @@ from matplotlib.text import Text
 
 import pendmap
 from pendmap import figures
-from pendmap.figures import record, style
+from pendmap.figures import experiment as drawing
+from pendmap.figures import style
 from recorded import clean, text
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ def test_bad_input_is_one_line_and_exit_2(
 
 def drawn(experiment: pendmap.Experiment, **given: Any) -> Any:  # noqa: ANN401
     with rc_context(style.RC):
-        figure = record.figure(experiment, dpi=100.0, **given)
+        figure = drawing.figure(experiment, dpi=100.0, **given)
         figure.canvas.draw()
     return figure
 
