@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+import numpy as np
 from scipy.integrate import solve_ivp
 
-from pendmap import Pendulum, basins, figures, simulate
+from pendmap import Pendulum, Rig, basins, figures, read_experiment, simulate
 from pendmap.figures import style
-
-if TYPE_CHECKING:
-    import numpy as np
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)
@@ -65,7 +63,26 @@ def friction() -> None:
         figure.savefig(HERE / "friction.png", dpi=110)
 
 
+def record() -> None:
+    """What `pendmap look` finds in a record that went wrong in several ways."""
+    rig = Rig.of(w0=6.2, c_over_m=0.05, Tr=0.06)
+    run = simulate(rig, 2.4, 0.0, 30.0, samples=1024)
+    rng = np.random.default_rng(1)
+    time = np.arange(3200) / 100
+    swing = np.interp(time[:2950], run["time"].values, run["theta"].values)
+    theta = np.concatenate([np.full(250, 2.4), swing])
+    theta += rng.normal(0, 0.002, theta.size)
+    theta[rng.choice(np.arange(300, 3200), 8)] += 0.7
+    kept = np.r_[0:1700, 1760:3200]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run_00.csv"
+        columns = np.column_stack([time + rng.normal(0, 4e-4, time.size), theta])[kept]
+        np.savetxt(path, columns, "%.6f", ",", header="t_s,theta_rad", comments="")
+        figures.draw_record(read_experiment(path), HERE / "record.png", dpi=100)
+
+
 if __name__ == "__main__":
     figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
     figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
     friction()
+    record()

@@ -53,12 +53,13 @@ def test_help_imports_nothing_heavy() -> None:
         "import sys\n"
         "from pendmap.cli.main import command\n"
         "command.main(['--help'], standalone_mode=False)\n"
-        "heavy = {'numpy', 'scipy', 'xarray', 'matplotlib', 'rerun', 'rich', 'pendmap._core'}\n"
+        "heavy = {'numpy', 'scipy', 'xarray', 'pandas', 'matplotlib', 'rerun', 'rich'}\n"
+        "heavy |= {'pendmap._core'}\n"
         "sys.exit(', '.join(heavy & set(sys.modules)) or 0)\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
-    for name in ("info", "effects", "simulate", "basins", "rig", "plot", "view"):
+    for name in ("info", "effects", "simulate", "basins", "look", "rig", "plot", "view"):
         assert name in run.stdout
 
 

@@ -94,8 +94,7 @@ def test_a_slipped_turn_is_taken_back(tmp_path: Path) -> None:
 def test_missed_counts_of_a_fine_record_are_mended(tmp_path: Path) -> None:
     time, theta, _ = motion(rate=1000.0, duration=12.0)
     count = 2 * math.pi / 400
-    readings = count * np.round((theta + 0.002 * np.random.default_rng(1).standard_normal(theta.size)) / count)  # fmt: skip
-    lost = readings + 200 * count * (time > 6)
+    lost = noisy(theta, 0.002, count) + 200 * count * (time > 6)
     description = '[rig]\nencoder_counts = 400\n[[run]]\nfile = "a.csv"\n'
     (run,) = experiment(tmp_path, description, a=text((time, lost))).runs
     assert "missed-counts" in found(run)

@@ -10,7 +10,17 @@ import click
 
 __all__ = ["command"]
 
-_LEANS_ON = ("numpy", "scipy", "xarray", "netcdf4", "matplotlib", "rerun-sdk", "click", "rich")
+_LEANS_ON = (
+    "numpy",
+    "scipy",
+    "xarray",
+    "pandas",
+    "netcdf4",
+    "matplotlib",
+    "rerun-sdk",
+    "click",
+    "rich",
+)
 
 
 @click.command("info")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, record, style, trajectory
+from pendmap.figures import basins, experiment, style, trajectory
 from pendmap.figures import runs as runs_figure
 from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
@@ -98,7 +98,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
 
 
 def draw_record(
-    experiment: Experiment,
+    records: Experiment,
     path: str | os.PathLike[str],
     *,
     size: tuple[float, float] | None = None,
@@ -112,7 +112,7 @@ def draw_record(
 
     Parameters
     ----------
-    experiment : Experiment
+    records : Experiment
         What ``pendmap.read_experiment`` returned.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
@@ -136,7 +136,7 @@ def draw_record(
     resolution = style.resolution(dpi)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
-        style.write(record.figure(experiment, size=size, dpi=resolution), part)
+        style.write(experiment.figure(records, size=size, dpi=resolution), part)
     return Path(path)
 
 

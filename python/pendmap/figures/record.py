@@ -1,4 +1,4 @@
-"""The figure of a record: what is used of it, what was found in it, its clock and its noise."""
+"""The figure of one record: what is used of it, what was found, its clock and its noise."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import textwrap
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from matplotlib.ticker import NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
 from pendmap.errors import InputError
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Transform
     from numpy.typing import NDArray
 
-    from pendmap.records import Experiment, Finding, Run
+    from pendmap.records import Run
 
-__all__ = ["figure"]
+__all__ = ["ANGLE", "FALSE", "UNUSED", "USED", "broken", "figure", "lone", "shown_line"]
 
 USED: Final = "#1d3557"
 UNUSED: Final = "#a9a9a9"
@@ -33,9 +34,6 @@ FALSE: Final = "#d55e00"
 BAND: Final = "#ececec"
 
 ANGLE: Final = "\N{GREEK SMALL LETTER THETA} (rad)"
-
-MOST_RUNS: Final = 12
-"""Strips of one figure; the text of ``look`` has every run."""
 
 MOST_POINTS: Final = 20_000
 """Residuals that are drawn; more only make a figure large."""
@@ -53,17 +51,8 @@ SHORT: Final = 2e-3
 """Share of the record under which a finding is a line, not a span."""
 
 
-def figure(
-    experiment: Experiment, *, size: tuple[float, float] | None = None, dpi: float = 200.0
-) -> Figure:
-    """Return the figure of an experiment: one record in detail, or a strip of each run."""
-    if len(experiment.runs) == 1:
-        return _one(experiment, size, dpi)
-    return _many(experiment, size, dpi)
-
-
-def _one(experiment: Experiment, size: tuple[float, float] | None, dpi: float) -> Figure:
-    (run,) = experiment.runs
+def figure(run: Run, size: tuple[float, float] | None, dpi: float) -> Figure:
+    """Return the figure of one record."""
     width = size[0] if size else 8.6
     letters = max(int((width - 1.0) / 0.073), 20)
     noted = _listed(run, letters)
@@ -132,11 +121,11 @@ def _history(axes: Axes, run: Run) -> None:
     dots = "o" if run.peaks_only or time.size < FEW else None
     line = "none" if run.peaks_only else "-"
     drawn = {"marker": dots, "ms": 2.2, "lw": 0.8, "ls": line}
-    lone = _lone(~run.trusted)
-    breaks = _broken(run)
-    axes.plot(*_where(time, theta, ~run.trusted & ~lone, breaks), color=UNUSED, **drawn)  # type: ignore[arg-type]
-    axes.plot(*_where(time, theta, run.trusted, breaks), color=USED, **drawn)  # type: ignore[arg-type]
-    axes.plot(time[lone], theta[lone], "x", color=FALSE, ms=4.5, mew=1.0)
+    alone = lone(~run.trusted)
+    breaks = broken(run)
+    axes.plot(*shown_line(time, theta, ~run.trusted & ~alone, breaks), color=UNUSED, **drawn)  # type: ignore[arg-type]
+    axes.plot(*shown_line(time, theta, run.trusted, breaks), color=USED, **drawn)  # type: ignore[arg-type]
+    axes.plot(time[alone], theta[alone], "x", color=FALSE, ms=4.5, mew=1.0)
     for segment in run.segments:
         if not segment.used:
             axes.axvspan(segment.from_s, segment.to_s, color=BAND, lw=0, zorder=0)
@@ -144,7 +133,7 @@ def _history(axes: Axes, run: Run) -> None:
     style.scale(axes, "x", axes.get_xlim(), "t (s)")
     style.scale(axes, "y", axes.get_ylim(), ANGLE, angle=float(np.ptp(axes.get_ylim())) > 2)  # noqa: PLR2004
     parts = [("for fitting", USED), ("not for fitting", UNUSED), ("outliers", FALSE)]
-    shown = [True, bool((~run.trusted & ~lone).any()), bool(lone.any())]
+    shown = [True, bool((~run.trusted & ~alone).any()), bool(alone.any())]
     at = 1.0
     for (text, colour), there in reversed(list(zip(parts, shown, strict=True))):
         if there:
@@ -170,21 +159,21 @@ def _limits(axes: Axes, run: Run) -> None:
     axes.set_ylim(bottom - pad, top + pad)
 
 
-def _lone(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def lone(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which of the marked samples stand in stretches of three at most: outliers."""
-    lone = np.zeros(marked.size, bool)
+    few = np.zeros(marked.size, bool)
     for low, high in zip(*true_runs(marked), strict=True):
-        lone[low:high] = high - low <= 3  # noqa: PLR2004
-    return lone
+        few[low:high] = high - low <= 3  # noqa: PLR2004
+    return few
 
 
-def _broken(run: Run) -> NDArray[np.bool_]:
+def broken(run: Run) -> NDArray[np.bool_]:
     """Whether a line from the sample before would cross a gap."""
     steps = np.diff(run.time)
     return np.concatenate([[False], steps > 5 * np.median(steps)])
 
 
-def _where(
+def shown_line(
     time: NDArray[np.float64],
     theta: NDArray[np.float64],
     which: NDArray[np.bool_],
@@ -237,19 +226,40 @@ def _intervals(axes: Axes, run: Run) -> None:
         pad = max(0.05 * (high - low), 0.02 * usual)
         edges = np.linspace(low - pad, high + pad, 61)
     axes.hist(steps, edges.tolist(), color=USED, log=True)
-    axes.set_ylim(bottom=0.7)
-    if not wide:
-        style.scale(axes, "x", (float(edges[0]), float(edges[-1])), "interval (ms)")
+    axes.set_ylim(0.7, 1.5 * steps.size)
+    _powers(axes, "y", (0.7, 1.5 * steps.size))
     axes.set_xlim(edges[0], edges[-1])
+    ends = (float(edges[0]), float(edges[-1]))
+    if wide:
+        _powers(axes, "x", ends)
+    else:
+        style.scale(axes, "x", ends, "interval (ms)")
     axes.set_xlabel("interval (ms)")
     axes.set_ylabel("samples", labelpad=2)
     axes.set_title("(b) between turning points" if run.peaks_only else "(b) the clock")
 
 
+def _powers(axes: Axes, which: str, ends: tuple[float, float]) -> None:
+    """Give a logarithmic side a few powers of ten, those within its ends."""
+    low, high = math.ceil(math.log10(ends[0])), math.floor(math.log10(ends[1]))
+    every = max((high - low) // 5 + 1, 1)
+    powers = range(low, high + 1, every)
+    labels = [f"{10.0**k:g}" for k in powers]
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_ticks([10.0**k for k in powers], labels)
+    axis.set_minor_formatter(NullFormatter())
+
+
 def _decay(axes: Axes, run: Run) -> None:
-    axes.plot(run.time, np.maximum(np.abs(run.theta), 1e-12), "o", color=USED, ms=2.5)
+    size = np.maximum(np.abs(run.theta), 1e-9)
+    axes.plot(run.time, size, "o", color=USED, ms=2.5)
     axes.set_yscale("log")
-    axes.set_xlabel("t (s)")
+    ends = (float(size.min()) / 1.5, float(size.max()) * 1.5)
+    axes.set_ylim(*ends)
+    ticks = style.log_ticks(*ends)
+    axes.yaxis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    style.scale(axes, "x", (float(run.time[0]), float(run.time[-1])), "t (s)")
     axes.set_ylabel("|\N{GREEK SMALL LETTER THETA}| (rad)", labelpad=2)
     axes.set_title("(c) the decay")
 
@@ -262,10 +272,10 @@ def _residuals(axes: Axes, run: Run) -> None:
     speed, residual = np.abs(fit.slope[keep]), 1e3 * np.abs(fit.residual[keep])
     stride = max(speed.size // MOST_POINTS, 1)
     axes.set_title("(c) away from nine neighbours")
-    axes.set_xlabel("|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)")
-    axes.set_ylabel("residual (mrad)", labelpad=2)
     if not speed.size or not math.isfinite(noise.sigma):
         axes.text(0.5, 0.5, "too few samples", transform=axes.transAxes, ha="center")
+        axes.set_xticks([])
+        axes.set_yticks([])
         return
     axes.plot(speed[::stride], residual[::stride], ".", color="#a9b8cc", ms=1.5, rasterized=True)
     for part in noise.by_speed:
@@ -273,72 +283,13 @@ def _residuals(axes: Axes, run: Run) -> None:
         level = 1e3 * part.sigma
         axes.plot([part.speed_from, high], [level, level], color=FALSE, lw=1.8)
     top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
-    axes.set_ylim(0, max(top, 1e-9))
+    speeds = "|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)"
     fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
     axes.set_xlim(0, max(fastest * 1.03, 1e-9))
+    axes.set_ylim(0, max(top, 1e-9))
+    style.scale(axes, "x", axes.get_xlim(), speeds)
+    style.scale(axes, "y", axes.get_ylim(), "residual (mrad)")
     axes.text(
         0.98, 0.96, "line: standard deviation", transform=axes.transAxes, ha="right", va="top",
         color=FALSE, fontsize=8.5,
     )  # fmt: skip
-
-
-def _many(experiment: Experiment, size: tuple[float, float] | None, dpi: float) -> Figure:
-    runs = experiment.runs[:MOST_RUNS]
-    width = size[0] if size else 8.6
-    strip, gap = 0.85, 0.36
-    height = size[1] if size else sheets.TOP + sheets.BOTTOM + len(runs) * (strip + gap)
-    across = width - sheets.LEFT - sheets.RIGHT
-    strip = (height - sheets.TOP - sheets.BOTTOM) / len(runs) - gap
-    if across < 3.0 or strip < 0.4:  # noqa: PLR2004 (inches)
-        least = sheets.TOP + sheets.BOTTOM + len(runs) * (0.4 + gap)
-        wide = sheets.LEFT + sheets.RIGHT + 3.0
-        raise InputError(
-            f"size {size} leaves no room for the panels; it must be at least"
-            f" {wide:.1f} x {least:.1f} inches"
-        )
-    shown = f", the first {MOST_RUNS}" if len(experiment.runs) > MOST_RUNS else ""
-    title = f"Experiment {experiment.path.resolve().name}"
-    known = ", ".join(f"{name} = {value:g}" for name, value in experiment.known.items())
-    sheet = sheets.headed(
-        (width, height), dpi, title, f"{len(experiment.runs)} runs{shown};   {known}".rstrip("; ")
-    )
-    longest = max(float(run.time[-1] - run.time[0]) for run in runs)
-    for k, run in enumerate(runs):
-        bottom = height - sheets.TOP - (k + 1) * (strip + gap) + gap
-        _strip(sheets.place(sheet, sheets.LEFT, bottom, across, strip), run, longest)
-        if k + 1 < len(runs):
-            sheet.axes[-1].set_xticklabels([])
-            sheet.axes[-1].set_xlabel("")
-    return sheet
-
-
-def _strip(axes: Axes, run: Run, longest: float) -> None:
-    """Draw one run from its own start, so that all share a scale of time."""
-    time = run.time - run.time[0]
-    breaks = _broken(run)
-    lone = _lone(~run.trusted)
-    axes.plot(*_where(time, run.theta, ~run.trusted & ~lone, breaks), color=UNUSED, lw=0.7)
-    axes.plot(*_where(time, run.theta, run.trusted, breaks), color=USED, lw=0.7)
-    axes.plot(time[lone], run.theta[lone], "x", color=FALSE, ms=3.5, mew=0.9)
-    low, high = float(run.theta.min()), float(run.theta.max())
-    pad = max(0.08 * (high - low), 1e-6)
-    axes.set_ylim(low - pad, high + pad)
-    axes.set_xlim(-0.01 * longest, 1.01 * longest)
-    style.scale(axes, "x", (0.0, longest), "t from the start (s)")
-    style.scale(axes, "y", axes.get_ylim(), ANGLE, angle=high - low > 2)  # noqa: PLR2004
-    said: list[str] = [run.kind]
-    if run.drive is not None:
-        said.append(
-            f"p = {run.drive['p']:g}, \N{GREEK CAPITAL LETTER OMEGA} = {run.drive['Omega']:g} rad/s"
-        )
-    if run.hold_out:
-        said.append("held out")
-    odd = sum(not found.mended for found in run.findings)
-    said.append(_odd(run.findings, odd))
-    axes.set_title(f"{run.name}: " + ", ".join(filter(None, said)), fontsize=8.5, pad=3)
-
-
-def _odd(findings: tuple[Finding, ...], odd: int) -> str:
-    keys = [found.what for found in findings][:3]
-    more = ", ..." if len(findings) > len(keys) else ""
-    return ", ".join(keys) + more if odd or keys else ""

@@ -114,38 +114,40 @@ def _listed(table: Table) -> str:
 
 def _guess(table: Table, places: dict[str, int]) -> list[Finding]:
     """Find what is missing by names like the usual ones, or without names by position."""
-    guessed: dict[str, int] = {}
     if not table.headed:
         return _by_position(table, places)
+    guessed = _by_name(table, places)
+    if "time" in places and any(channel in places for channel in ANGLES):
+        guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
+    # A picture's coordinates beside an angle are what the angle was made from.
+    pair = all(name in places or name in guessed for name in ("pixel_x", "pixel_y"))
+    if "angle" in places or "angle" in guessed or not pair:
+        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
+    places.update(guessed)
+    if not guessed:
+        return []
+    said = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
+    return [Finding("columns-guessed", f"by their names {said}")]
+
+
+def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
+    """Return columns for the channels that have none, by names like the usual ones."""
+    guessed: dict[str, int] = {}
     split = [name_and_unit(head) for head in table.names]
     for channel, kind in CHANNELS.items():
         if channel in places:
             continue
-        fitting = []
-        for k, (name, unit) in enumerate(split):
-            if k in places.values() or k in guessed.values():
-                continue
-            if not any(re.fullmatch(pattern, plain(name)) for pattern in kind.names):
-                continue
-            if unit is None or kind.has(unit):
-                fitting.append(k)
+        taken = {*places.values(), *guessed.values()}
+        fitting = [
+            k
+            for k, (name, unit) in enumerate(split)
+            if k not in taken
+            and (unit is None or kind.has(unit))
+            and any(re.fullmatch(pattern, plain(name)) for pattern in kind.names)
+        ]
         if fitting:
             guessed[channel] = _best(channel, fitting, table)
-    needed = any(channel in places for channel in ANGLES)
-    if needed and "time" in places:
-        guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
-    # A picture's coordinates beside an angle are what the angle was made from.
-    if "angle" in places or "angle" in guessed:
-        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
-    if ("pixel_x" in guessed or "pixel_x" in places) != (
-        "pixel_y" in guessed or "pixel_y" in places
-    ):
-        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
-    places.update(guessed)
-    if not guessed or not {"time", *ANGLES} & set(guessed):
-        return []
-    said = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    return [Finding("columns-guessed", f"by their names {said}")]
+    return guessed
 
 
 def _best(channel: str, fitting: list[int], table: Table) -> int:

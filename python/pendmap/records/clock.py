@@ -224,9 +224,11 @@ def _spacing(work: Work) -> None:
             f"{counted(gaps.size, 'gap')}, about {counted(lost, 'sample')} missing; the longest"
             f" {steps[worst]:.3g} s at {work.time[worst]:.6g} s"
         )
-        work.say("time-gap", text, at=gaps)
+        span = (float(work.time[worst]), float(work.time[worst + 1]))
+        work.say("time-gap", text, at=gaps, span=span)
     even = np.delete(steps, gaps)
     spread = math.sqrt(float(np.mean((even - usual) ** 2)))
     if spread > JITTER * usual:
-        text = f"the intervals jitter by {spread:.2g} s rms, {100 * spread / usual:.0f} % of {usual:.4g} s"
+        share = 100 * spread / usual
+        text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
         work.say("time-jitter", text)

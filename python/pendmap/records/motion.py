@@ -222,9 +222,9 @@ def _settle(work: Work, parts: list[tuple[int, int]], middle: float, span: tuple
     work.trusted &= trusted
     if len(parts) > 1:
         low, high = parts[longest]
-        span = (float(work.time[low]), float(work.time[high - 1]))
-        text = f"{len(parts)} releases: the longest swing is used, {span[0]:.6g} to {span[1]:.6g} s"
-        work.say("several-releases", text, span=span)
+        begin, end = float(work.time[low]), float(work.time[high - 1])
+        text = f"{len(parts)} releases: the longest swing is used, {begin:.6g} to {end:.6g} s"
+        work.say("several-releases", text, span=(begin, end))
     first, last = segments[0], segments[-1]
     if first.what == "held":
         text = f"held until {first.to_s:.6g} s, not for fitting"
