@@ -1,0 +1,337 @@
+"""Peaks and zero crossings of a free decay, between the samples, each with a standard error."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.special import ellipk
+
+from pendmap.errors import InputError
+from pendmap.identification.ends import End, release, stop
+from pendmap.identification.local_fit import count_of, fit_around, noise_of
+from pendmap.identification.turning import outline
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.identification.local_fit import LocalFit
+    from pendmap.identification.turning import Outline
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Peaks", "find_peaks", "samples"]
+
+_BIAS: Final = 0.25
+"""Bias allowed in a peak's amplitude, in standard errors."""
+_WIDEST: Final = 1.3
+"""Half width of a peak's window at most, in radians of phase w0 t: a quarter swing is 1.57."""
+_CROSSING: Final = 0.6
+_FEWEST: Final = 8
+_RESOLVED: Final = 4.0
+"""A peak counts if it stands this many of its standard errors away from the one before."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Peaks:
+    """Turning points of a free decay, and the crossings of zero between them.
+
+    Half cycle ``k`` runs from peak ``k`` to peak ``k + 1``; it is odd if ``k`` is. Peak 0 is the
+    release where the record shows it, or else the first turn.
+
+    Parameters
+    ----------
+    time : array, shape (P,)
+        s.
+    amplitude : array, shape (P,)
+        Angle, with its sign, as recorded, rad.
+    stderr_time, stderr_amplitude : array, shape (P,)
+        Standard errors; infinite where nothing is known (the top of a clipped reading).
+    index : array of int, shape (P,)
+        Number ``k`` of the peak; one is missing where the record has a gap.
+    kind : tuple of str
+        ``release``, ``turn``, ``clipped``, or ``stop``: where the pendulum came to rest.
+    crossing_time, crossing_stderr : array, shape (C,)
+        s.
+    crossing_index : array of int, shape (C,)
+        Number of the half cycle in which the recorded angle is zero.
+    sigma : float
+        Standard deviation of the noise of a sample that the errors were computed with, rad.
+    """
+
+    time: Floats
+    amplitude: Floats
+    stderr_time: Floats
+    stderr_amplitude: Floats
+    index: NDArray[np.int64]
+    kind: tuple[str, ...]
+    crossing_time: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    crossing_stderr: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    crossing_index: NDArray[np.int64] = dataclasses.field(
+        default_factory=lambda: np.empty(0, np.int64)
+    )
+    sigma: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        time: ArrayLike,
+        amplitude: ArrayLike,
+        *,
+        stderr_time: float = 0.0,
+        stderr_amplitude: float = 0.0,
+    ) -> Peaks:
+        """Return peaks that somebody else has measured; absolute values get alternating signs."""
+        t, a = np.asarray(time, float), np.asarray(amplitude, float)
+        if t.ndim != 1 or t.shape != a.shape:
+            raise InputError(f"{t.shape} times of {a.shape} peaks: allowed are as many of each")
+        if a.size > 1 and np.all(a[:-1] > 0):
+            a = a * (-1.0) ** np.arange(a.size)
+        index = np.arange(t.size)
+        errors = np.full(t.size, stderr_time), np.full(t.size, stderr_amplitude)
+        return cls(t, a, *errors, index, ("turn",) * t.size)
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    @property
+    def odd(self) -> NDArray[np.bool_]:
+        """Which peaks begin an odd half cycle, shape (P,)."""
+        return self.index % 2 == 1
+
+    @property
+    def turned(self) -> Peaks:
+        """Only those at which the pendulum turned and was seen: no stop, nothing clipped."""
+        return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
+
+    def select(self, which: NDArray[np.bool_]) -> Peaks:
+        """Return some of the peaks, and all crossings."""
+        names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index")
+        some = {name: getattr(self, name)[which] for name in names}
+        kind = tuple(k for k, keep in zip(self.kind, which, strict=True) if keep)
+        return dataclasses.replace(self, **some, kind=kind)
+
+
+def samples(
+    time: ArrayLike, theta: ArrayLike, trusted: ArrayLike | None = None
+) -> tuple[Floats, Floats]:
+    """Return the samples that may be used, as arrays.
+
+    Raises
+    ------
+    InputError
+        If the lengths differ, a sample that is trusted is not finite, or time does not increase.
+    """
+    t, x = np.asarray(time, float), np.asarray(theta, float)
+    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
+    if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
+        raise InputError(f"time {t.shape}, theta {x.shape}, trusted {good.shape}: allowed are rows")
+    t, x = t[good], x[good]
+    if not (np.isfinite(t).all() and np.isfinite(x).all()):
+        raise InputError("time or theta is not finite: allowed are finite numbers where trusted")
+    if np.any(np.diff(t) <= 0):
+        raise InputError("time does not increase: allowed are increasing times")
+    return t, x
+
+
+def find_peaks(
+    time: ArrayLike,
+    theta: ArrayLike,
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+) -> Peaks:
+    """Find the peaks and zero crossings of a free decay.
+
+    A quartic is fitted by least squares around each peak, a cubic around each crossing. The
+    quartic leaves out the sixth derivative ``w0^6 sin A (3 sin^2 A - cos^2 A)`` that a pendulum has
+    at a peak ``A``; it shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half width
+    ``h``. The window is as wide as lets this be a quarter of the standard error, and 1.3 rad of
+    phase at most. Coulomb friction bends the two sides of a peak differently, which makes its time
+    late by ``0.16 h theta_r / A``, alike for all peaks of one size: periods do not feel it.
+    Amplitudes are freed of the excess ``stderr(v)^2 / (2 abs(theta''))`` that the highest point of
+    a noisy curve has on average.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, increasing, and rad from the downward rest, unwrapped.
+    sigma : float, optional
+        Standard deviation of the noise, rad; by default estimated without a model.
+    trusted : array of bool, shape (N,), optional
+        Samples that may be used; by default all.
+
+    Returns
+    -------
+    Peaks
+        Empty if the record does not swing.
+
+    Raises
+    ------
+    InputError
+        If the arrays do not match, are not finite or time does not increase.
+
+    Notes
+    -----
+    Where the count is coarser than the noise, neighbouring samples share their error, and the
+    standard errors count one sample for each count that the window sees.
+    """
+    t, x = samples(time, theta, trusted)
+    noise = noise_of(t, x) if sigma is None else max(float(sigma), count_of(x) / math.sqrt(12))
+    course = outline(t, x, noise)
+    if course is None:
+        none = np.empty(0)
+        return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
+    # An unwrapped angle may rest some turns away from where it began.
+    x = x - math.tau * round(float(np.median(x[course.turns[-2:]])) / math.tau)
+    finder = _Finder(t, x, noise, course)
+    ends = finder.found()
+    index = _numbered(ends, finder.w0)
+    crossings = finder.crossings(ends, index)
+    columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
+    return Peaks(
+        *columns.reshape(-1, 4).T.copy(),
+        index=index,
+        kind=tuple(e.kind for e in ends),
+        crossing_time=crossings[0],
+        crossing_stderr=crossings[1],
+        crossing_index=crossings[2].astype(np.int64),
+        sigma=noise,
+    )
+
+
+class _Finder:
+    """One record, its noise and its rough course."""
+
+    def __init__(self, time: Floats, theta: Floats, sigma: float, course: Outline) -> None:
+        self.time, self.theta, self.sigma, self.course = time, theta, sigma, course
+        self.count = count_of(theta)
+        late = float(np.median(np.abs(theta[course.turns[course.turns.size // 2 :]])))
+        self.w0 = 4 * float(ellipk(math.sin(min(late, 3.0) / 2) ** 2)) / course.period
+        self.step = float(np.median(np.diff(time)))
+
+    def found(self) -> list[End]:
+        """All peaks, in order of time."""
+        turns = [int(k) for k in self.course.turns]
+        begin = release(self.time, self.theta, self.sigma, self.w0, self.course)
+        result = [] if begin is None else [begin]
+        if begin is None:
+            first = int(turns[0])
+            inner = int(np.argmax(np.abs(self.course.smooth[: first // 2 + 1])))
+            if inner > 2:  # noqa: PLR2004 (samples that a turn needs before it)
+                turns = [inner, *turns]
+        for k in turns:
+            end = self._clipped(k) or self._turn(k)
+            if end is None or (result and not self._resolved(result[-1], end)):
+                continue
+            result.append(end)
+        end = stop(self.time, self.theta, self.sigma, self.course, result)
+        return result if end is None else [*result, end]
+
+    def window(self, amplitude: float) -> float:
+        """Half width of the window of a peak, s."""
+        a = min(abs(amplitude), math.pi - 0.05)
+        sixth = max(abs(math.sin(a) * (3 * math.sin(a) ** 2 - math.cos(a) ** 2)), 1e-3 * a, 1e-6)
+        bias = 5 / 231 * sixth / 720
+        error = self.sigma * 1.875 * math.sqrt(self.w0 * self.step / 2)
+        phase = (_BIAS * error / bias) ** (1 / 6.5)
+        least = (_FEWEST / 2 + 0.5) * self.step
+        return float(min(max(min(phase, _WIDEST) / self.w0, least), 0.45 * self.course.period))
+
+    def _turn(self, k: int) -> End | None:
+        time, half = float(self.time[k]), self.window(float(self.course.smooth[k]))
+        fit = None
+        begin = float(self.time[max(self.course.left - 1, 0)])
+        for _ in range(4):
+            fit = fit_around(
+                self.time, self.theta, time, half, (0, 1, 2, 3, 4), sigma=self.sigma, begin=begin
+            )
+            found = None if fit is None else fit.turn()
+            if found is None:
+                return None
+            near, time = time, found
+            if abs(time - near) < 0.1 * self.step:
+                break
+        return None if fit is None else self._end(fit, time)
+
+    def _end(self, fit: LocalFit, time: float) -> End:
+        (value, gain), (_, slope_gain), (bend, _) = (fit.at(time, j) for j in range(3))
+        sigma = self._effective(fit)
+        bend = bend or math.inf
+        slope = slope_gain * sigma
+        return End(
+            time, value - slope**2 / (2 * bend) * -1.0, slope / abs(bend), gain * sigma, "turn"
+        )
+
+    def _effective(self, fit: LocalFit) -> float:
+        """The noise of a sample, counted as often as samples are independent."""
+        if self.count <= 2 * self.sigma:
+            return self.sigma
+        inside = np.abs(self.time - fit.centre) <= fit.half
+        levels = np.unique(np.round(self.theta[inside] / self.count)).size
+        return self.sigma * math.sqrt(max(fit.points / max(levels, 1), 1.0))
+
+    def _clipped(self, k: int) -> End | None:
+        """A top that was cut off: the extreme of the record for longer than the swing stays."""
+        extreme = self.theta.max() if self.course.smooth[k] > 0 else self.theta.min()
+        near = np.flatnonzero(
+            (self.theta == extreme) & (np.abs(self.time - self.time[k]) < self.course.period / 2)
+        )
+        if near.size < 5 or near[-1] - near[0] + 1 != near.size:  # noqa: PLR2004 (in a row)
+            return None
+        bend = self.w0**2 * max(math.sin(min(abs(extreme), math.pi)), 0.05)
+        lasts = float(self.time[near[-1]] - self.time[near[0]])
+        if lasts < 3 * self.step + 4 * math.sqrt((self.count + 4 * self.sigma) / bend):
+            return None
+        middle = float(self.time[near[0]] + self.time[near[-1]]) / 2
+        return End(middle, float(extreme), self.step, math.inf, "clipped")
+
+    @staticmethod
+    def _resolved(before: End, after: End) -> bool:
+        if not (math.isfinite(before.stderr_angle) and math.isfinite(after.stderr_angle)):
+            return True
+        return abs(after.angle - before.angle) > _RESOLVED * math.hypot(
+            before.stderr_angle, after.stderr_angle
+        )
+
+    def crossings(
+        self, ends: list[End], index: NDArray[np.int64]
+    ) -> tuple[Floats, Floats, NDArray[np.int64]]:
+        """Instants at which the angle is zero between two peaks, their errors and half cycles."""
+        found = []
+        for before, after, k in zip(ends, ends[1:], index, strict=False):
+            if after.kind == "stop" or before.angle * after.angle >= 0:
+                continue
+            inside = np.flatnonzero((self.time > before.time) & (self.time < after.time))
+            if inside.size < 3:  # noqa: PLR2004
+                continue
+            k0 = inside[np.argmin(np.abs(self.course.smooth[inside]))]
+            half = max(_CROSSING / self.w0, 3.5 * self.step)
+            fit, time = None, float(self.time[k0])
+            for _ in range(2):
+                fit = fit_around(
+                    self.time, self.theta, time, half, (0, 1, 2, 3), sigma=self.sigma
+                )
+                root = None if fit is None else fit.zero()
+                time = time if root is None else root
+            if fit is None or fit.zero() is None:
+                continue
+            (_, gain), (speed, _) = fit.at(time), fit.at(time, 1)
+            found.append((time, gain * self._effective(fit) / abs(speed), k))
+        columns = np.array(found, float).reshape(-1, 3).T
+        return columns[0], columns[1], columns[2].astype(np.int64)
+
+
+def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
+    """Numbers of the peaks: signs alternate, and a gap in the record hides an even number."""
+    result = [0] if ends else []
+    for before, after in zip(ends, ends[1:], strict=False):
+        mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)
+        half = 2 * float(ellipk(math.sin(mean / 2) ** 2)) / w0
+        cycles = (after.time - before.time) / half
+        odd = before.angle * after.angle < 0 or after.kind == "stop"
+        steps = 2 * round((cycles - 1) / 2) + 1 if odd else 2 * round(cycles / 2)
+        result.append(result[-1] + max(steps, 1))
+    return np.array(result, np.int64)
