@@ -142,4 +142,5 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         used,
         tuple(warnings),
         covariance=(names, np.asarray(outer)),
+        misfit=misfit,
     )
