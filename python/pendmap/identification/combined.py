@@ -102,7 +102,7 @@ def decrement(peaks: Floats) -> float:
     """Return ``delta`` by eq. 2.7, from the first two and the last two absolute peaks.
 
     ``delta = ln[(th_0 - th_1) / (th_{k-1} - th_k)] / ((k - 1) pi)``. All between them cancel.
-    NaN where a difference is not above 0.
+    NaN where the ratio is not above 0.
     """
     ratio = (peaks[0] - peaks[1]) / (peaks[-2] - peaks[-1])
     if not ratio > 0:
@@ -119,9 +119,11 @@ def coulomb(peaks: Floats) -> float:
 
 def triplets(peaks: Floats) -> tuple[Floats, Floats]:
     """Return ``delta`` and ``theta_r`` of each three peaks in a row, shape (P - 2,): figure 5."""
-    groups = np.lib.stride_tricks.sliding_window_view(peaks, 3)
-    delta = np.array([decrement(group) for group in groups])
-    return delta, np.array([coulomb(group) for group in groups])
+    first, second, third = peaks[:-2], peaks[1:-1], peaks[2:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        delta = np.log((first - second) / (second - third)) / math.pi
+        theta_r = (second**2 - first * third) / (first - third)
+    return delta, theta_r
 
 
 def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int) -> Decrement:

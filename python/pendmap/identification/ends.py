@@ -27,13 +27,14 @@ _PHASE: Final = 0.8
 
 @dataclasses.dataclass(frozen=True)
 class End:
-    """The end of a half cycle: when, where (rad), how surely, and of which kind."""
+    """The end of a half cycle: when, where (rad), how surely, of which kind; the window, s."""
 
     time: float
     angle: float
     stderr_time: float
     stderr_angle: float
     kind: str
+    window: float = 0.0
 
 
 def release(

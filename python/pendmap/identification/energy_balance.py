@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pendmap.identification.chain import chain_covariance, chain_least_squares
 from pendmap.identification.combined import unphysical
 from pendmap.identification.envelope import viscous_work
 from pendmap.identification.local_fit import smoothed_velocity
@@ -27,7 +28,7 @@ _FEWEST = 5
 _MISFIT = 2.0
 _LARGEST = 2.0
 """Peaks below this give w0, rad: above, damping itself changes the half cycle's time."""
-_PHASE = 0.8
+_PHASE = 0.5
 """Half width of the windows in which the velocity is fitted, in radians of phase w0 t."""
 
 
@@ -76,13 +77,15 @@ def identify(
         return Identification(_NAME, warnings=(text,), applicable=False)
     w0 = frequency(small).w0
     work = _measured_work(t, x, turned, pairs, w0, peaks.sigma)
+    theta_r = 0.0
     zero, values, covariance, misfit = 0.0, np.empty(0), np.empty((0, 0)), 1.0
     for _ in range(5):
-        w0 = frequency(small, offset=zero).w0
+        w0 = frequency(small, theta_r=theta_r, offset=zero).w0
         values, covariance, misfit = _balance(turned, pairs, work, w0, zero)
         zero += float(values[2])
+        theta_r = float(values[1]) / w0**2
     zeta = float(values[0]) / (2 * w0)
-    period = frequency(small, zeta=min(abs(zeta), 0.9), offset=zero)
+    period = frequency(small, zeta=min(abs(zeta), 0.9), theta_r=theta_r, offset=zero)
     names = ("w0", "c_over_m", "Tr", "offset")
     found = np.array([period.w0, values[0], values[1], zero])
     # Energies are counted in w0^2: its error goes over to both dampings.
@@ -121,21 +124,14 @@ def _balance(
     tilt = w0**2 * (np.sin(x[pairs]) - np.sin(x[later]))
     # d lost / d zero = w0^2 (sin x_later - sin x_before).
     rows = np.column_stack((work, way, tilt))
-    slopes = np.zeros((pairs.size, len(peaks)))
-    each = np.arange(pairs.size)
-    slopes[each, pairs] = w0**2 * np.sin(x[pairs])
-    slopes[each, later] = -(w0**2) * np.sin(x[later])
-    error = np.maximum(peaks.stderr_amplitude, 1e-12)
+    variance = np.maximum(peaks.stderr_amplitude, 1e-12) ** 2
+    noise = chain_covariance(
+        pairs, w0**2 * np.sin(x[pairs]), -(w0**2) * np.sin(x[later]), variance
+    )
     # A peak's noise also moves the energy in second order: it matters where the peak is small.
-    second = (w0 * error) ** 4 / 2
-    noise = slopes * error**2 @ slopes.T + np.diag(second[pairs] + second[later])
-    scale = np.linalg.cholesky(noise)
-    rows, lost = np.linalg.solve(scale, rows), np.linalg.solve(scale, lost)
-    inverse = np.linalg.inv(rows.T @ rows)
-    values = inverse @ (rows.T @ lost)
-    residual = lost - rows @ values
-    misfit = float(residual @ residual) / max(pairs.size - 3, 1)
-    return values, inverse * max(misfit, 1.0), misfit
+    second = w0**4 * variance**2 / 2
+    noise[0] += second[pairs] + second[later]
+    return chain_least_squares(rows, lost, noise)
 
 
 def _measured_work(  # noqa: PLR0913 (record, peaks, scales)

@@ -65,12 +65,35 @@ class LocalFit:
         return self._nearest_root(self.coefficients)
 
     def _nearest_root(self, ascending: Floats) -> float | None:
-        roots = np.roots(ascending[::-1])
-        real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
-        real = real[np.abs(real) < 1]
-        if real.size == 0:
+        # Newton's method from the middle finds it nearly always; all roots are dear.
+        found = _newton(ascending.tolist())
+        if found is None:
+            roots = np.roots(ascending[::-1])
+            real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
+            real = real[np.abs(real) < 1]
+            if real.size == 0:
+                return None
+            found = float(real[np.argmin(np.abs(real))])
+        return self.centre + self.half * found
+
+
+def _newton(ascending: list[float]) -> float | None:
+    """A root of a polynomial within half a unit of 0 by Newton's method, if it leads there."""
+    s = 0.0
+    for _ in range(20):
+        value = slope = 0.0
+        for c in reversed(ascending):
+            slope = slope * s + value
+            value = value * s + c
+        if slope == 0:
             return None
-        return float(self.centre + self.half * real[np.argmin(np.abs(real))])
+        step = value / slope
+        s -= step
+        if abs(s) > 0.5:  # noqa: PLR2004
+            return None
+        if abs(step) < 1e-13:  # noqa: PLR2004
+            return s
+    return None
 
 
 def fit_around(  # noqa: PLR0913 (samples, window, form)
@@ -112,7 +135,7 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
         return None
     rows = s[:, None] ** np.array(powers)
     inverse, coefficients, residual = _solve(rows, x)
-    if sigma > 0:
+    if sigma > 0 and float(np.abs(residual).max()) > _OUTLIER * sigma:
         scale = max(sigma, float(np.median(np.abs(residual))) / _NORMAL_MAD)
         good = np.abs(residual) < _OUTLIER * scale
         if not good.all() and good.sum() > len(powers):
@@ -129,7 +152,8 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
 
 def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the inverse normal matrix, the solution and what it leaves."""
-    inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
+    # The samples' times differ and are scaled to the window: the matrix is far from singular.
+    inverse = np.linalg.inv(rows.T @ rows)
     coefficients = inverse @ (rows.T @ x)
     return inverse, coefficients, x - rows @ coefficients
 
@@ -207,6 +231,8 @@ def smoothed_velocity(
     t, x = windows(time, width)[first], windows(theta, width)[first]
     scale = half if half > 0 else 1.0
     rows = ((t - time[:, None]) / scale)[..., None] ** np.arange(degree + 1)
-    normal = np.linalg.pinv(np.swapaxes(rows, 1, 2) @ rows, hermitian=True)
-    slope = np.einsum("nj,nkj,nk->n", normal[:, 1, :], rows, x) / scale
+    across = np.swapaxes(rows, 1, 2)
+    normal = np.linalg.inv(across @ rows)
+    moments = (across @ x[..., None])[..., 0]
+    slope = np.sum(normal[:, 1, :] * moments, axis=1) / scale
     return slope, np.sqrt(np.maximum(normal[:, 1, 1], 0.0)) / scale

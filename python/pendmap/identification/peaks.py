@@ -22,15 +22,17 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Peaks", "find_peaks", "samples"]
+__all__ = ["LATENESS", "Peaks", "find_peaks", "samples"]
 
 _BIAS: Final = 0.25
 """Bias allowed in a peak's amplitude, in standard errors."""
 _WIDEST: Final = 1.3
 """Half width of a peak's window at most, in radians of phase w0 t: a quarter swing is 1.57."""
+LATENESS: Final = 5 / 32
+"""What the quartic makes of ``s abs(s)``: half the slope that it has at 0, over the window."""
 _CROSSING: Final = 0.6
 _FEWEST: Final = 8
-_RESOLVED: Final = 4.0
+_RESOLVED: Final = 8.0
 """A peak counts if it stands this many of its standard errors away from the one before."""
 
 
@@ -59,6 +61,9 @@ class Peaks:
         Number of the half cycle in which the recorded angle is zero.
     sigma : float
         Standard deviation of the noise of a sample that the errors were computed with, rad.
+    window : array, shape (P,)
+        Half widths of the windows in which the peaks were fitted, s; 0 where friction makes no
+        time late.
     """
 
     time: Floats
@@ -73,6 +78,11 @@ class Peaks:
         default_factory=lambda: np.empty(0, np.int64)
     )
     sigma: float = 0.0
+    window: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        if self.window.size != self.time.size:
+            object.__setattr__(self, "window", np.zeros(self.time.size))
 
     @classmethod
     def of(
@@ -108,7 +118,7 @@ class Peaks:
 
     def select(self, which: NDArray[np.bool_]) -> Peaks:
         """Return some of the peaks, and all crossings."""
-        names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index")
+        names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index", "window")
         some = {name: getattr(self, name)[which] for name in names}
         kind = tuple(k for k, keep in zip(self.kind, which, strict=True) if keep)
         return dataclasses.replace(self, **some, kind=kind)
@@ -150,7 +160,7 @@ def find_peaks(
     at a peak ``A``; it shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half width
     ``h``. The window is as wide as lets this be a quarter of the standard error, and 1.3 rad of
     phase at most. Coulomb friction bends the two sides of a peak differently, which makes its time
-    late by ``0.16 h theta_r / A``, alike for all peaks of one size: periods do not feel it.
+    late by ``5/32 h theta_r / sin A``, alike for all peaks of one size.
     Amplitudes are freed of the excess ``stderr(v)^2 / (2 abs(theta''))`` that the highest point of
     a noisy curve has on average.
 
@@ -176,7 +186,7 @@ def find_peaks(
     Notes
     -----
     Where the count is coarser than the noise, neighbouring samples share their error, and the
-    standard errors count one sample for each count that the window sees.
+    standard errors count three samples for each count that the window sees.
     """
     t, x = samples(time, theta, trusted)
     noise = noise_of(t, x) if sigma is None else max(float(sigma), count_of(x) / math.sqrt(12))
@@ -199,6 +209,7 @@ def find_peaks(
         crossing_stderr=crossings[1],
         crossing_index=crossings[2].astype(np.int64),
         sigma=noise,
+        window=np.array([e.window for e in ends]),
     )
 
 
@@ -262,7 +273,12 @@ class _Finder:
         bend = bend or math.inf
         slope = slope_gain * sigma
         return End(
-            time, value - slope**2 / (2 * bend) * -1.0, slope / abs(bend), gain * sigma, "turn"
+            time,
+            value + slope**2 / (2 * bend),
+            slope / abs(bend),
+            gain * sigma,
+            "turn",
+            fit.half,
         )
 
     def _effective(self, fit: LocalFit) -> float:
@@ -271,7 +287,7 @@ class _Finder:
             return self.sigma
         inside = np.abs(self.time - fit.centre) <= fit.half
         levels = np.unique(np.round(self.theta[inside] / self.count)).size
-        return self.sigma * math.sqrt(max(fit.points / max(levels, 1), 1.0))
+        return self.sigma * math.sqrt(max(fit.points / (3 * levels), 1.0))
 
     def _clipped(self, k: int) -> End | None:
         """A top that was cut off: the extreme of the record for longer than the swing stays."""

@@ -7,9 +7,10 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ellipk
+from scipy.special import ellipe, ellipkm1
 
-from pendmap.identification.uncertainty import least_squares_line
+from pendmap.identification.chain import chain_covariance, chain_least_squares
+from pendmap.identification.peaks import LATENESS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Frequency", "frequency", "mean_period", "phases"]
+__all__ = ["Frequency", "frequency", "mean_period", "quarters"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,30 +39,24 @@ def mean_period(time: Floats) -> float:
     return float(np.mean(time[2:] - time[:-2]))
 
 
-def phases(amplitude: Floats) -> Floats:
-    """Return ``w0 t`` at the peaks of a pendulum without dissipation, from the first one on.
+def quarters(amplitude: Floats) -> tuple[Floats, Floats]:
+    """Return ``w0 t`` of a quarter swing, ``K(sin^2(A/2))``, and its derivative by ``A``."""
+    size = np.clip(np.abs(amplitude), 1e-6, math.pi - 1e-6)
+    m, rest = np.sin(size / 2) ** 2, np.cos(size / 2) ** 2
+    quarter = ellipkm1(rest)
+    return quarter, (ellipe(m) - rest * quarter) / (2 * m * rest) * np.sin(size) / 2
+
+
+def frequency(
+    peaks: Peaks, *, zeta: float = 0.0, theta_r: float = 0.0, offset: float = 0.0
+) -> Frequency:
+    """Fit the amplitude-corrected period ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, to all peaks.
 
     A half cycle between the peaks ``A`` and ``B`` takes a quarter period of each,
-    ``w0 t = K(sin^2(A/2)) + K(sin^2(B/2))``. For viscous damping and friction this is right to
-    first order; at ``zeta = 0.004`` it misses 5e-4 of a half cycle near 2.6 rad, and less than
-    1e-4 below 2 rad.
-
-    Parameters
-    ----------
-    amplitude : array, shape (P,)
-        Peaks that follow one another, either sign, rad.
-    """
-    size = np.minimum(np.abs(amplitude), math.pi - 1e-6)
-    quarter = ellipk(np.sin(size / 2) ** 2)
-    return np.concatenate(([0.0], np.cumsum(quarter[1:] + quarter[:-1])))
-
-
-def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Frequency:
-    """Fit ``t_k = t_0 + Phi_k / (w0 sqrt(1 - zeta^2))`` to the times of all peaks.
-
-    ``Phi`` is :func:`phases`: this is the amplitude-corrected period ``T = 4 K(m) / w0``,
-    ``m = sin^2(A/2)``, of every cycle at once. Where peaks are missing the gap is left out: what
-    follows begins anew, at a time of its own.
+    ``w0 t = [K(sin^2(A/2)) + K(sin^2(B/2))] / sqrt(1 - zeta^2)``. For viscous damping and friction
+    this is right to first order; at ``zeta = 0.004`` it misses 3e-4 of the half cycle near 2.6 rad
+    and 5e-5 near 2 rad. Errors of times and amplitudes both count, and that neighbouring half
+    cycles share a peak. Half cycles beside a missing peak are left out.
 
     Parameters
     ----------
@@ -69,24 +64,34 @@ def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Freque
         Three or more.
     zeta : float
         Damping ratio, which makes small swings slower.
+    theta_r : float
+        ``Tr / w0^2``, rad: friction makes measured peaks late, see
+        :func:`pendmap.identification.peaks.find_peaks`.
     offset : float
         Zero error of the angle, rad.
+
+    Raises
+    ------
+    ValueError
+        If no two peaks follow one another.
     """
     amplitude = peaks.amplitude - offset
-    error = np.maximum(peaks.stderr_time, 1e-12)
-    gaps = np.flatnonzero(np.diff(peaks.index) != 1) + 1
-    if gaps.size == 0:
-        line, covariance, misfit = least_squares_line(phases(amplitude), peaks.time, error)
-        slope, variance = float(line[1]), float(covariance[1, 1])
-    else:
-        parts = [p for p in np.split(np.arange(len(peaks)), gaps) if p.size > 1]
-        lines = [
-            least_squares_line(phases(amplitude[p]), peaks.time[p], error[p]) for p in parts
-        ]
-        weights = np.array([1 / fit[1][1, 1] for fit in lines])
-        slope = float(np.average([fit[0][1] for fit in lines], weights=weights))
-        variance = 1 / float(weights.sum())
-        misfit = float(np.average([fit[2] for fit in lines], weights=weights))
-    damped = 1 / slope
+    quarter, slope = quarters(amplitude)
+    bend = np.sin(np.clip(np.abs(amplitude), 2 * abs(theta_r) + 1e-9, 3.0))
+    time = peaks.time - LATENESS * peaks.window * theta_r / bend
+    pairs = np.flatnonzero(np.diff(peaks.index) == 1)
+    if pairs.size == 0:
+        raise ValueError("no two peaks follow one another")
+    lasts, both = time[pairs + 1] - time[pairs], quarter[pairs + 1] + quarter[pairs]
+    rough = float(np.median(lasts / both))
+    one = np.ones(pairs.size)
+    # A time that is too late makes one half cycle longer and the next one shorter, an amplitude
+    # that is too large makes both longer.
+    late = chain_covariance(pairs, -one, one, np.maximum(peaks.stderr_time, 1e-12) ** 2)
+    wide = chain_covariance(
+        pairs, slope[pairs] * rough, slope[pairs + 1] * rough, peaks.stderr_amplitude**2
+    )
+    values, covariance, misfit = chain_least_squares(both[:, None], lasts, late + wide)
     root = math.sqrt(1 - zeta**2)
-    return Frequency(damped / root, math.sqrt(variance) * damped**2 / root, misfit)
+    w0 = 1 / (float(values[0]) * root)
+    return Frequency(w0, math.sqrt(float(covariance[0, 0])) * w0**2 * root, misfit)

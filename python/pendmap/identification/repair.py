@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING
 
@@ -106,15 +107,15 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         )
     first, delta, theta_r, zero = fit.x
     zeta = delta / math.sqrt(1 + delta**2)
-    smooth = Peaks(
-        small.time,
-        model(fit.x) - zero,
-        small.stderr_time if np.all(small.stderr_time > 0) else np.ones(count),
-        small.stderr_amplitude,
-        small.index,
-        small.kind,
+    # The fitted peaks are so much surer than the measured ones that their errors do not count.
+    times = small.stderr_time
+    smooth = dataclasses.replace(
+        small,
+        amplitude=model(fit.x) - zero,
+        stderr_amplitude=np.zeros(count),
+        stderr_time=times if np.all(times > 0) else np.ones(count),
     )
-    period = frequency(smooth, zeta=zeta)
+    period = frequency(smooth, zeta=zeta, theta_r=theta_r)
     period_error = period.stderr
     if not np.all(small.stderr_time > 0):
         period_error *= math.sqrt(min(period.misfit, 1.0))
