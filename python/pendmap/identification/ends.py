@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["End", "release", "stop"]
 
 _SURE: Final = 4.0
-_PHASE: Final = 0.8
-"""Half width of the windows here, in radians of phase w0 t."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +36,7 @@ class End:
 
 
 def release(
-    time: Floats, theta: Floats, sigma: float, w0: float, course: Outline
+    time: Floats, theta: Floats, sigma: float, scale: tuple[float, float], course: Outline
 ) -> End | None:
     """Return the release from rest at which the record begins, if it does.
 
@@ -51,18 +49,19 @@ def release(
         s and rad.
     sigma : float
         Noise, rad.
-    w0 : float
-        Rough natural frequency, rad/s.
+    scale : (float, float)
+        Rough natural frequency, rad/s, and half width of a window, s.
     course : Outline
         The rough course of the record.
     """
     if course.left == 0:
         return None
+    w0, half = scale
     step = float(np.median(np.diff(time)))
     level, leaves = float(np.median(theta[: max(course.left // 2, 3)])), float(time[course.left])
     bend = w0**2 * max(math.sin(min(abs(level), math.pi)), 0.02)
     quick = math.sqrt(2 * (6 * sigma + 1e-9) / bend)
-    half = max(_PHASE / w0, 5.5 * step)
+    half = max(half, 5.5 * step)
     if leaves - time[0] > 2 * quick + 4 * step:
         return _joined(time, theta, sigma, (float(time[0]), leaves, half), "release")
     free = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 3, 4), sigma=sigma)
@@ -129,12 +128,15 @@ def _joined(
         residual = x - rows @ coefficients
         return float(residual @ residual), coefficients, inverse
 
-    low, high = max(leaves - half, begin), leaves + half / 4
+    # The sum of squares is flat where the level takes all and has ripples: first a scan.
+    scan = np.linspace(max(leaves - half, begin), leaves + half / 2, 61)
+    nearest = int(np.argmin([solved(float(at))[0] for at in scan]))
+    low, high = float(scan[max(nearest - 1, 0)]), float(scan[min(nearest + 1, 60)])
     best = minimize_scalar(lambda at: solved(at)[0], bounds=(low, high), method="bounded")
     at = float(best.x)
     least, coefficients, inverse = solved(at)
     # The curvature of the sum of squares gives the error of the instant.
-    shift = max((high - low) / 100, 1e-9)
+    shift = max((high - low) / 10, 1e-9)
     curvature = (solved(at + shift)[0] - 2 * least + solved(at - shift)[0]) / shift**2
     error = sigma * math.sqrt(2 / curvature) if curvature > 0 else half
     level_error = sigma * math.sqrt(max(float(inverse[0, 0]), 0.0))

@@ -18,6 +18,7 @@ __all__ = ["LocalFit", "count_of", "fit_around", "noise_of", "smoothed_velocity"
 _NORMAL_MAD: Final = 0.674489750196
 """Median of the absolute value of a standard normal variable."""
 _OUTLIER: Final = 4.5
+_ROUNDS: Final = 4
 _POINTS, _DEGREE = 9, 4
 
 
@@ -108,8 +109,8 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
 ) -> LocalFit | None:
     """Fit a polynomial of these powers to the samples within ``half`` of ``centre``.
 
-    A sample that lies 4.5 times the noise off is left out and the fit repeated, once: what a
-    missed count or a dropout left behind must not turn a peak.
+    Samples that lie 4.5 times the noise off are left out and the fit is repeated, some times over:
+    what a missed count or a dropout left behind must not turn a peak.
 
     Parameters
     ----------
@@ -135,12 +136,15 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
         return None
     rows = s[:, None] ** np.array(powers)
     inverse, coefficients, residual = _solve(rows, x)
-    if sigma > 0 and float(np.abs(residual).max()) > _OUTLIER * sigma:
+    for _ in range(_ROUNDS if sigma > 0 else 0):
+        if float(np.abs(residual).max()) <= _OUTLIER * sigma:
+            break
         scale = max(sigma, float(np.median(np.abs(residual))) / _NORMAL_MAD)
         good = np.abs(residual) < _OUTLIER * scale
-        if not good.all() and good.sum() > len(powers):
-            rows, x = rows[good], x[good]
-            inverse, coefficients, residual = _solve(rows, x)
+        if good.all() or good.sum() <= len(powers) + 1:
+            break
+        rows, x = rows[good], x[good]
+        inverse, coefficients, residual = _solve(rows, x)
     every, square = np.zeros(max(powers) + 1), np.zeros((max(powers) + 1,) * 2)
     every[list(powers)] = coefficients
     square[np.ix_(powers, powers)] = inverse

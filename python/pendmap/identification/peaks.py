@@ -195,7 +195,8 @@ def find_peaks(
         none = np.empty(0)
         return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
     # An unwrapped angle may rest some turns away from where it began.
-    x = x - math.tau * round(float(np.median(x[course.turns[-2:]])) / math.tau)
+    away = math.tau * round(float(np.mean(x[course.turns[-2:]])) / math.tau)
+    x, course = x - away, dataclasses.replace(course, smooth=course.smooth - away)
     finder = _Finder(t, x, noise, course)
     ends = finder.found()
     index = _numbered(ends, finder.w0)
@@ -226,7 +227,8 @@ class _Finder:
     def found(self) -> list[End]:
         """All peaks, in order of time."""
         turns = [int(k) for k in self.course.turns]
-        begin = release(self.time, self.theta, self.sigma, self.w0, self.course)
+        scale = self.w0, self.window(float(self.theta[0]))
+        begin = release(self.time, self.theta, self.sigma, scale, self.course)
         result = [] if begin is None else [begin]
         if begin is None:
             first = int(turns[0])

@@ -22,6 +22,8 @@ _SMOOTHING: Final = 0.1
 _SURE: Final = 6.0
 """A turn is believed once the angle has come back by this many standard errors."""
 _FEWEST: Final = 8
+_GAP: Final = 10.0
+"""A pause of this many samples is a gap, before the period is known."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,22 +74,28 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     calm = _median_of_five(theta)
     step = count_of(theta)
     span = float(np.ptp(calm))
-    rough = _zigzag(calm, max(8 * sigma + 2 * step, 1e-6 * span))
+    steps = np.diff(time)
+    gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
+    rough = _zigzags(calm, max(8 * sigma + 2 * step, 1e-6 * span), gaps)
     if rough.size < 2:  # noqa: PLR2004 (a half cycle lies between two)
         return None
-    gaps = np.diff(time[rough])
-    period = 2 * float(np.median(gaps[gaps.size // 2 :]))
+    halves = np.diff(time[rough])
+    period = 2 * float(np.median(halves[halves.size // 2 :]))
     smooth, count = _running_mean(time, calm, _SMOOTHING * period)
     # The median of five has a little more noise than the samples' mean would leave.
     noise = 1.2 * max(sigma, 1e-9 * span) / math.sqrt(count)
-    turns = _zigzag(smooth, _SURE * noise + 0.5 * step)
-    turns = turns[_far_apart(time[turns], period)]
+    gaps = np.flatnonzero(steps > _SMOOTHING * period) + 1
+    # Towards the end the mean is over ever fewer samples: what it does there is noise.
+    ahead = int(np.searchsorted(time, time[-1] - _SMOOTHING * period))
+    turns = _zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
+    turns = _far_apart(turns, time, period)
+    level = float(np.median(smooth[time > time[-1] - 0.5 * period]))
+    off = np.flatnonzero(np.abs(smooth[:ahead] - level) > 4 * noise + 0.5 * step)
+    rest = int(off[-1]) + 1 if off.size and time[-1] - time[off[-1]] > 0.75 * period else None
+    if rest is not None:
+        turns = turns[turns < rest]
     if turns.size < 2:  # noqa: PLR2004
         return None
-    tail = time > time[-1] - 0.5 * period
-    level = float(np.median(smooth[tail]))
-    off = np.flatnonzero(np.abs(smooth - level) > 4 * noise + 0.5 * step)
-    rest = int(off[-1]) + 1 if off.size and time[-1] - time[off[-1]] > 0.75 * period else None
     # Several in a row: a single one is an outlier.
     away = np.abs(theta - float(np.median(theta[:3]))) > _SURE * sigma + step
     runs = away[:-2] & away[1:-1] & away[2:]
@@ -136,7 +144,19 @@ def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
     return np.array(found, dtype=np.intp)
 
 
-def _far_apart(times: Floats, period: float) -> NDArray[np.intp]:
-    """The turns up to the first that follows sooner than any pendulum swings."""
-    soon = np.flatnonzero(np.diff(times) < 0.3 * period)
-    return np.arange(times.size if soon.size == 0 else soon[0] + 1)
+def _zigzags(x: Floats, threshold: float, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The same for each part between two gaps: what is next to a gap need not be a turn."""
+    begins = np.concatenate(([0], gaps))
+    parts = [_zigzag(part, threshold) for part in np.split(x, gaps)]
+    return np.concatenate([part + at for part, at in zip(parts, begins, strict=True)])
+
+
+def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[np.intp]:
+    """The turns without pairs that follow one another sooner than any pendulum swings."""
+    kept: list[int] = []
+    for k in turns.tolist():
+        if kept and time[k] - time[kept[-1]] < 0.3 * period:  # noqa: PLR2004
+            kept.pop()
+        else:
+            kept.append(k)
+    return np.array(kept, np.intp)
