@@ -22,8 +22,16 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 import numpy as np
 
 from peers.report import machine, note, say, table
-from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
-from pendmap.identification import combined, de_paula, log_decrement
+from pendmap.identification import (
+    Estimate,
+    Identification,
+    Peaks,
+    combined,
+    de_paula,
+    find_peaks,
+    identify,
+    log_decrement,
+)
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.drive import Drive
@@ -67,9 +75,7 @@ def recipe_errors() -> dict[str, float]:
     """Difference from the decrement recipe on the exact peaks."""
     truths = json.loads(TRUTHS.read_text(encoding="utf-8"))
     exact, wanted = truths["free_decay"]["nonlinear"][0], truths["decrement_recipe"][0]
-    peaks = Peaks.of(
-        np.array(exact["times"], float)[:-1], np.array(exact["thetas"], float)[:-1]
-    )
+    peaks = Peaks.of(np.array(exact["times"], float)[:-1], np.array(exact["thetas"], float)[:-1])
     small, _ = combined.small_peaks(peaks)
     made = combined.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
     names = ("delta", "zeta", "theta_r", "mean_period", "w0", "Tr")
@@ -121,9 +127,7 @@ def choices(peaks: Peaks) -> dict[str, Identification]:
         for cut in (12.0, 30.0, 90.0, 180.0):
             for reading in ("ends", "line"):
                 name = f"log_decrement, {reading}, {floor:g} to {cut:g} deg"
-                made[name] = log_decrement.from_peaks(
-                    some, reading=reading, cut=math.radians(cut)
-                )
+                made[name] = log_decrement.from_peaks(some, reading=reading, cut=math.radians(cut))
         for cut in (6.0, 12.0, 30.0, 60.0):
             for top in (90.0, 180.0):
                 slow, fast = np.radians((floor, cut)), np.radians((cut, top))

@@ -32,7 +32,7 @@ class Decay:
 
 
 @functools.cache
-def decay(  # noqa: PLR0913, PLR0917 (the pendulum, the release)
+def decay(  # noqa: PLR0913 (the pendulum, the release)
     w0: float = 6.2,
     c_over_m: float = 0.0496,
     tr: float = 0.08,

@@ -66,7 +66,7 @@ def chain_least_squares(
     """
     factor = (cholesky_banded(covariance, lower=True), True)
     weighted = cho_solve_banded(factor, rows)
-    inverse = np.linalg.inv(rows.T @ weighted)
+    inverse = np.asarray(np.linalg.inv(rows.T @ weighted), np.float64)
     values = inverse @ (weighted.T @ y)
     residual = y - rows @ values
     chi2 = float(residual @ cho_solve_banded(factor, residual))

@@ -85,7 +85,9 @@ def from_peaks(
             return Identification(_NAME, warnings=(text,), applicable=False)
     quick, slack = chosen["fast"], chosen["slow"]
     warnings = []
-    speed = frequency(turned.select((size < max(fast[1], slow[1])) & (size >= min(fast[0], slow[0]))))
+    speed = frequency(
+        turned.select((size < max(fast[1], slow[1])) & (size >= min(fast[0], slow[0])))
+    )
     relative = np.maximum(quick.stderr_amplitude, 1e-12) / np.abs(quick.amplitude)
     rate, rate_cov, rate_misfit = least_squares_line(
         quick.time, np.log(np.abs(quick.amplitude)), relative

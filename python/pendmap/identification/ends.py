@@ -123,7 +123,7 @@ def _joined(
     def solved(instant: float) -> tuple[float, Floats, Floats]:
         s = np.maximum(t - instant, 0.0) / half
         rows = np.column_stack((np.ones_like(s), s**2, s**4))
-        inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
+        inverse = np.asarray(np.linalg.pinv(rows.T @ rows, hermitian=True), np.float64)
         coefficients = inverse @ (rows.T @ x)
         residual = x - rows @ coefficients
         return float(residual @ residual), coefficients, inverse

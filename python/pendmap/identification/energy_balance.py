@@ -76,7 +76,7 @@ def identify(
         text = f"not applicable: {pairs.size} whole half cycles, {_FEWEST - 1} are needed"
         return Identification(_NAME, warnings=(text,), applicable=False)
     w0 = frequency(small).w0
-    work = _measured_work(t, x, turned, pairs, w0, peaks.sigma)
+    work = _measured_work((t, x), turned, pairs, w0)
     theta_r = 0.0
     zero, values, covariance, misfit = 0.0, np.empty(0), np.empty((0, 0)), 1.0
     for _ in range(5):
@@ -125,29 +125,21 @@ def _balance(
     # d lost / d zero = w0^2 (sin x_later - sin x_before).
     rows = np.column_stack((work, way, tilt))
     variance = np.maximum(peaks.stderr_amplitude, 1e-12) ** 2
-    noise = chain_covariance(
-        pairs, w0**2 * np.sin(x[pairs]), -(w0**2) * np.sin(x[later]), variance
-    )
+    noise = chain_covariance(pairs, w0**2 * np.sin(x[pairs]), -(w0**2) * np.sin(x[later]), variance)
     # A peak's noise also moves the energy in second order: it matters where the peak is small.
     second = w0**4 * variance**2 / 2
     noise[0] += second[pairs] + second[later]
     return chain_least_squares(rows, lost, noise)
 
 
-def _measured_work(  # noqa: PLR0913 (record, peaks, scales)
-    time: Floats,
-    theta: Floats,
-    peaks: Peaks,
-    pairs: NDArray[np.intp],
-    w0: float,
-    sigma: float,
+def _measured_work(
+    record: tuple[Floats, Floats], peaks: Peaks, pairs: NDArray[np.intp], w0: float
 ) -> Floats:
     """``int th'^2 dt`` over each half cycle, rad^2/s."""
+    time, theta = record
     speed, gain = smoothed_velocity(time, theta, _PHASE / w0)
-    power = speed**2 - (sigma * gain) ** 2
-    total = np.concatenate(
-        ([0.0], np.cumsum(np.diff(time) * (power[1:] + power[:-1]) / 2))
-    )
+    power = speed**2 - (peaks.sigma * gain) ** 2
+    total = np.concatenate(([0.0], np.cumsum(np.diff(time) * (power[1:] + power[:-1]) / 2)))
     ends = np.interp(peaks.time, time, total)
     measured = ends[pairs + 1] - ends[pairs]
     mean = (np.abs(peaks.amplitude[pairs]) + np.abs(peaks.amplitude[pairs + 1])) / 2

@@ -19,6 +19,7 @@ _NORMAL_MAD: Final = 0.674489750196
 """Median of the absolute value of a standard normal variable."""
 _OUTLIER: Final = 4.5
 _ROUNDS: Final = 4
+_ROUNDING: Final = 1e-9
 _POINTS, _DEGREE = 9, 4
 
 
@@ -54,7 +55,9 @@ class LocalFit:
         s = (time - self.centre) / self.half
         for j in range(derivative, size):
             row[j] = math.perm(j, derivative) * s ** (j - derivative) / self.half**derivative
-        return float(row @ self.coefficients), math.sqrt(max(row @ self.covariance @ row, 0.0))
+        return float(row @ self.coefficients), math.sqrt(
+            max(float(row @ self.covariance @ row), 0.0)
+        )
 
     def turn(self) -> float | None:
         """Return the instant nearest to the centre at which the velocity is zero, s."""
@@ -157,7 +160,7 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
 def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the inverse normal matrix, the solution and what it leaves."""
     # The samples' times differ and are scaled to the window: the matrix is far from singular.
-    inverse = np.linalg.inv(rows.T @ rows)
+    inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     coefficients = inverse @ (rows.T @ x)
     return inverse, coefficients, x - rows @ coefficients
 
@@ -199,7 +202,7 @@ def count_of(theta: Floats) -> float:
     """
     levels = np.unique(theta)
     gaps = np.diff(levels)
-    gaps = gaps[gaps > 1e-9]
+    gaps = gaps[gaps > _ROUNDING]
     if gaps.size < 10 or levels.size > 0.98 * theta.size:  # noqa: PLR2004 (too few to tell)
         return 0.0
     step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))

@@ -8,7 +8,7 @@ from pendmap.errors import InputError
 from pendmap.identification import combined, de_paula, energy_balance, log_decrement, repair
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray

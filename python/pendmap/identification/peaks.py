@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -109,7 +110,7 @@ class Peaks:
     @property
     def odd(self) -> NDArray[np.bool_]:
         """Which peaks begin an odd half cycle, shape (P,)."""
-        return self.index % 2 == 1
+        return np.asarray(self.index % 2 == 1)
 
     @property
     def turned(self) -> Peaks:
@@ -202,8 +203,12 @@ def find_peaks(
     index = _numbered(ends, finder.w0)
     crossings = finder.crossings(ends, index)
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
+    instant, amplitude, stderr_time, stderr_amplitude = columns.reshape(-1, 4).T.copy()
     return Peaks(
-        *columns.reshape(-1, 4).T.copy(),
+        instant,
+        amplitude,
+        stderr_time,
+        stderr_amplitude,
         index=index,
         kind=tuple(e.kind for e in ends),
         crossing_time=crossings[0],
@@ -329,9 +334,7 @@ class _Finder:
             half = max(_CROSSING / self.w0, 3.5 * self.step)
             fit, time = None, float(self.time[k0])
             for _ in range(2):
-                fit = fit_around(
-                    self.time, self.theta, time, half, (0, 1, 2, 3), sigma=self.sigma
-                )
+                fit = fit_around(self.time, self.theta, time, half, (0, 1, 2, 3), sigma=self.sigma)
                 root = None if fit is None else fit.zero()
                 time = time if root is None else root
             if fit is None or fit.zero() is None:
@@ -345,7 +348,7 @@ class _Finder:
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
     """Numbers of the peaks: signs alternate, and a gap in the record hides an even number."""
     result = [0] if ends else []
-    for before, after in zip(ends, ends[1:], strict=False):
+    for before, after in itertools.pairwise(ends):
         mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)
         half = 2 * float(ellipk(math.sin(mean / 2) ** 2)) / w0
         cycles = (after.time - before.time) / half

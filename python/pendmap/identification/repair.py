@@ -105,7 +105,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
             f"the recursion does not fit the peaks: chi^2 per degree of freedom is {misfit:.3g}; "
             "the errors are widened by it"
         )
-    first, delta, theta_r, zero = fit.x
+    _, delta, theta_r, zero = fit.x
     zeta = delta / math.sqrt(1 + delta**2)
     # The fitted peaks are so much surer than the measured ones that their errors do not count.
     times = small.stderr_time

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.model import Rig
 
@@ -77,7 +77,7 @@ class Identification:
 
     @property
     def derived(self) -> dict[str, Estimate]:
-        """``zeta = c_over_m / (2 w0)`` and ``theta_r = Tr / w0**2`` (rad), as far as they are known.
+        """``zeta = c_over_m / (2 w0)`` and ``theta_r = Tr / w0**2`` (rad), as far as known.
 
         Errors by the delta method from the covariance; without one the errors of the two numbers
         count as independent.
@@ -112,8 +112,10 @@ class Identification:
     def rig(self) -> Rig:
         """The pendulum that was found; what the method does not know is 0, and so is a negative
         damping, which no pendulum has.
-        """  # noqa: D205, D400, D415 (one sentence)
-        known = {n: e.value for n, e in self.estimates.items() if n in Rig.numbers()}
+        """  # noqa: D205 (one sentence)
+        known: dict[str, Any] = {
+            n: e.value for n, e in self.estimates.items() if n in Rig.numbers()
+        }
         for name in ("c_over_m", "Tr"):
             if name in known:
                 known[name] = max(known[name], 0.0)

@@ -30,6 +30,9 @@ for it."""
 PEAKS: Final = (1.2, 2.53)
 """Peaks of the paper's table, rad."""
 
+_SAME: Final = 1e-9
+"""Events closer than this are one, s."""
+
 
 @dataclasses.dataclass(frozen=True)
 class State:
@@ -125,9 +128,9 @@ def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Float
     turned = np.isin(kinds, ("turn", "stick", "stuck for ever"))
     times, angles = run["event_time"].values[turned], run["event_theta"].values[turned]
     # A stop that lasts is told twice, when it begins and when it proves to be for ever.
-    new = np.concatenate(([True], np.diff(times) > 1e-9)) if times.size else np.empty(0, bool)
+    new = np.concatenate(([True], np.diff(times) > _SAME)) if times.size else np.empty(0, bool)
     times, angles = times[new], angles[new]
-    if start.velocity == 0 and (times.size == 0 or times[0] > 1e-9):
+    if start.velocity == 0 and (times.size == 0 or times[0] > _SAME):
         times, angles = np.append(0.0, times), np.append(start.theta, angles)
     return times + start.time, angles
 
@@ -229,7 +232,9 @@ def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | Non
         if there.size == 0:
             return None
         # Not the last ones: an asked period below all would pick the noisiest.
-        near = int(np.argmin(np.abs(there - max(asked, float(np.median(there[there.size // 2 :]))))))
+        near = int(
+            np.argmin(np.abs(there - max(asked, float(np.median(there[there.size // 2 :])))))
+        )
         if what == "peak":
             near = int(np.argmin(np.abs(there - asked)))
         measured, column[name] = float(there[near]), abs(float(wrong[near]))

@@ -155,7 +155,7 @@ def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[
     """The turns without pairs that follow one another sooner than any pendulum swings."""
     kept: list[int] = []
     for k in turns.tolist():
-        if kept and time[k] - time[kept[-1]] < 0.3 * period:  # noqa: PLR2004
+        if kept and time[k] - time[kept[-1]] < 0.3 * period:
             kept.pop()
         else:
             kept.append(k)

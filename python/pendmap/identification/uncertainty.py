@@ -93,7 +93,7 @@ def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Fl
         chi^2 per degree of freedom.
     """
     rows = np.column_stack((np.ones_like(x), x)) / stderr[:, None]
-    inverse = np.linalg.inv(rows.T @ rows)
+    inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     coefficients = inverse @ (rows.T @ (y / stderr))
     residual = y / stderr - rows @ coefficients
     misfit = float(residual @ residual) / max(x.size - 2, 1)
