@@ -24,6 +24,7 @@ __all__ = [
     "Reading",
     "coulomb",
     "decrement",
+    "from_amplitudes",
     "from_peaks",
     "identify",
     "identify_odd_ends",
@@ -31,6 +32,7 @@ __all__ = [
     "recursion",
     "small_peaks",
     "triplets",
+    "unphysical",
 ]
 
 CUT: Final = math.radians(12.0)
