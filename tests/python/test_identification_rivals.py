@@ -191,6 +191,15 @@ def test_table_1_of_the_true_model_has_no_errors() -> None:
     assert errors.peak_rms < table.errors["wrong"].peak_rms
 
 
+@pytest.mark.parametrize("begin", [1, 4, 60, 150, 620])
+def test_a_record_that_begins_in_motion_is_compared_peak_by_peak(begin: int) -> None:
+    time, angle = record(WIDE, noise_deg=0.02)
+    true = Identification("true", {name: Estimate(value) for name, value in BOTH.items()})
+    errors = table1(time[begin:], angle[begin:], {"true": true}).errors["true"]
+    assert np.abs(errors.peak_error[:100]).max() < 2
+    assert np.abs(errors.period_error[:100]).max() < 1
+
+
 def test_an_experiment_gives_its_longest_free_run() -> None:
     @dataclasses.dataclass(frozen=True)
     class Run:

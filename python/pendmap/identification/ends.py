@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["End", "release", "stop"]
 
 _SURE: Final = 4.0
+_STILL: Final = 1e-3
+"""A velocity below this, over amplitude and w0, is none: the even form itself is off by as much."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,17 +66,15 @@ def release(
     half = max(half, 5.5 * step)
     if leaves - time[0] > 2 * quick + 4 * step:
         return _joined(time, theta, sigma, (float(time[0]), leaves, half), "release")
-    free = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 3, 4), sigma=sigma)
     even = fit_around(time, theta, float(time[0]), half, (0, 2, 4), sigma=sigma)
-    if free is None or even is None:
+    moving = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 4), sigma=sigma)
+    if even is None or moving is None:
         return None
-    # A poor even fit, or a bend away from the middle, is a record that begins in motion.
-    (angle, gain), (speed, speed_gain) = even.at(float(time[0])), free.at(float(time[0]), 1)
-    bend = even.at(float(time[0]), 2)[0]
-    worse = even.residual**2 * (even.points - 3) - free.residual**2 * (free.points - 5)
-    slack = 1e-6 * abs(angle)
-    moving = abs(speed) > _SURE * speed_gain * sigma + slack * w0
-    if bend * angle >= 0 or (moving and worse > _SURE**2 * sigma**2 + slack**2):
+    # A velocity, or a bend away from the middle, is a record that begins in motion.
+    (angle, gain), (bend, _) = even.at(float(time[0])), even.at(float(time[0]), 2)
+    speed, speed_gain = moving.at(float(time[0]), 1)
+    slack = _STILL * abs(angle) * w0
+    if bend * angle >= 0 or abs(speed) > _SURE * speed_gain * sigma + slack:
         return None
     return End(float(time[0]), angle, step / 10, gain * sigma, "release")
 

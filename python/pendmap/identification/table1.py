@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.local_fit import fit_around
-from pendmap.identification.peaks import Peaks, find_peaks, samples
+from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.trajectory import simulate
 
 if TYPE_CHECKING:
@@ -105,20 +104,14 @@ class Table1:
     errors: Mapping[str, PeakErrors]
 
 
-def first_state(time: Floats, theta: Floats, peaks: Peaks) -> State:
-    """Return the state from which models are simulated.
+def first_state(peaks: Peaks) -> State:
+    """Return the state from which models are simulated: the first peak, at rest.
 
-    The release where the record shows it, at rest; else the first sample, with angle and velocity
-    by a local cubic.
+    It is the release where the record shows it. In a record that begins in motion no sample gives a
+    velocity as surely as the first turn does.
     """
-    if peaks.kind and peaks.kind[0] == "release":
-        return State(float(peaks.time[0]), float(peaks.amplitude[0]), 0.0)
-    quarter = float(np.median(np.diff(peaks.time))) / 2
-    begin = float(time[0])
-    fit = fit_around(time, theta, begin, max(quarter / 2, 8 * float(time[1] - begin)), (0, 1, 2, 3))
-    if fit is None:
-        return State(begin, float(theta[0]), 0.0)
-    return State(begin, fit.at(begin)[0], fit.at(begin, 1)[0])
+    turned = peaks.turned
+    return State(float(turned.time[0]), float(turned.amplitude[0]), 0.0)
 
 
 def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Floats]:
@@ -147,7 +140,8 @@ def peak_errors(
     peaks : Peaks
         What it is compared with.
     start : State
-        Where the simulation begins, as recorded: the zero error that was found is taken off.
+        Where the simulation begins, at the first of ``peaks``, as recorded: the zero error that
+        was found is taken off.
     offset : float, optional
         Zero error of ``peaks``, rad; by default the one that was found. 0 for true peaks.
     """
@@ -156,7 +150,6 @@ def peak_errors(
     turned = peaks.turned
     origin = dataclasses.replace(start, theta=start.theta - zero)
     times, angles = simulated_peaks(found.rig, origin, float(turned.time[-1]) * 1.2 + 5.0)
-    # Without a release the simulation's first turn is the record's first peak.
     number = turned.index - turned.index[0]
     made_time, made = (np.full(int(number[-1]) + 1, math.nan) for _ in range(2))
     size = min(made.size, times.size)
@@ -185,7 +178,7 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     periods: Sequence[float] = PERIODS,
     peaks: Sequence[float] = PEAKS,
 ) -> Table1:
-    """Simulate what each method found from the record's first state, and compare.
+    """Simulate what each method found from the record's first peak, and compare.
 
     Parameters
     ----------
@@ -211,7 +204,7 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     found = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     if len(found.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return Table1((), {})
-    start = first_state(*samples(time, theta, trusted), found)
+    start = first_state(found)
     errors = {
         name: peak_errors(each, found, start)
         for name, each in identifications.items()
