@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.model import Rig
 
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["Estimate", "Identification"]
+
+_Z95: Final = 1.959963984540054
+"""The 97.5 % point of the standard normal distribution."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,6 +59,8 @@ class Identification:
         Whether the method can be applied to the record; if not, ``warnings`` say why.
     covariance : tuple of (tuple of str, ndarray) or None
         Names and covariance matrix of what was fitted together.
+    misfit : float or None
+        chi^2 per degree of freedom of the method's own model, where it has one.
     """
 
     method: str
@@ -64,17 +69,53 @@ class Identification:
     warnings: tuple[str, ...] = ()
     applicable: bool = True
     covariance: tuple[tuple[str, ...], NDArray[np.float64]] | None = None
+    misfit: float | None = None
 
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""
         return self.estimates[name].value
 
     @property
+    def derived(self) -> dict[str, Estimate]:
+        """``zeta = c_over_m / (2 w0)`` and ``theta_r = Tr / w0**2`` (rad), as far as known.
+
+        Errors by the delta method from the covariance; without one the errors of the two numbers
+        count as independent.
+        """
+        made = {}
+        for name, numerator, power in (("zeta", "c_over_m", 1), ("theta_r", "Tr", 2)):
+            if numerator not in self.estimates or "w0" not in self.estimates:
+                continue
+            over, w0 = self.estimates[numerator], self.estimates["w0"]
+            scale = 1 / (2 * w0.value) if power == 1 else 1 / w0.value**2
+            value = over.value * scale
+            if over.stderr is None or w0.stderr is None:
+                made[name] = Estimate(value)
+                continue
+            lever = -power * value / w0.value
+            shared = self._shared(numerator, "w0")
+            variance = (scale * over.stderr) ** 2 + (lever * w0.stderr) ** 2
+            error = math.sqrt(max(variance + 2 * scale * lever * shared, 0.0))
+            made[name] = Estimate(value, error, (value - _Z95 * error, value + _Z95 * error))
+        return made
+
+    def _shared(self, one: str, other: str) -> float:
+        """The covariance of two estimates."""
+        if self.covariance is None:
+            return 0.0
+        names, matrix = self.covariance
+        if one not in names or other not in names:
+            return 0.0
+        return float(matrix[names.index(one), names.index(other)])
+
+    @property
     def rig(self) -> Rig:
         """The pendulum that was found; what the method does not know is 0, and so is a negative
         damping, which no pendulum has.
         """  # noqa: D205 (one sentence)
-        known = {n: e.value for n, e in self.estimates.items() if n in Rig.numbers()}
+        known: dict[str, Any] = {
+            n: e.value for n, e in self.estimates.items() if n in Rig.numbers()
+        }
         for name in ("c_over_m", "Tr"):
             if name in known:
                 known[name] = max(known[name], 0.0)

@@ -1,0 +1,26 @@
+"""Damping from the record of a free decay: the paper's method, its repair and its rivals."""
+
+from __future__ import annotations
+
+from pendmap.identification.methods import METHODS, Method, identify
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.result import Estimate, Identification
+from pendmap.identification.start import StartingValues, global_start, starting_values
+from pendmap.identification.table1 import PeakErrors, Row, Table1, table1
+
+__all__ = [
+    "METHODS",
+    "Estimate",
+    "Identification",
+    "Method",
+    "PeakErrors",
+    "Peaks",
+    "Row",
+    "StartingValues",
+    "Table1",
+    "find_peaks",
+    "global_start",
+    "identify",
+    "starting_values",
+    "table1",
+]

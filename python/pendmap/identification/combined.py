@@ -1,0 +1,295 @@
+"""The combined decrement of viscous damping and Coulomb friction, as the paper prints it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.period import mean_period
+from pendmap.identification.result import Identification
+from pendmap.identification.uncertainty import bootstrap, estimates, jacobian
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+__all__ = [
+    "CUT",
+    "Decrement",
+    "Reading",
+    "coulomb",
+    "decrement",
+    "from_amplitudes",
+    "from_peaks",
+    "identify",
+    "identify_odd_ends",
+    "identify_odd_triplets",
+    "recursion",
+    "small_peaks",
+    "triplets",
+    "unphysical",
+]
+
+CUT: Final = math.radians(12.0)
+"""Peaks above this are dropped, rad: there the pendulum is not linear."""
+
+Reading = Literal["all", "odd_ends", "odd_triplets"]
+_NAMES: Final[dict[Reading, str]] = {
+    "all": "combined",
+    "odd_ends": "combined_odd_ends",
+    "odd_triplets": "combined_odd_triplets",
+}
+_FEWEST: Final = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class Decrement:
+    """What the combined method makes of the peaks of a small decay.
+
+    Parameters
+    ----------
+    delta : float
+        ``zeta / sqrt(1 - zeta^2)``, eq. 2.7.
+    theta_r : float
+        ``Tr / w0^2``, rad, eq. 2.10.
+    mean_period : float
+        Mean of all overlapping full cycles, s.
+    """
+
+    delta: float
+    theta_r: float
+    mean_period: float
+
+    @property
+    def zeta(self) -> float:
+        """The damping ratio."""
+        return self.delta / math.sqrt(1 + self.delta**2)
+
+    @property
+    def w0(self) -> float:
+        """Natural frequency ``2 pi / (mean_period sqrt(1 - zeta^2))``, rad/s."""
+        return 2 * math.pi / (self.mean_period * math.sqrt(1 - self.zeta**2))
+
+    @property
+    def Tr(self) -> float:  # noqa: N802 (the paper's name)
+        """Coulomb friction over inertia, rad/s^2."""
+        return self.w0**2 * self.theta_r
+
+    @property
+    def si(self) -> Floats:
+        """``w0, c_over_m, Tr``."""
+        return np.array([self.w0, 2 * self.zeta * self.w0, self.Tr])
+
+
+def recursion(first: float, delta: float, theta_r: float, count: int) -> Floats:
+    """Return the absolute values of peaks by eqs. 2.4 to 2.6, shape (count,).
+
+    ``abs(th_k) = -theta_r (E + 1) + E abs(th_{k-1})``, ``E = exp(-delta pi)``. From the peak on
+    that does not reach zero any more values are negative, and mean nothing.
+    """
+    shrink = math.exp(-delta * math.pi)
+    result = np.empty(count)
+    result[0] = first
+    for k in range(1, count):
+        result[k] = -theta_r * (shrink + 1) + shrink * result[k - 1]
+    return result
+
+
+def decrement(peaks: Floats) -> float:
+    """Return ``delta`` by eq. 2.7, from the first two and the last two absolute peaks.
+
+    ``delta = ln[(th_0 - th_1) / (th_{k-1} - th_k)] / ((k - 1) pi)``. All between them cancel.
+    NaN where the ratio is not above 0.
+    """
+    ratio = (peaks[0] - peaks[1]) / (peaks[-2] - peaks[-1])
+    if not ratio > 0:
+        return math.nan
+    return float(math.log(ratio) / ((peaks.size - 2) * math.pi))
+
+
+def coulomb(peaks: Floats) -> float:
+    """Return ``theta_r = Tr / w0^2`` by eq. 2.10, from the same four absolute peaks, rad."""
+    first, second, last_but_one, last = peaks[0], peaks[1], peaks[-2], peaks[-1]
+    below = second + first - last_but_one - last
+    return float((second * last_but_one - first * last) / below) if below else math.nan
+
+
+def triplets(peaks: Floats) -> tuple[Floats, Floats]:
+    """Return ``delta`` and ``theta_r`` of each three peaks in a row, shape (P - 2,): figure 5."""
+    first, second, third = peaks[:-2], peaks[1:-1], peaks[2:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        delta = np.log((first - second) / (second - third)) / math.pi
+        theta_r = (second**2 - first * third) / (first - third)
+    return delta, theta_r
+
+
+def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int) -> Decrement:
+    """Apply eqs. 2.7 and 2.10 to absolute peaks; ``parity`` is that of the first one's number."""
+    if reading == "odd_triplets":
+        deltas, thetas = (each[1 - parity :: 2] for each in triplets(peaks))
+        delta, theta_r = float(np.mean(deltas)), float(np.mean(thetas))
+    else:
+        used = peaks
+        if reading == "odd_ends":
+            # Both pairs of neighbours that 2.7 uses begin at an odd peak.
+            used = used[1 - parity :]
+            used = used[: used.size - used.size % 2]
+        delta, theta_r = decrement(used), coulomb(used)
+    return Decrement(delta, theta_r, mean_period(times))
+
+
+def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
+    """Return the peaks below a cut that follow one another, and what had to be said about them."""
+    small = peaks.turned
+    above = np.flatnonzero(np.abs(small.amplitude) >= cut)
+    small = small.select(np.arange(len(small)) > (above[-1] if above.size else -1))
+    gaps = np.flatnonzero(np.diff(small.index) != 1)
+    warnings = []
+    if gaps.size:
+        parts = np.split(np.arange(len(small)), gaps + 1)
+        longest = max(parts, key=len)
+        warnings.append(f"peaks are missing: the longest row of {longest.size} is used")
+        small = small.select(np.isin(np.arange(len(small)), longest))
+    return small, warnings
+
+
+def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> Identification:
+    """Identify damping from peaks; see :func:`identify`."""
+    name = _NAMES[reading]
+    small, warnings = small_peaks(peaks, cut)
+    size = np.abs(small.amplitude)
+    while size.size > _FEWEST and not size[-2] > size[-1]:
+        size = size[:-1]
+    if size.size < len(small):
+        few = len(small) - size.size
+        warnings.append(f"the last peaks ({few}) do not decrease and were dropped")
+        small = small.select(np.arange(len(small)) < size.size)
+    least = _FEWEST + (reading != "all") * 2
+    if size.size < least:
+        known = "the record ends above it" if len(peaks) and not len(small) else "too few peaks"
+        text = (
+            f"not applicable: {size.size} peaks under {math.degrees(cut):.3g} degrees, {least} are "
+            f"needed: {known}"
+        )
+        return Identification(name, warnings=(*warnings, text), applicable=False)
+    parity = int(small.index[0]) % 2
+    count = len(small)
+
+    def compute(values: Floats) -> Floats:
+        return from_amplitudes(values[:count], values[count:], reading, parity).si
+
+    values = np.concatenate((size, small.time))
+    stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
+    found = compute(values)
+    if not np.isfinite(found).all():
+        text = "not applicable: a difference of peaks has the wrong sign, 2.7 has no logarithm"
+        return Identification(name, warnings=(*warnings, text), applicable=False)
+    slopes = jacobian(compute, values, stderr / 10)
+    covariance = slopes * stderr**2 @ slopes.T
+    draws = bootstrap(compute, values, stderr)
+    failed = float(np.mean(~np.isfinite(draws).all(axis=1)))
+    names = ("w0", "c_over_m", "Tr")
+    low, high = np.nanpercentile(draws, (2.5, 97.5), axis=0)
+    intervals = {n: (float(low[j]), float(high[j])) for j, n in enumerate(names)}
+    if failed > 0.01:  # noqa: PLR2004 (an interval at 95 % hardly notices fewer)
+        warnings.append(
+            f"noise turns a difference of peaks round in {failed:.0%} of simulated repetitions: "
+            "the errors are too small"
+        )
+    warnings += unphysical(dict(zip(names, found, strict=True)))
+    used = (
+        f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
+        f"degrees); {_USES[reading]}; the mean of {count - 2} overlapping periods"
+    )
+    result = estimates(names, found, covariance, intervals=intervals)
+    return Identification(
+        name, result, used, tuple(warnings), covariance=(names, np.asarray(covariance))
+    )
+
+
+_USES: Final[dict[Reading, str]] = {
+    "all": "of them the first two and the last two",
+    "odd_ends": "of them the first two and the last two that begin at an odd peak",
+    "odd_triplets": "the mean over all triplets that begin at an odd peak",
+}
+
+
+def unphysical(values: dict[str, float]) -> list[str]:
+    """Return a warning for each damping that is negative, which none is."""
+    return [
+        f"unphysical: {name} is {values[name]:.4g}, below 0"
+        for name in ("c_over_m", "Tr")
+        if values.get(name, 0.0) < 0
+    ]
+
+
+def identify(  # noqa: PLR0913 (record, then what may be chosen)
+    time: ArrayLike,
+    theta: ArrayLike,
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+    reading: Reading = "all",
+    cut: float = CUT,
+) -> Identification:
+    """Identify viscous damping and Coulomb friction by the combined decrement as printed.
+
+    Peaks above 12 degrees are dropped; eq. 2.7 gives ``delta``, eq. 2.10 ``theta_r``, the mean
+    period ``w0 = 2 pi / (mean_period sqrt(1 - zeta^2))``. The method is biased: by the pendulum's
+    nonlinearity (1.5 % in delta at 12 degrees), by a zero error of the angle, and because 2.7 uses
+    four peaks of all. :mod:`pendmap.identification.repair` mends that.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, and rad from the downward rest, unwrapped.
+    sigma : float, optional
+        Noise of a sample, rad; by default estimated.
+    trusted : array of bool, shape (N,), optional
+        Samples that may be used.
+    reading : {"all", "odd_ends", "odd_triplets"}
+        The paper starts "only on odd half cycles": ``odd_ends`` takes 2.7 between the first and
+        the last pair of peaks that begin at an odd one, ``odd_triplets`` the mean over the
+        triplets that do.
+    cut : float
+        Peaks above are dropped, rad.
+
+    Returns
+    -------
+    Identification
+        ``w0``, ``c_over_m``, ``Tr``; standard errors by the delta method, intervals by a
+        parametric bootstrap of the peaks. Not applicable where the record ends above the cut.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
+    """
+    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    return from_peaks(peaks, reading=reading, cut=cut)
+
+
+def identify_odd_ends(
+    time: ArrayLike,
+    theta: ArrayLike,
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+) -> Identification:
+    """Identify with eq. 2.7 between two odd ends; see :func:`identify`."""
+    return identify(time, theta, sigma=sigma, trusted=trusted, reading="odd_ends")
+
+
+def identify_odd_triplets(
+    time: ArrayLike,
+    theta: ArrayLike,
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+) -> Identification:
+    """Identify with the mean of the odd triplets; see :func:`identify`."""
+    return identify(time, theta, sigma=sigma, trusted=trusted, reading="odd_triplets")

@@ -1,0 +1,245 @@
+"""Polynomials fitted to a few samples around an instant, and the noise that they leave."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["LocalFit", "count_of", "fit_around", "noise_of", "smoothed_velocity"]
+
+_NORMAL_MAD: Final = 0.674489750196
+"""Median of the absolute value of a standard normal variable."""
+_OUTLIER: Final = 4.5
+_ROUNDS: Final = 4
+_ROUNDING: Final = 1e-9
+_POINTS, _DEGREE = 9, 4
+
+
+@dataclasses.dataclass(frozen=True)
+class LocalFit:
+    """A polynomial ``sum_j c_j ((t - centre) / half)**j`` fitted to samples of unit weight.
+
+    Parameters
+    ----------
+    centre, half : float
+        Middle and half width of the window, s.
+    coefficients : array, shape (degree + 1,)
+        ``c_j``, rad.
+    covariance : array, shape (degree + 1, degree + 1)
+        Of the coefficients, for noise of unit variance.
+    points : int
+        Samples that were used.
+    residual : float
+        Root of the sum of squared residuals over the degrees of freedom, rad.
+    """
+
+    centre: float
+    half: float
+    coefficients: Floats
+    covariance: Floats
+    points: int
+    residual: float
+
+    def at(self, time: float, derivative: int = 0) -> tuple[float, float]:
+        """Return a derivative and its standard error for unit noise, in rad/s^derivative."""
+        size = self.coefficients.size
+        row = np.zeros(size)
+        s = (time - self.centre) / self.half
+        for j in range(derivative, size):
+            row[j] = math.perm(j, derivative) * s ** (j - derivative) / self.half**derivative
+        return float(row @ self.coefficients), math.sqrt(
+            max(float(row @ self.covariance @ row), 0.0)
+        )
+
+    def turn(self) -> float | None:
+        """Return the instant nearest to the centre at which the velocity is zero, s."""
+        slopes = self.coefficients[1:] * np.arange(1, self.coefficients.size)
+        return self._nearest_root(slopes)
+
+    def zero(self) -> float | None:
+        """Return the instant nearest to the centre at which the angle is zero, s."""
+        return self._nearest_root(self.coefficients)
+
+    def _nearest_root(self, ascending: Floats) -> float | None:
+        # Newton's method from the middle finds it nearly always; all roots are dear.
+        found = _newton(ascending.tolist())
+        if found is None:
+            roots = np.roots(ascending[::-1])
+            real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
+            real = real[np.abs(real) < 1]
+            if real.size == 0:
+                return None
+            found = float(real[np.argmin(np.abs(real))])
+        return self.centre + self.half * found
+
+
+def _newton(ascending: list[float]) -> float | None:
+    """A root of a polynomial within half a unit of 0 by Newton's method, if it leads there."""
+    s = 0.0
+    for _ in range(20):
+        value = slope = 0.0
+        for c in reversed(ascending):
+            slope = slope * s + value
+            value = value * s + c
+        if slope == 0:
+            return None
+        step = value / slope
+        s -= step
+        if abs(s) > 0.5:  # noqa: PLR2004
+            return None
+        if abs(step) < 1e-13:  # noqa: PLR2004
+            return s
+    return None
+
+
+def fit_around(  # noqa: PLR0913 (samples, window, form)
+    time: Floats,
+    theta: Floats,
+    centre: float,
+    half: float,
+    powers: tuple[int, ...],
+    *,
+    sigma: float = 0.0,
+    begin: float = -math.inf,
+) -> LocalFit | None:
+    """Fit a polynomial of these powers to the samples within ``half`` of ``centre``.
+
+    Samples that lie 4.5 times the noise off are left out and the fit is repeated, some times over:
+    what a missed count or a dropout left behind must not turn a peak.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, increasing, and rad.
+    centre, half : float
+        Middle and half width of the window, s.
+    powers : tuple of int
+        Powers of ``t - centre`` that the polynomial has.
+    sigma : float
+        Standard deviation of the noise, rad; 0 leaves no sample out.
+    begin : float
+        Samples before this instant are not used, s.
+
+    Returns
+    -------
+    LocalFit or None
+        ``None`` where there are no more samples than powers.
+    """
+    first, last = np.searchsorted(time, (max(centre - half, begin), centre + half * (1 + 1e-9)))
+    s, x = (time[first:last] - centre) / half, theta[first:last]
+    if x.size <= len(powers):
+        return None
+    rows = s[:, None] ** np.array(powers)
+    inverse, coefficients, residual = _solve(rows, x)
+    for _ in range(_ROUNDS if sigma > 0 else 0):
+        if float(np.abs(residual).max()) <= _OUTLIER * sigma:
+            break
+        scale = max(sigma, float(np.median(np.abs(residual))) / _NORMAL_MAD)
+        good = np.abs(residual) < _OUTLIER * scale
+        if good.all() or good.sum() <= len(powers) + 1:
+            break
+        rows, x = rows[good], x[good]
+        inverse, coefficients, residual = _solve(rows, x)
+    every, square = np.zeros(max(powers) + 1), np.zeros((max(powers) + 1,) * 2)
+    every[list(powers)] = coefficients
+    square[np.ix_(powers, powers)] = inverse
+    freedom = x.size - len(powers)
+    return LocalFit(
+        centre, half, every, square, x.size, math.sqrt(float(residual @ residual) / freedom)
+    )
+
+
+def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the inverse normal matrix, the solution and what it leaves."""
+    # The samples' times differ and are scaled to the window: the matrix is far from singular.
+    inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
+    coefficients = inverse @ (rows.T @ x)
+    return inverse, coefficients, x - rows @ coefficients
+
+
+def noise_of(time: Floats, theta: Floats) -> float:
+    """Return the standard deviation of the noise without a model of the motion, rad.
+
+    The residual of a quartic through nine neighbouring samples, by its median absolute value, over
+    the filter's noise gain. Where the reading moves in steps coarser than the noise, the steps'
+    own ``count / sqrt(12)`` is returned. Samples at rest within a step say nothing and are left
+    out. Times need not be evenly spaced: gaps and jitter only add a little.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s and rad.
+    """
+    del time  # nine neighbours of an even clock; kept so that another floor can take its place
+    if theta.size < 2 * _POINTS:
+        return 0.0
+    s = np.linspace(-1, 1, _POINTS)
+    rows = s[:, None] ** np.arange(_DEGREE + 1)
+    hat = rows @ np.linalg.pinv(rows)
+    kernel = np.eye(_POINTS)[_POINTS // 2] - hat[_POINTS // 2]
+    residual = np.correlate(theta, kernel, mode="valid") / math.sqrt(float(kernel @ kernel))
+    step = count_of(theta)
+    windows = np.lib.stride_tricks.sliding_window_view(theta, _POINTS)
+    moving = np.ptp(windows, axis=1) > 2 * step
+    if moving.sum() >= _POINTS:
+        residual = residual[moving]
+    floor = float(np.median(np.abs(residual))) / _NORMAL_MAD
+    return max(floor, step / math.sqrt(12))
+
+
+def count_of(theta: Floats) -> float:
+    """Return the step in which the angle is counted, rad; 0 if it has none.
+
+    A step is believed if all differences of the values that occur are multiples of it.
+    """
+    levels = np.unique(theta)
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > _ROUNDING]
+    if gaps.size < 10 or levels.size > 0.98 * theta.size:  # noqa: PLR2004 (too few to tell)
+        return 0.0
+    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    multiples = gaps / step
+    return step if np.all(np.abs(multiples - np.round(multiples)) < 0.1) else 0.0  # noqa: PLR2004
+
+
+def smoothed_velocity(
+    time: Floats, theta: Floats, half: float, degree: int = 4
+) -> tuple[Floats, Floats]:
+    """Return the velocity at every sample by local polynomials, and its error for unit noise.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, increasing, and rad.
+    half : float
+        Half width of the window, s.
+    degree : int
+        Of the polynomial; fewer samples than it needs widen the window.
+
+    Returns
+    -------
+    velocity, stderr : ndarray, shape (N,)
+        rad/s, and 1/s.
+    """
+    reach = max(round(half / float(np.median(np.diff(time)))), degree // 2 + 2)
+    width = 2 * reach + 1
+    if time.size < width:
+        raise ValueError(f"{time.size} samples are fewer than a window of {width}")
+    first = np.clip(np.arange(time.size) - reach, 0, time.size - width)
+    windows = np.lib.stride_tricks.sliding_window_view
+    t, x = windows(time, width)[first], windows(theta, width)[first]
+    scale = half if half > 0 else 1.0
+    rows = ((t - time[:, None]) / scale)[..., None] ** np.arange(degree + 1)
+    across = np.swapaxes(rows, 1, 2)
+    normal = np.linalg.inv(across @ rows)
+    moments = (across @ x[..., None])[..., 0]
+    slope = np.sum(normal[:, 1, :] * moments, axis=1) / scale
+    return slope, np.sqrt(np.maximum(normal[:, 1, 1], 0.0)) / scale

@@ -1,0 +1,223 @@
+"""Peaks and zero crossings of a free decay, between the samples, each with a standard error."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.special import ellipk
+
+from pendmap.errors import InputError
+from pendmap.identification.finder import Finder
+from pendmap.identification.local_fit import count_of, noise_of
+from pendmap.identification.turning import outline
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.identification.ends import End
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["LATENESS", "Peaks", "find_peaks", "samples"]
+
+LATENESS: Final = 5 / 32
+"""What the quartic makes of ``s abs(s)``: half the slope that it has at 0, over the window."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Peaks:
+    """Turning points of a free decay, and the crossings of zero between them.
+
+    Half cycle ``k`` runs from peak ``k`` to peak ``k + 1``; it is odd if ``k`` is. Peak 0 is the
+    release where the record shows it, or else the first turn.
+
+    Parameters
+    ----------
+    time : array, shape (P,)
+        s.
+    amplitude : array, shape (P,)
+        Angle, with its sign, as recorded, rad.
+    stderr_time, stderr_amplitude : array, shape (P,)
+        Standard errors; infinite where nothing is known (the top of a clipped reading).
+    index : array of int, shape (P,)
+        Number ``k`` of the peak; one is missing where the record has a gap.
+    kind : tuple of str
+        ``release``, ``turn``, ``clipped``, or ``stop``: where the pendulum came to rest.
+    crossing_time, crossing_stderr : array, shape (C,)
+        s.
+    crossing_index : array of int, shape (C,)
+        Number of the half cycle in which the recorded angle is zero.
+    sigma : float
+        Standard deviation of the noise of a sample that the errors were computed with, rad.
+    window : array, shape (P,)
+        Half widths of the windows in which the peaks were fitted, s; 0 where friction makes no
+        time late.
+    """
+
+    time: Floats
+    amplitude: Floats
+    stderr_time: Floats
+    stderr_amplitude: Floats
+    index: NDArray[np.int64]
+    kind: tuple[str, ...]
+    crossing_time: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    crossing_stderr: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+    crossing_index: NDArray[np.int64] = dataclasses.field(
+        default_factory=lambda: np.empty(0, np.int64)
+    )
+    sigma: float = 0.0
+    window: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        if self.window.size != self.time.size:
+            object.__setattr__(self, "window", np.zeros(self.time.size))
+
+    @classmethod
+    def of(
+        cls,
+        time: ArrayLike,
+        amplitude: ArrayLike,
+        *,
+        stderr_time: float = 0.0,
+        stderr_amplitude: float = 0.0,
+    ) -> Peaks:
+        """Return peaks that somebody else has measured; absolute values get alternating signs."""
+        t, a = np.asarray(time, float), np.asarray(amplitude, float)
+        if t.ndim != 1 or t.shape != a.shape:
+            raise InputError(f"{t.shape} times of {a.shape} peaks: allowed are as many of each")
+        if a.size > 1 and np.all(a[:-1] > 0):
+            a = a * (-1.0) ** np.arange(a.size)
+        index = np.arange(t.size)
+        errors = np.full(t.size, stderr_time), np.full(t.size, stderr_amplitude)
+        return cls(t, a, *errors, index, ("turn",) * t.size)
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    @property
+    def odd(self) -> NDArray[np.bool_]:
+        """Which peaks begin an odd half cycle, shape (P,)."""
+        return np.asarray(self.index % 2 == 1)
+
+    @property
+    def turned(self) -> Peaks:
+        """Only those at which the pendulum turned and was seen: no stop, nothing clipped."""
+        return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
+
+    def select(self, which: NDArray[np.bool_]) -> Peaks:
+        """Return some of the peaks, and all crossings."""
+        names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index", "window")
+        some = {name: getattr(self, name)[which] for name in names}
+        kind = tuple(k for k, keep in zip(self.kind, which, strict=True) if keep)
+        return dataclasses.replace(self, **some, kind=kind)
+
+
+def samples(
+    time: ArrayLike, theta: ArrayLike, trusted: ArrayLike | None = None
+) -> tuple[Floats, Floats]:
+    """Return the samples that may be used, as arrays.
+
+    Raises
+    ------
+    InputError
+        If the lengths differ, a sample that is trusted is not finite, or time does not increase.
+    """
+    t, x = np.asarray(time, float), np.asarray(theta, float)
+    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
+    if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
+        raise InputError(f"time {t.shape}, theta {x.shape}, trusted {good.shape}: allowed are rows")
+    t, x = t[good], x[good]
+    if not (np.isfinite(t).all() and np.isfinite(x).all()):
+        raise InputError("time or theta is not finite: allowed are finite numbers where trusted")
+    if np.any(np.diff(t) <= 0):
+        raise InputError("time does not increase: allowed are increasing times")
+    return t, x
+
+
+def find_peaks(
+    time: ArrayLike,
+    theta: ArrayLike,
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+) -> Peaks:
+    """Find the peaks and zero crossings of a free decay.
+
+    A quartic is fitted by least squares around each peak, a cubic around each crossing. The
+    quartic leaves out the sixth derivative ``w0^6 sin A (3 sin^2 A - cos^2 A)`` that a pendulum has
+    at a peak ``A``; it shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half width
+    ``h``. The window is as wide as lets this be a quarter of the standard error, and 1.3 rad of
+    phase at most. Coulomb friction bends the two sides of a peak differently, which makes its time
+    late by ``5/32 h theta_r / sin A``, alike for all peaks of one size.
+    Amplitudes are freed of the excess ``stderr(v)^2 / (2 abs(theta''))`` that the highest point of
+    a noisy curve has on average.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, increasing, and rad from the downward rest, unwrapped.
+    sigma : float, optional
+        Standard deviation of the noise, rad; by default estimated without a model.
+    trusted : array of bool, shape (N,), optional
+        Samples that may be used; by default all.
+
+    Returns
+    -------
+    Peaks
+        Empty if the record does not swing.
+
+    Raises
+    ------
+    InputError
+        If the arrays do not match, are not finite or time does not increase.
+
+    Notes
+    -----
+    Where the count is coarser than the noise, neighbouring samples share their error, and the
+    standard errors count three samples for each count that the window sees.
+    """
+    t, x = samples(time, theta, trusted)
+    noise = noise_of(t, x) if sigma is None else max(float(sigma), count_of(x) / math.sqrt(12))
+    course = outline(t, x, noise)
+    if course is None:
+        none = np.empty(0)
+        return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
+    # An unwrapped angle may rest some turns away from where it began.
+    away = math.tau * round(float(np.mean(x[course.turns[-2:]])) / math.tau)
+    x, course = x - away, dataclasses.replace(course, smooth=course.smooth - away)
+    finder = Finder(t, x, noise, course)
+    ends = finder.found()
+    index = _numbered(ends, finder.w0)
+    crossings = finder.crossings(ends, index)
+    columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
+    instant, amplitude, stderr_time, stderr_amplitude = columns.reshape(-1, 4).T.copy()
+    return Peaks(
+        instant,
+        amplitude,
+        stderr_time,
+        stderr_amplitude,
+        index=index,
+        kind=tuple(e.kind for e in ends),
+        crossing_time=crossings[0],
+        crossing_stderr=crossings[1],
+        crossing_index=crossings[2].astype(np.int64),
+        sigma=noise,
+        window=np.array([e.window for e in ends]),
+    )
+
+
+def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
+    """Numbers of the peaks: signs alternate, and a gap in the record hides an even number."""
+    result = [0] if ends else []
+    for before, after in itertools.pairwise(ends):
+        mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)
+        half = 2 * float(ellipk(math.sin(mean / 2) ** 2)) / w0
+        cycles = (after.time - before.time) / half
+        odd = before.angle * after.angle < 0 or after.kind == "stop"
+        steps = 2 * round((cycles - 1) / 2) + 1 if odd else 2 * round(cycles / 2)
+        result.append(result[-1] + max(steps, 1))
+    return np.array(result, np.int64)

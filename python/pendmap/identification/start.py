@@ -1,0 +1,192 @@
+"""Starting values for a fit to the whole record."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.optimize import differential_evolution
+from scipy.special import ellipk
+
+from pendmap.errors import InputError
+from pendmap.identification import energy_balance, repair
+from pendmap.identification.envelope import envelope
+from pendmap.identification.peaks import Peaks, find_peaks, samples
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.identification.result import Identification
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["StartingValues", "global_start", "starting_values"]
+
+_DAMPING: Final = (1e-5, 0.5)
+"""Range of ``c_over_m / w0`` that is searched."""
+_FRICTION: Final = (1e-6, 0.3)
+"""Range of ``Tr / w0^2`` that is searched, rad."""
+_ZERO: Final = 0.2
+"""Largest zero error that is searched, rad."""
+_MISFIT: Final = 25.0
+"""chi^2 per degree of freedom above which a method's values are no start."""
+_MOST_PEAKS: Final = 80
+
+
+@dataclasses.dataclass(frozen=True)
+class StartingValues:
+    """Where a fit may begin.
+
+    Parameters
+    ----------
+    w0 : float
+        Natural frequency, rad/s.
+    c_over_m, Tr : float
+        Damping, 1/s and rad/s^2; 0 or more.
+    offset : float
+        Zero error of the angle, rad.
+    source : str
+        How they were found: the name of a method, ``global`` or ``guess``.
+    """
+
+    w0: float
+    c_over_m: float
+    Tr: float
+    offset: float
+    source: str
+
+
+def starting_values(
+    time: ArrayLike,
+    theta: ArrayLike,
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+) -> StartingValues:
+    """Find starting values: energy balance, else the repaired decrement, else a global search.
+
+    A method counts if it is applicable, its damping is not negative by more than its errors, and
+    its model of the peaks is not far off. A record with two peaks or fewer gives a guess.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, and rad from the downward rest, unwrapped.
+    sigma : float, optional
+        Noise of a sample, rad; by default estimated.
+    trusted : array of bool, shape (N,), optional
+        Samples that may be used.
+
+    Raises
+    ------
+    InputError
+        If the record does not swing at all.
+    """
+    balance = energy_balance.identify(time, theta, sigma=sigma, trusted=trusted)
+    if _sound(balance):
+        return _clipped(balance)
+    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    mended = repair.from_peaks(peaks)
+    if _sound(mended):
+        return _clipped(mended)
+    if len(peaks.turned) > 3:  # noqa: PLR2004 (four unknowns)
+        return global_start(peaks)
+    return _guess(*samples(time, theta, trusted), peaks)
+
+
+def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
+    """Search all of the plausible damping for the envelope of the peaks.
+
+    Differential evolution over ``c_over_m / w0``, ``Tr / w0^2``, the first peak and the zero error
+    on :func:`pendmap.identification.envelope.envelope`; distances count by
+    ``2 (sqrt(1 + r^2) - 1)``, so that false peaks cannot lead it away. ``w0`` is the median over
+    half cycles of what each says alone, its amplitude taken into account.
+
+    Parameters
+    ----------
+    peaks : Peaks
+        Four or more that turned.
+    seed : int
+        Of the search.
+
+    Raises
+    ------
+    InputError
+        If there are fewer peaks.
+    """
+    turned = peaks.turned
+    if len(turned) < 4:  # noqa: PLR2004
+        raise InputError(f"{len(turned)} peaks: allowed are 4 or more for a global search")
+    numbers = turned.index - turned.index[0]
+    count = int(numbers[-1]) + 1
+    some = np.unique(np.linspace(0, len(turned) - 1, _MOST_PEAKS).round().astype(int))
+    measured, at = turned.amplitude, numbers
+    sign = math.copysign(1.0, measured[0]) * (-1.0) ** at
+    size = np.abs(measured)
+    error = np.hypot(np.maximum(turned.stderr_amplitude, 1e-12), 1e-3 * size.max())
+
+    def cost(unknown: Floats) -> Floats:
+        gamma, theta_r, scale, zero = unknown.reshape(4, -1)
+        made = envelope(scale * size[0], 10.0**gamma, 10.0**theta_r, count)[at[some]]
+        off = (zero + sign[some, None] * made - measured[some, None]) / error[some, None]
+        return np.asarray(np.sum(2 * (np.sqrt(1 + off**2) - 1), axis=0))
+
+    bounds = [
+        tuple(math.log10(edge) for edge in _DAMPING),
+        tuple(math.log10(edge) for edge in _FRICTION),
+        (0.8, 1.2 if 1.2 * size[0] < math.pi else math.pi / size[0]),
+        (-_ZERO, _ZERO),
+    ]
+    best = differential_evolution(
+        cost, bounds, seed=seed, vectorized=True, updating="deferred", polish=False, maxiter=120
+    ).x
+    gamma, theta_r, zero = 10.0 ** best[0], 10.0 ** best[1], float(best[3])
+    w0 = _frequency(turned, zero)
+    return StartingValues(w0, float(gamma * w0), float(theta_r * w0**2), zero, "global")
+
+
+def _frequency(peaks: Peaks, zero: float) -> float:
+    """The median over half cycles of the amplitude-corrected natural frequency, rad/s."""
+    size = np.minimum(np.abs(peaks.amplitude - zero), math.pi - 1e-3)
+    quarter = ellipk(np.sin(size / 2) ** 2)
+    steps = np.diff(peaks.index)
+    return float(np.median(steps * (quarter[1:] + quarter[:-1]) / np.diff(peaks.time)))
+
+
+def _sound(found: Identification) -> bool:
+    if not found.applicable:
+        return False
+    for name in ("c_over_m", "Tr"):
+        estimate = found.estimates[name]
+        if not math.isfinite(estimate.value) or estimate.value < -3 * (estimate.stderr or 0.0):
+            return False
+    return found["w0"] > 0 and not (found.misfit is not None and found.misfit > _MISFIT)
+
+
+def _clipped(found: Identification) -> StartingValues:
+    """Values as a fit needs them: one that must not be negative begins at 0."""
+    return StartingValues(
+        found["w0"],
+        max(found["c_over_m"], 0.0),
+        max(found["Tr"], 0.0),
+        found["offset"],
+        found.method,
+    )
+
+
+def _guess(time: Floats, theta: Floats, peaks: Peaks) -> StartingValues:
+    """From one swing: its half period, and a damping that most rigs have."""
+    if len(peaks) > 1:
+        w0 = _frequency(peaks, 0.0)
+    else:
+        # One quarter: from the largest angle to the first zero.
+        far = int(np.argmax(np.abs(theta)))
+        passed = np.flatnonzero(theta[far:] * theta[far] < 0)
+        if passed.size == 0:
+            raise InputError("the record does not swing: allowed is a decay with a zero crossing")
+        amplitude = min(abs(float(theta[far])), 3.1)
+        quarter = float(time[far + passed[0]] - time[far])
+        w0 = float(ellipk(math.sin(amplitude / 2) ** 2)) / quarter
+    return StartingValues(w0, 0.01 * w0, 1e-3 * w0**2, 0.0, "guess")

@@ -1,0 +1,234 @@
+"""The paper's table 1 and figure 7: what a simulation of each model misses of the record."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.trajectory import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.identification.result import Identification
+    from pendmap.model import Rig
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["PeakErrors", "Row", "State", "Table1", "first_state", "peak_errors", "table1"]
+
+PERIODS: Final = (0.26, 1.54)
+"""Periods of the paper's table, s. No rig near 6 rad/s has the first: its shortest one stands in
+for it."""
+PEAKS: Final = (1.2, 2.53)
+"""Peaks of the paper's table, rad."""
+
+_SAME: Final = 1e-9
+"""Events closer than this are one, s."""
+
+
+@dataclasses.dataclass(frozen=True)
+class State:
+    """Where a simulation begins: time (s), angle (rad, as recorded) and velocity (rad/s)."""
+
+    time: float
+    theta: float
+    velocity: float
+
+
+@dataclasses.dataclass(frozen=True)
+class PeakErrors:
+    """Figure 7 for one model; errors are simulation minus measurement over measurement, percent.
+
+    Parameters
+    ----------
+    method : str
+        Which model.
+    period_time, period, period_error : array, shape (Q,)
+        When each full cycle begins (s), its measured length (s), and the error. NaN where the
+        simulation has come to rest.
+    peak_index, peak, peak_error : array, shape (P,)
+        Number of each peak, its measured size (rad), and the error.
+    """
+
+    method: str
+    period_time: Floats
+    period: Floats
+    period_error: Floats
+    peak_index: NDArray[np.int64]
+    peak: Floats
+    peak_error: Floats
+
+    @property
+    def period_rms(self) -> float:
+        """Root mean square of the period errors, percent."""
+        return float(np.sqrt(np.nanmean(self.period_error**2)))
+
+    @property
+    def peak_rms(self) -> float:
+        """Root mean square of the peak errors, percent."""
+        return float(np.sqrt(np.nanmean(self.peak_error**2)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """A row of table 1.
+
+    Parameters
+    ----------
+    what : str
+        ``period`` or ``peak``.
+    asked, measured : float
+        What the paper's table has, and what is nearest to it in this record, s or rad.
+    errors : mapping of str to float
+        By method: the error's absolute value, percent; NaN where the simulation rests by then.
+    """
+
+    what: str
+    asked: float
+    measured: float
+    errors: Mapping[str, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Table1:
+    """Table 1 of a record, and figure 7 behind it."""
+
+    rows: tuple[Row, ...]
+    errors: Mapping[str, PeakErrors]
+
+
+def first_state(peaks: Peaks) -> State:
+    """Return the state from which models are simulated: the first peak, at rest.
+
+    It is the release where the record shows it. In a record that begins in motion no sample gives a
+    velocity as surely as the first turn does.
+    """
+    turned = peaks.turned
+    return State(float(turned.time[0]), float(turned.amplitude[0]), 0.0)
+
+
+def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Floats]:
+    """Return times (s) and angles (rad) of the peaks that a model has from a state on."""
+    run = simulate(rig, start.theta, start.velocity, max(until - start.time, 1e-3), samples=1)
+    kinds = run["event_kind"].values
+    turned = np.isin(kinds, ("turn", "stick", "stuck for ever"))
+    times, angles = run["event_time"].values[turned], run["event_theta"].values[turned]
+    # A stop that lasts is told twice, when it begins and when it proves to be for ever.
+    new = np.concatenate(([True], np.diff(times) > _SAME)) if times.size else np.empty(0, bool)
+    times, angles = times[new], angles[new]
+    if start.velocity == 0 and (times.size == 0 or times[0] > _SAME):
+        times, angles = np.append(0.0, times), np.append(start.theta, angles)
+    return times + start.time, angles
+
+
+def peak_errors(
+    found: Identification, peaks: Peaks, start: State, *, offset: float | None = None
+) -> PeakErrors:
+    """Compare a model's simulation with peaks, number by number.
+
+    Parameters
+    ----------
+    found : Identification
+        With a ``w0``.
+    peaks : Peaks
+        What it is compared with.
+    start : State
+        Where the simulation begins, at the first of ``peaks``, as recorded: the zero error that
+        was found is taken off.
+    offset : float, optional
+        Zero error of ``peaks``, rad; by default the one that was found. 0 for true peaks.
+    """
+    zero = found["offset"] if "offset" in found.estimates else 0.0
+    shown = zero if offset is None else offset
+    turned = peaks.turned
+    origin = dataclasses.replace(start, theta=start.theta - zero)
+    times, angles = simulated_peaks(found.rig, origin, float(turned.time[-1]) * 1.2 + 5.0)
+    number = turned.index - turned.index[0]
+    made_time, made = (np.full(int(number[-1]) + 1, math.nan) for _ in range(2))
+    size = min(made.size, times.size)
+    made_time[:size], made[:size] = times[:size], angles[:size] + shown
+    at = np.flatnonzero(turned.index[2:] - turned.index[:-2] == 2)  # noqa: PLR2004 (one cycle)
+    period = turned.time[at + 2] - turned.time[at]
+    other = made_time[number[at + 2]] - made_time[number[at]]
+    return PeakErrors(
+        method=found.method,
+        period_time=turned.time[at],
+        period=period,
+        period_error=100 * (other - period) / period,
+        peak_index=turned.index,
+        peak=np.abs(turned.amplitude),
+        peak_error=100 * (made[number] / turned.amplitude - 1),
+    )
+
+
+def table1(  # noqa: PLR0913 (record, models, rows)
+    time: ArrayLike,
+    theta: ArrayLike,
+    identifications: Mapping[str, Identification],
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+    periods: Sequence[float] = PERIODS,
+    peaks: Sequence[float] = PEAKS,
+) -> Table1:
+    """Simulate what each method found from the record's first peak, and compare.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, and rad from the downward rest, unwrapped.
+    identifications : mapping of str to Identification
+        As of :func:`pendmap.identification.identify`; those that are not applicable are left out.
+    sigma : float, optional
+        Noise of a sample, rad; by default estimated.
+    trusted : array of bool, shape (N,), optional
+        Samples that may be used.
+    periods, peaks : sequence of float
+        Rows: the measured period (s) and peak (rad) nearest to each.
+
+    Returns
+    -------
+    Table1
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, table 1 and figure 7.
+    """
+    found = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    if len(found.turned) < 3:  # noqa: PLR2004 (one full cycle)
+        return Table1((), {})
+    start = first_state(found)
+    errors = {
+        name: peak_errors(each, found, start)
+        for name, each in identifications.items()
+        if each.applicable
+    }
+    rows = [_row("period", asked, errors) for asked in periods]
+    rows += [_row("peak", asked, errors) for asked in peaks]
+    return Table1(tuple(row for row in rows if row is not None), errors)
+
+
+def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:
+    """The row of what is nearest to a value, or none where no model has anything."""
+    column, measured = {}, math.nan
+    for name, each in errors.items():
+        there, wrong = (
+            (each.period, each.period_error) if what == "period" else (each.peak, each.peak_error)
+        )
+        if there.size == 0:
+            return None
+        # Not the last ones: an asked period below all would pick the noisiest.
+        near = int(
+            np.argmin(np.abs(there - max(asked, float(np.median(there[there.size // 2 :])))))
+        )
+        if what == "peak":
+            near = int(np.argmin(np.abs(there - asked)))
+        measured, column[name] = float(there[near]), abs(float(wrong[near]))
+    return Row(what, asked, measured, column) if column else None

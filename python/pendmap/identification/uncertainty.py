@@ -1,0 +1,100 @@
+"""Standard errors and intervals of what is computed from numbers with errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.identification.result import Estimate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Z95", "bootstrap", "estimates", "jacobian", "least_squares_line"]
+
+Z95: Final = 1.959963984540054
+"""The 97.5 % point of the standard normal distribution."""
+
+
+def jacobian(function: Callable[[Floats], Floats], values: Floats, steps: Floats) -> Floats:
+    """Return the derivatives of a function by central differences, shape (M, N).
+
+    Parameters
+    ----------
+    function : callable
+        Takes an array of shape (N,), returns one of shape (M,).
+    values : array, shape (N,)
+        Where.
+    steps : array, shape (N,)
+        Half the differences: a tenth of a standard error is small for the function and large for
+        rounding. A zero leaves that column 0.
+    """
+    base = function(values)
+    result = np.zeros((base.size, values.size))
+    for j in np.flatnonzero(steps):
+        shift = np.zeros(values.size)
+        shift[j] = steps[j]
+        result[:, j] = (function(values + shift) - function(values - shift)) / (2 * steps[j])
+    return result
+
+
+def bootstrap(
+    function: Callable[[Floats], Floats],
+    values: Floats,
+    stderr: Floats,
+    *,
+    draws: int = 1000,
+    seed: int = 0,
+) -> Floats:
+    """Return what a function makes of normally scattered values, shape (draws, M).
+
+    Rows in which it fails (a logarithm of a negative difference) are NaN. Honest where the function
+    bends within the errors, which the delta method does not see.
+    """
+    rng = np.random.default_rng(seed)
+    scattered = values + stderr * rng.standard_normal((draws, values.size))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.array([function(row) for row in scattered])
+
+
+def estimates(
+    names: Sequence[str],
+    values: Floats,
+    covariance: Floats,
+    *,
+    intervals: Mapping[str, tuple[float, float]] | None = None,
+) -> dict[str, Estimate]:
+    """Return numbers with standard errors and, if no others are given, normal 95 % intervals."""
+    given = intervals or {}
+    result = {}
+    for j, name in enumerate(names):
+        value, error = float(values[j]), float(np.sqrt(max(covariance[j, j], 0.0)))
+        normal = (value - Z95 * error, value + Z95 * error)
+        result[name] = Estimate(value, error, given.get(name, normal))
+    return result
+
+
+def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Floats, float]:
+    """Fit ``y = c_0 + c_1 x`` with weights.
+
+    Returns
+    -------
+    coefficients : ndarray, shape (2,)
+        ``c_0, c_1``.
+    covariance : ndarray, shape (2, 2)
+        Widened by chi^2 per degree of freedom where that is above 1: where a straight line is not
+        the law, its misfit is larger than the noise.
+    misfit : float
+        chi^2 per degree of freedom.
+    """
+    rows = np.column_stack((np.ones_like(x), x)) / stderr[:, None]
+    inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
+    coefficients = inverse @ (rows.T @ (y / stderr))
+    residual = y / stderr - rows @ coefficients
+    misfit = float(residual @ residual) / max(x.size - 2, 1)
+    return coefficients, inverse * max(misfit, 1.0), misfit
