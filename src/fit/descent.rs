@@ -35,6 +35,12 @@ impl Point {
         Ok(Self { values, windows, normal })
     }
 
+    /// The samples that count, less the parameters and initial states that were adapted to them.
+    #[must_use]
+    pub fn degrees(&self, problem: &Problem) -> usize {
+        problem.samples().saturating_sub(self.values.len() + 2 * self.windows.len())
+    }
+
     /// The point a step further; none where it cannot be.
     #[must_use]
     pub fn moved(&self, problem: &Problem, step: &Step) -> Option<Self> {

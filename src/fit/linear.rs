@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::problem::{Columns, Problem, Shaped, Slot};
+use super::problem::{Columns, MOST_READINGS, Problem, Shaped, Slot};
 use super::window::Window;
 use crate::integrate::State;
 use crate::integrate::course::Course;
@@ -12,8 +12,8 @@ use crate::model::{Observation, Pendulum};
 
 /// The most derivatives that one pass carries.
 const WIDEST: usize = 16;
-/// The most parameters of readings at once, and the angle.
-const READINGS: usize = 8;
+/// The free parameters of a reading, and the angle.
+const READINGS: usize = MOST_READINGS + 1;
 
 /// A window at one point of the search.
 #[derive(Clone, Debug)]

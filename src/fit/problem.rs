@@ -6,6 +6,9 @@ use crate::error::Error;
 use crate::model::effects::Action;
 use crate::model::{Pendulum, Recorded};
 
+/// The most free parameters of a record's reading.
+pub const MOST_READINGS: usize = 7;
+
 /// A record of one motion, and the pendulum that it is thought to be of.
 #[derive(Clone, Debug)]
 pub struct Record {
@@ -33,14 +36,19 @@ pub enum Slot {
 }
 
 /// A free parameter.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Free {
-    /// What it is.
-    pub slot: Slot,
-    /// In which record alone; in all if none.
-    pub record: Option<usize>,
+    /// What it is in which records; the same number in all of them, at most once in each.
+    pub places: Vec<(usize, Slot)>,
     /// Where the search starts.
     pub start: f64,
+}
+
+impl Free {
+    /// What it is in record `index`.
+    fn slot(&self, index: usize) -> Option<Slot> {
+        self.places.iter().find(|(record, _)| *record == index).map(|(_, slot)| *slot)
+    }
 }
 
 /// Records and free parameters.
@@ -96,36 +104,39 @@ impl Problem {
         for record in &records {
             record.check()?;
         }
-        for Free { slot, record, start } in &free {
+        let known: Vec<usize> = records.iter().map(|r| r.pendulum.parameters().len()).collect();
+        for Free { places, start } in &free {
             if !start.is_finite() {
                 return Err(range("start of a free parameter", *start, "any finite number"));
             }
-            if let Some(record) = *record
-                && record >= records.len()
-            {
-                return Err(range(
-                    "record of a free parameter",
-                    record as f64,
-                    "one of those given",
-                ));
+            for (record, slot) in places {
+                let Some(known) = known.get(*record) else {
+                    let allowed = "one of those given";
+                    return Err(range("record of a free parameter", *record as f64, allowed));
+                };
+                if let Slot::Parameter(index) = *slot
+                    && index >= *known
+                {
+                    let allowed = "one that the pendulum has";
+                    return Err(range("place of a free parameter", index as f64, allowed));
+                }
             }
-            let Slot::Parameter(index) = *slot else { continue };
-            let has = |r: &Record| index < r.pendulum.parameters().len();
-            if !(0..records.len())
-                .filter(|r| record.is_none_or(|own| own == *r))
-                .all(|r| has(&records[r]))
-            {
+        }
+        let problem = Self { records, free, tolerance };
+        for index in 0..problem.records.len() {
+            let count = problem.columns(index).reading.len();
+            if count > MOST_READINGS {
                 return Err(range(
-                    "place of a free parameter",
-                    index as f64,
-                    "one that the pendulum has",
+                    "number of free parameters of the reading",
+                    count as f64,
+                    "7 or fewer",
                 ));
             }
         }
         if !(tolerance > 0.0 && tolerance.is_finite()) {
             return Err(range("tolerance", tolerance, "a number above 0"));
         }
-        Ok(Self { records, free, tolerance })
+        Ok(problem)
     }
 
     /// The values from which the search starts.
@@ -144,14 +155,12 @@ impl Problem {
         };
         let mut columns = Columns::default();
         for (place, free) in self.free.iter().enumerate() {
-            if free.record.is_some_and(|own| own != index) {
-                continue;
-            }
-            match free.slot {
-                Slot::Parameter(parameter) if reads(parameter) => {
+            match free.slot(index) {
+                Some(Slot::Parameter(parameter)) if reads(parameter) => {
                     columns.reading.push((place, parameter));
                 }
-                slot => columns.motion.push((place, slot)),
+                Some(slot) => columns.motion.push((place, slot)),
+                None => {}
             }
         }
         columns
@@ -164,12 +173,10 @@ impl Problem {
     pub fn shaped(&self, index: usize, values: &[f64]) -> Option<Shaped> {
         let mut shaped = Shaped { pendulum: self.records[index].pendulum.clone(), gravity: 1.0 };
         for (free, value) in self.free.iter().zip(values) {
-            if free.record.is_some_and(|own| own != index) {
-                continue;
-            }
-            match free.slot {
-                Slot::Gravity => shaped.gravity = *value,
-                Slot::Parameter(parameter) => shaped.pendulum.set_parameter(parameter, *value),
+            match free.slot(index) {
+                Some(Slot::Gravity) => shaped.gravity = *value,
+                Some(Slot::Parameter(place)) => shaped.pendulum.set_parameter(place, *value),
+                None => {}
             }
         }
         shaped.is_sound().then_some(shaped)

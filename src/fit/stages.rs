@@ -51,6 +51,19 @@ pub struct Fit {
     pub converged: bool,
 }
 
+impl Fit {
+    /// By which factor the sum of squares exceeds its degrees of freedom, where that is more than
+    /// chance and an error of `doubt` (relative) of the standard errors allow; else 1. Birge (1932),
+    /// Physical Review 40, 207: the intervals of a model that does not fit are widened by its root.
+    #[must_use]
+    pub fn widening(&self, problem: &Problem, doubt: f64) -> f64 {
+        let degrees = self.point.degrees(problem).max(1) as f64;
+        let ratio = self.point.normal.chi2 / degrees;
+        let allowed = 1.0 + 4.0 * (2.0 / degrees + 4.0 * doubt * doubt).sqrt();
+        if ratio > allowed { ratio } else { 1.0 }
+    }
+}
+
 /// Fits the free parameters of `problem`. With `windows` the search begins at these, and at the
 /// parameters' starts, with one stage alone.
 ///
