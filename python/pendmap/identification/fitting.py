@@ -246,7 +246,9 @@ def fit_runs(
     units = Units(model.w0, si=True)
     quantities, given = _prepare(runs, model, free, start or {}, units)
     wanted = [q.name for q in quantities] if profiled is None else list(profiled)
-    chosen = [k for k, q in enumerate(quantities) if q.name.split("[")[0] in wanted or q.name in wanted]
+    chosen = [
+        k for k, q in enumerate(quantities) if q.name.split("[")[0] in wanted or q.name in wanted
+    ]
     swing = math.tau / model.w0
     choices = {
         "tolerance": _tolerance(runs),
@@ -377,9 +379,7 @@ def _rig_of(run: FitRun, model: Rig) -> Rig:
     if run.drive is not None:
         drive |= {name: value or 0.0 for name, value in run.drive.items()}
     effects = model.effects if run.drive else tuple(e for e in model.effects if not e.drives)
-    return dataclasses.replace(
-        model, **drive, effects=effects, lab_time_s=run.lab_time_s, notes={}
-    )
+    return dataclasses.replace(model, **drive, effects=effects, lab_time_s=run.lab_time_s, notes={})
 
 
 def _effect(name: str, rig: Rig) -> tuple[int, Effect, str] | None:

@@ -1,0 +1,1 @@
+"""From a record to its pendulum: one method a file, one common result."""
