@@ -12,6 +12,10 @@ use crate::model::{Observation, Pendulum};
 
 /// The most derivatives that one pass carries.
 const WIDEST: usize = 16;
+/// A trial that needs more steps than this, and than that in a unit of time, is far off: it is given
+/// up. Ten in a unit of time are common.
+const MOST_STEPS: usize = 1000;
+const MOST_STEPS_A_TIME: f64 = 50.0;
 /// The free parameters of a reading, and the angle.
 const READINGS: usize = MOST_READINGS + 1;
 
@@ -99,11 +103,15 @@ impl Follow<'_> {
             course = course.driven_by(Arc::clone(recorded));
         }
         let times = &record.times[self.window.from..self.window.to];
+        let rate = pendulum.motion().omega.max(1.0);
+        let most =
+            MOST_STEPS + (MOST_STEPS_A_TIME * rate * (times[times.len() - 1] - times[0])) as usize;
         let begin = |of: usize| {
             let place = (motion.len() + of).wrapping_sub(first);
             Tangent::<f64, N>::seeded(self.window.start[of], place)
         };
-        let run = sample(&course, times[0], [begin(0), begin(1)], times, |_, _| true);
+        let run =
+            sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
         let filled = N.min(self.directions - first);
         for (row, state) in slopes.chunks_exact_mut(self.directions).zip(&run.states) {
             row[first..first + filled].copy_from_slice(&state[0].slope[..filled]);
