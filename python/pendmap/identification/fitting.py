@@ -191,7 +191,7 @@ class _Quantity:
         return float(units.given(1.0, self.power))
 
 
-def fit_runs(
+def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     runs: Sequence[FitRun],
     model: Rig,
     free: Sequence[str] = ("w0", "c_over_m", "Tr"),
@@ -246,9 +246,7 @@ def fit_runs(
     units = Units(model.w0, si=True)
     quantities, given = _prepare(runs, model, free, start or {}, units)
     wanted = [q.name for q in quantities] if profiled is None else list(profiled)
-    chosen = [
-        k for k, q in enumerate(quantities) if q.name.split("[")[0] in wanted or q.name in wanted
-    ]
+    chosen = [k for k, q in enumerate(quantities) if {q.name, q.name.partition("[")[0]} & {*wanted}]
     swing = math.tau / model.w0
     choices = {
         "tolerance": _tolerance(runs),
@@ -262,7 +260,9 @@ def fit_runs(
     }
     bare = [(q.places, q.bare(q.start, units)) for q in quantities]
     try:
-        found = _core.fit_runs(given, bare, choices, _bare_windows(windows, units))
+        found = _core.fit_runs(
+            given, bare, choices, None if windows is None else _bare_windows(windows, units)
+        )
     except ValueError as error:
         raise InputError(str(error)) from None
     return _result(found, runs, model, quantities, chosen, units)
@@ -298,12 +298,13 @@ def score(
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
     units = Units(model.w0, si=True)
-    base = list(dict.fromkeys(name.split("[")[0] for name in fit.names))
+    base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
     quantities, given = _prepare(runs, model, [*base, *candidates], start, units)
     bare = [(q.places, q.bare(q.start, units)) for q in quantities]
     try:
-        at = _core.fit_equations(given, bare, _tolerance(runs), _bare_windows(fit.windows, units))
+        windows = _bare_windows(fit.windows, units)
+        at = _core.fit_equations(given, bare, _tolerance(runs), windows)
     except ValueError as error:
         raise InputError(str(error)) from None
     slopes = np.array([q.slope(b, units) for q, (_, b) in zip(quantities, bare, strict=True)])
@@ -367,7 +368,7 @@ def _prepare(
         ]
     quantities = [
         dataclasses.replace(
-            q, start=start.get(q.name, start.get(q.name.split("[")[0], _value(q, rigs)))
+            q, start=start.get(q.name, start.get(q.name.partition("[")[0], _value(q, rigs)))
         )
         for q in quantities
     ]
@@ -403,7 +404,7 @@ def _place(name: str, rig: Rig) -> int | None:
 def _power(name: str, rig: Rig, free: Sequence[str]) -> float:
     if name == "w0":
         return 1
-    own = {si: power for si, power in COUNTERPARTS.values()}
+    own = dict(COUNTERPARTS.values())
     if name in own:
         return own[name]
     found = _effect(name, rig)
@@ -416,15 +417,15 @@ def _power(name: str, rig: Rig, free: Sequence[str]) -> float:
         return float(entry["power_of_w0"])
     if f"{effect.name}.{less}" in free:
         raise InputError(
-            f"free has {effect.name}.{less} beside {name}, whose unit depends on it: allowed is one "
-            "of them"
+            f"free has {effect.name}.{less} beside {name}, whose unit depends on it: allowed is "
+            "one of them"
         )
     return float(entry["power_of_w0"] - effect.parameters[less])
 
 
 def _value(quantity: _Quantity, rigs: Sequence[Rig]) -> float:
     rig = rigs[quantity.places[0][0]]
-    name = quantity.name.split("[")[0]
+    name = quantity.name.partition("[")[0]
     if name in PLACES:
         return float(getattr(rig, name))
     found = _effect(name, rig)
@@ -481,10 +482,8 @@ def _floats(what: str, values: object) -> NDArray[np.float64]:
 
 
 def _bare_windows(
-    windows: Sequence[tuple[int, int, int, float, float]] | None, units: Units
-) -> list[tuple[int, int, int, float, float]] | None:
-    if windows is None:
-        return None
+    windows: Sequence[tuple[int, int, int, float, float]], units: Units
+) -> list[tuple[int, int, int, float, float]]:
     return [(r, a, b, theta, units.bare(v, 1)) for r, a, b, theta, v in windows]
 
 
@@ -493,7 +492,7 @@ def _tolerance(runs: Sequence[FitRun]) -> float:
     return float(np.clip(EXACTNESS * smallest, *TOLERANCES))
 
 
-def _result(  # noqa: PLR0913 (all that the fit had, and what came of it)
+def _result(  # noqa: PLR0913, PLR0917 (all that the fit had, and what came of it)
     found: Mapping[str, Any],
     runs: Sequence[FitRun],
     model: Rig,

@@ -1,7 +1,7 @@
 """The best method: the whole record of a free decay against the equation of motion.
 
-``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')`` with further terms by effects is followed from
-release to rest, stops included, and all its numbers are adapted to all readings at once
+``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')``, with further terms by effects, is followed
+from release to rest, stops included, and all its numbers are adapted to all readings at once
 (:mod:`pendmap.identification.fitting`). Nothing is linearised, no peak is picked.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -187,7 +187,7 @@ def _model(
 ) -> Rig:
     if isinstance(start, Rig):
         return start
-    known = dict(start or {})
+    known: dict[str, Any] = dict(start or {})
     if "w0" not in known:
         rough = rough_start(time, theta, sigma)
         if rough is None:
@@ -212,8 +212,8 @@ def _warnings(fit: TrajectoryFit, estimates: Mapping[str, Estimate], reading: Re
     ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
         found.append(
-            f"the model does not fit: residuals are {math.sqrt(ratio):.2g} times the noise, and the "
-            "intervals are widened by that factor; an effect is missing in the model"
+            f"the model does not fit: residuals are {math.sqrt(ratio):.2g} times the noise, and "
+            "the intervals are widened by that factor; an effect is missing in the model"
         )
     elif ratio < TOO_GOOD and not reading.coarse:
         found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
