@@ -14,11 +14,12 @@
 //! | Which closed orbits are there, and are they stable? | [`orbit`] |
 //! | Where do motions end, and how is that recognised? | [`attractor`] |
 //! | What does the whole plane of initial conditions do? | [`maps`] |
+//! | Which parameters does a record's pendulum have? | [`fit`] |
 //! | How do many trajectories share a register? | [`lanes`] |
 //! | What was wrong with my request? | [`error`] |
 //!
 //! Imports run upwards in that list's reverse: `maps` -> `attractor`, `orbit` -> `integrate` ->
-//! `model` -> `lanes` -> `error`. Threads live in `maps` alone.
+//! `model` -> `lanes` -> `error`, and `fit` -> `integrate`. Threads live in `maps` and `fit` alone.
 //!
 //! ```
 //! use pendmap::maps::basins::{Options, basins};
@@ -41,6 +42,7 @@
 
 pub mod attractor;
 pub mod error;
+pub mod fit;
 pub mod integrate;
 pub mod lanes;
 pub mod maps;

@@ -12,6 +12,8 @@ __all__ = [
     "choose_steps",
     "default_threads",
     "effects",
+    "fit_equations",
+    "fit_runs",
     "period",
     "simd",
     "simd_available",
@@ -26,6 +28,9 @@ _Parameters: TypeAlias = tuple[
 _Axis: TypeAlias = tuple[float, float, int]
 _Floats: TypeAlias = NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int, int], object]
+
+_Free: TypeAlias = tuple[Sequence[tuple[int, int]], float]
+_Window: TypeAlias = tuple[int, int, int, float, float]
 
 class _Choices(TypedDict):
     tol: float
@@ -73,4 +78,16 @@ def basins_list(
     velocity: _Floats,
     choices: _Choices,
     progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def fit_runs(
+    runs: Sequence[dict[str, Any]],
+    free: Sequence[_Free],
+    choices: dict[str, Any],
+    windows: Sequence[_Window] | None = None,
+) -> dict[str, Any]: ...
+def fit_equations(
+    runs: Sequence[dict[str, Any]],
+    free: Sequence[_Free],
+    tolerance: float,
+    windows: Sequence[_Window],
 ) -> dict[str, Any]: ...

@@ -27,7 +27,7 @@ pub struct Course<N> {
     plain: Equation<f64>,
     recorded: Option<Arc<Recorded>>,
     watches: bool,
-    sticks: bool,
+    jumps: bool,
     harmonic: bool,
     period: Option<f64>,
     look: f64,
@@ -53,6 +53,8 @@ impl<N: Number> Course<N> {
         let mut plain = pendulum.equation();
         plain.ages = ages;
         let changes = ages && pendulum.drifts();
+        // Negative friction, which a fit may pass through, holds nothing, but jumps all the same.
+        let jumps = pendulum.has_friction() || pendulum.theta_r < 0.0;
         let tolerance = tolerance.max(FINEST);
         let rate = greatest_rate(pendulum).max(if pendulum.is_autonomous() {
             0.0
@@ -62,8 +64,8 @@ impl<N: Number> Course<N> {
         Self {
             equation,
             recorded: None,
-            watches: pendulum.has_events(),
-            sticks: pendulum.has_friction(),
+            watches: jumps || pendulum.has_events(),
+            jumps,
             harmonic: plain.has_closed_release(),
             plain,
             period: (!changes).then(|| pendulum.period()),
@@ -86,6 +88,16 @@ impl<N: Number> Course<N> {
         self
     }
 
+    /// The same with gravity `(w0 / w_ref)^2`, time being counted in `1 / w_ref`.
+    #[must_use]
+    pub fn with_gravity(mut self, gravity: N) -> Self {
+        let value = gravity.value();
+        self.longest /= value.max(1.0).sqrt();
+        self.plain = self.plain.with_gravity(value);
+        self.equation = self.equation.with_gravity(gravity);
+        self
+    }
+
     /// The same with every turn found, also where nothing changes there: derivatives by the
     /// strength of a friction that is 0 need them.
     #[must_use]
@@ -100,8 +112,9 @@ impl<N: Number> Course<N> {
         let mut forcing = self.equation.forcing(N::constant(tau));
         if let Some(recorded) = &self.recorded {
             let [up, side] = recorded.acceleration(tau);
-            forcing.vertical = forcing.vertical + N::constant(up);
-            forcing.lateral = forcing.lateral + N::constant(side);
+            let gravity = self.equation.gravity();
+            forcing.vertical = gravity.scale_add(up, forcing.vertical);
+            forcing.lateral = gravity.scale_add(side, forcing.lateral);
         }
         let at = self.equation.point(&forcing, theta, velocity, N::constant(sense));
         self.equation.acceleration(&forcing, &at)
@@ -113,10 +126,11 @@ impl<N: Number> Course<N> {
         self.watches
     }
 
-    /// Whether friction can hold the pendulum.
+    /// Whether friction makes the acceleration jump with the sense of the motion; where it is
+    /// positive, it can hold the pendulum.
     #[must_use]
-    pub fn sticks(&self) -> bool {
-        self.sticks
+    pub fn jumps(&self) -> bool {
+        self.jumps
     }
 
     /// The longest step.
@@ -137,8 +151,8 @@ impl<N> Load for Course<N> {
         let mut forcing = self.plain.forcing(tau);
         if let Some(recorded) = &self.recorded {
             let [up, side] = recorded.acceleration(tau);
-            forcing.vertical += up;
-            forcing.lateral += side;
+            forcing.vertical += self.plain.gravity() * up;
+            forcing.lateral += self.plain.gravity() * side;
         }
         let at = self.plain.point(&forcing, theta, 0.0, 1.0);
         [self.plain.load(&forcing, &at), self.plain.friction(&at).max(0.0)]

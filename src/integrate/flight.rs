@@ -92,7 +92,7 @@ impl<'a, N: Number> Flight<'a, N> {
         let velocity = state[1].value();
         if velocity != 0.0 {
             flight.set_out(1_f64.copysign(velocity));
-        } else if course.sticks() {
+        } else if course.jumps() {
             match release(course, tau, state[0].value(), until) {
                 Release::Now(sense) => flight.set_out(sense),
                 wait => flight.settle(wait),
@@ -221,7 +221,7 @@ impl<'a, N: Number> Flight<'a, N> {
     /// At a velocity 0, reached in the sense `sense` with the acceleration `before`.
     fn turn(&mut self, sense: f64, before: f64) {
         let theta = self.state[0].value();
-        let goes_on = if self.course.sticks() {
+        let goes_on = if self.course.jumps() {
             self.uncrowded(release(self.course, self.tau, theta, self.until))
         } else {
             Release::Now(-sense)
@@ -238,7 +238,7 @@ impl<'a, N: Number> Flight<'a, N> {
         }
         self.note(EventKind::Turn);
         let after = self.course.acceleration(self.tau, self.state[0], self.state[1], next).value();
-        let ratio = if self.course.sticks() { after / before } else { 1.0 };
+        let ratio = if self.course.jumps() { after / before } else { 1.0 };
         self.ratio *= ratio;
         self.state[1] = self.state[1].reset(0.0, ratio);
         self.set_out(next);

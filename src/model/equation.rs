@@ -5,6 +5,9 @@
 //! friction, a constant torque (over `m l^2 w0^2`) and the library of effects. `a` and `l` are the
 //! pivot's accelerations over gravity, upward and toward positive theta; nondimensional time
 //! `tau = w0 t`, `gamma = c / (m w0)`.
+//!
+//! Where `w0` itself is fitted, time is counted in `1 / w_ref` with a fixed `w_ref` near it, and
+//! gravity, its drive included, is multiplied by `(w0 / w_ref)^2` ([`Equation::with_gravity`]).
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -25,6 +28,8 @@ pub struct Equation<R> {
     pub torque: R,
     /// The pivot's motion.
     pub motion: Motion<R>,
+    /// Gravity and its reciprocal: `(w0 / w_ref)^2`, 1 where the unit of time is `1 / w0`.
+    gravity: [R; 2],
     /// Time in the laboratory at `tau = 0`.
     pub lab_time: R,
     /// Whether the time in the laboratory goes on with `tau`; a map holds it.
@@ -42,10 +47,12 @@ pub struct Equation<R> {
 /// What the drive does at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Forcing<R> {
-    /// `1 + a`.
+    /// Gravity times `1 + a`.
     pub vertical: R,
-    /// `l`.
+    /// Gravity times `l`.
     pub lateral: R,
+    /// One over gravity.
+    pub per_gravity: R,
     /// Time in the laboratory.
     pub lab: R,
 }
@@ -58,6 +65,7 @@ impl Forcing<f64> {
         Forcing {
             vertical: number.like(self.vertical),
             lateral: number.like(self.lateral),
+            per_gravity: number.like(self.per_gravity),
             lab: number.like(self.lab),
         }
     }
@@ -110,12 +118,14 @@ impl<R: Real> Equation<R> {
             }
         }
         let lab_time = gamma.like(pendulum.lab_time);
+        let gravity = [gamma.like(1.0); 2];
         let ages = false;
         Self {
             gamma,
             theta_r,
             torque,
             motion,
+            gravity,
             lab_time,
             ages,
             torques,
@@ -124,6 +134,19 @@ impl<R: Real> Equation<R> {
             plain,
             holds,
         }
+    }
+
+    /// The same with gravity `(w0 / w_ref)^2`, time being counted in `1 / w_ref`.
+    #[must_use]
+    pub fn with_gravity(mut self, gravity: R) -> Self {
+        self.gravity = [gravity, gravity.like(1.0) / gravity];
+        self
+    }
+
+    /// Gravity.
+    #[inline(always)]
+    pub fn gravity(&self) -> R {
+        self.gravity[0]
     }
 
     /// The same with sideways accelerations taken into account even where no effect makes them: for
@@ -138,15 +161,23 @@ impl<R: Real> Equation<R> {
     #[inline(always)]
     pub fn forcing(&self, tau: R) -> Forcing<R> {
         let lateral = if self.sideways { self.motion.sideways(tau) } else { tau.like(0.0) };
+        self.pushed(self.motion.vertical(tau, self.plain), lateral, tau)
+    }
+
+    /// The same under a pivot whose motion is known otherwise: `vertical` is `1 + a`.
+    #[inline(always)]
+    pub fn pushed(&self, vertical: R, lateral: R, tau: R) -> Forcing<R> {
+        let [gravity, per_gravity] = self.gravity;
         let lab = if self.ages { self.lab_time + tau } else { self.lab_time };
-        Forcing { vertical: self.motion.vertical(tau, self.plain), lateral, lab }
+        Forcing { vertical: gravity * vertical, lateral: gravity * lateral, per_gravity, lab }
     }
 
     /// Where the formulas are evaluated; `sense` is 1 or -1.
     #[inline(always)]
     pub fn point(&self, forcing: &Forcing<R>, theta: R, velocity: R, sense: R) -> Point<R> {
         let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
-        Point { theta, velocity, sense, sine, vertical: forcing.vertical, lab: forcing.lab }
+        let Forcing { vertical, per_gravity, lab, .. } = *forcing;
+        Point { theta, velocity, sense, sine, vertical, per_gravity, lab }
     }
 
     /// All torques per inertia but friction.
@@ -241,6 +272,7 @@ impl Equation<f64> {
                 lateral: number.like(lateral),
                 lateral_phase: number.like(lateral_phase),
             },
+            gravity: [number.like(self.gravity[0]), number.like(self.gravity[1])],
             lab_time: number.like(self.lab_time),
             ages: self.ages,
             torques: Vec::new(),

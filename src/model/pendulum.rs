@@ -126,6 +126,43 @@ impl Pendulum {
         all
     }
 
+    /// Sets the parameter of that place in [`Pendulum::parameters`], without a check: a fit passes
+    /// through values that no pendulum has.
+    ///
+    /// # Panics
+    /// If there is no such place.
+    pub fn set_parameter(&mut self, index: usize, value: f64) {
+        let own = match index {
+            0 => Some(&mut self.gamma),
+            1 => Some(&mut self.theta_r),
+            2 => Some(&mut self.torque),
+            3 => Some(&mut self.drive.p),
+            4 => Some(&mut self.drive.omega),
+            5 => Some(&mut self.drive.phase),
+            _ => None,
+        };
+        if let Some(slot) = own {
+            *slot = value;
+            return;
+        }
+        let (effect, parameter) = self.owner(index).expect("a place in the list of parameters");
+        self.effects[effect].parameters[parameter] = value;
+    }
+
+    /// The effect, and the place among its parameters, of parameter `index`; nothing where it is the
+    /// pendulum's own, or none.
+    #[must_use]
+    pub fn owner(&self, index: usize) -> Option<(usize, usize)> {
+        let mut place = index.checked_sub(Self::OWN_PARAMETERS)?;
+        for (which, effect) in self.effects.iter().enumerate() {
+            if place < effect.values().len() {
+                return Some((which, place));
+            }
+            place -= effect.values().len();
+        }
+        None
+    }
+
     /// The acceleration `th''` at time `tau`, moving in the sense of `velocity`.
     #[must_use]
     pub fn acceleration(&self, tau: f64, theta: f64, velocity: f64) -> f64 {

@@ -66,7 +66,7 @@ impl Load for Equation<f64> {
 impl Equation<f64> {
     /// What a drive without sideways motion does where its vertical factor is known.
     fn at_rest(&self, vertical: f64) -> Forcing<f64> {
-        Forcing { vertical, lateral: 0.0, lab: self.lab_time }
+        self.pushed(vertical, 0.0, 0.0)
     }
 
     /// Whether the pendulum at rest at `theta` is never let go.
@@ -151,7 +151,7 @@ fn closed<L: Load>(load: &L, tau: f64, theta: f64, edge: f64) -> Release {
     let motion = &equation.motion;
     let still = equation.at_rest(1.0);
     let at = equation.point(&still, theta, 0.0, 1.0);
-    let (constant, swing) = (equation.load(&still, &at), -at.sine * motion.p);
+    let (constant, swing) = (equation.load(&still, &at), -at.sine * equation.gravity() * motion.p);
     let mut first = None::<(f64, f64)>;
     for sense in [1.0, -1.0] {
         let limit = equation.friction(&at).max(0.0) - sense * constant;

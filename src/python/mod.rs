@@ -4,6 +4,7 @@
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
 mod convert;
+mod fit;
 mod library;
 mod maps;
 mod motion;
@@ -80,5 +81,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(maps::basins_grid, module)?)?;
     module.add_function(wrap_pyfunction!(maps::basins_list, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
     Ok(())
 }

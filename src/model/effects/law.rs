@@ -143,8 +143,10 @@ pub struct Point<R> {
     pub sense: R,
     /// `sin theta`.
     pub sine: R,
-    /// `1 + a(t)`: gravity and the pivot's vertical acceleration over gravity.
+    /// Gravity times `1 + a(t)`, with the pivot's vertical acceleration over gravity `a`.
     pub vertical: R,
+    /// One over gravity, which is 1 where the unit of time is `1 / w0`.
+    pub per_gravity: R,
     /// Time in the laboratory.
     pub lab: R,
 }

@@ -32,6 +32,6 @@ impl Law for LoadDependentFriction {
     #[inline(always)]
     fn friction<R: Real>([k, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         let load = at.vertical * at.cosine() + at.velocity * at.velocity;
-        *k * (load.magnitude() - at.constant(1.0))
+        *k * (load.magnitude() * at.per_gravity - at.constant(1.0))
     }
 }

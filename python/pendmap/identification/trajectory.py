@@ -1,0 +1,230 @@
+"""The best method: the whole record of a free decay against the equation of motion.
+
+``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')``, with further terms by effects, is followed
+from release to rest, stops included, and all its numbers are adapted to all readings at once
+(:mod:`pendmap.identification.fitting`). Nothing is linearised, no peak is picked.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap import checks
+from pendmap.errors import InputError
+from pendmap.identification.fitting import FitRun, TrajectoryFit, fit_runs
+from pendmap.identification.reading import Reading, reading_of
+from pendmap.identification.result import Estimate, Identification
+from pendmap.identification.rough import rough_start
+from pendmap.model import Rig
+from pendmap.model.effects import Effect
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+__all__ = ["fit_decay", "identify"]
+
+METHOD: Final = "trajectory"
+OFFSET: Final = "encoder_offset"
+TOO_GOOD: Final = 0.7
+"""A sum of squares below this part of its degrees of freedom shows that sigma is too large."""
+
+
+def identify(  # noqa: PLR0913 (the record, and what is known of it)
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    *,
+    sigma: float | None = None,
+    trusted: NDArray[np.bool_] | None = None,
+    start: Rig | Mapping[str, float] | None = None,
+    offset: bool = True,
+    friction: bool = True,
+    effects: Sequence[Effect] = (),
+    free: Sequence[str] | None = None,
+) -> Identification:
+    """Return the damping found in a free decay by fitting its whole trajectory.
+
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        In s; each after the one before it.
+    theta : ndarray of float, shape (n,)
+        Readings of the angle from the downward rest, rad, unwrapped.
+    sigma : float, optional
+        Their standard error, rad; if none is given, the noise of the record as it is seen without
+        any model.
+    trusted : ndarray of bool, shape (n,), optional
+        Which samples count; all if none are given.
+    start : Rig or mapping of str to float, optional
+        Where the search starts; else from zero crossings and the energy of each half swing.
+    offset : bool
+        Whether the sensor may read zero at another angle; ``offset`` is what it reads at rest
+        there.
+    friction : bool
+        Whether there may be Coulomb friction.
+    effects : sequence of Effect
+        Whatever else acts, parameters in SI.
+    free : sequence of str, optional
+        Which of their parameters (``effect.parameter``) are fitted; if none are given, all but
+        those that are shapes: exponents, orders and widths.
+
+    Returns
+    -------
+    Identification
+        ``w0``, ``c_over_m``, ``Tr``, ``offset`` and the effects' parameters. Damping may come out
+        negative, which no pendulum has and a warning says: something else is missing then.
+
+    Raises
+    ------
+    InputError
+        If the arrays do not fit together.
+
+    References
+    ----------
+    Bock (1983), Progress in Scientific Computing 2, 95, for the method; Venzon & Moolgavkar (1988),
+    Applied Statistics 37, 87, for the intervals.
+    """
+    try:
+        fit, reading = fit_decay(
+            time,
+            theta,
+            sigma=sigma,
+            trusted=trusted,
+            start=start,
+            offset=offset,
+            friction=friction,
+            effects=effects,
+            free=free,
+        )
+    except TooShortError as error:
+        return Identification(METHOD, warnings=(str(error),), applicable=False)
+    renamed = {f"{OFFSET}.d": "offset"}
+    names = tuple(renamed.get(name, name) for name in fit.names)
+    estimates = dict(zip(names, fit.estimates.values(), strict=True))
+    count = len(fit.windows)
+    span = f"{time[0]:g} to {time[-1]:g} s"
+    used = f"{fit.samples} readings of {len(time)}, {span}, as one motion"
+    if count > 1:
+        used = f"{fit.samples} readings of {len(time)}, {span}, in {count} windows"
+    return Identification(
+        METHOD,
+        estimates=estimates,
+        used=f"{used}; noise {reading.sigma:.2e} rad",
+        warnings=tuple(_warnings(fit, estimates, reading)),
+        covariance=(names, fit.covariance),
+    )
+
+
+class TooShortError(InputError):
+    """The record holds fewer than two half swings."""
+
+
+def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    *,
+    sigma: float | None = None,
+    trusted: NDArray[np.bool_] | None = None,
+    start: Rig | Mapping[str, float] | None = None,
+    offset: bool = True,
+    friction: bool = True,
+    effects: Sequence[Effect] = (),
+    free: Sequence[str] | None = None,
+) -> tuple[TrajectoryFit, Reading]:
+    """Return the fit behind :func:`identify`, with curve and residuals, and the standard errors.
+
+    Parameters and errors are those of :func:`identify`.
+
+    Raises
+    ------
+    TooShortError
+        If the record holds fewer than two half swings and no start is given.
+    """
+    time, theta = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, theta))
+    if time.shape != theta.shape or time.ndim != 1:
+        raise InputError(
+            f"time has {time.shape} values and theta {theta.shape}: they must be as many"
+        )
+    if not (np.all(np.isfinite(time)) and np.all(np.isfinite(theta))):
+        raise InputError("time or theta is not finite: allowed are finite numbers")
+    if sigma is not None and checks.number("sigma", sigma) <= 0:
+        raise InputError(f"sigma is {sigma:g}: allowed is a number above 0")
+    good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
+    if good.shape != time.shape:
+        raise InputError("trusted and time differ in length: they must be as many")
+    reading = reading_of(theta, sigma)
+    model = _model(start, time[good], theta[good], reading.sigma)
+    extra = [*effects]
+    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
+    if not friction:
+        model = dataclasses.replace(model, Tr=0.0)
+    if offset and all(effect.name != OFFSET for effect in effects):
+        extra.append(Effect(OFFSET, {"d": 0.0}))
+    model = dataclasses.replace(model, effects=tuple(extra))
+    names += _sizes(extra) if free is None else [*free, *_sizes(extra[len(effects) :])]
+    run = FitRun(time, theta, reading.each, trusted=good)
+    return fit_runs([run], model, names, sigma_doubt=reading.doubt), reading
+
+
+SHAPES: Final = ("n", "w", "vs")
+"""Parameters of effects that say how they act, not how strongly."""
+
+
+def _sizes(effects: Sequence[Effect]) -> list[str]:
+    return [f"{e.name}.{p}" for e in effects for p in e.parameters if p not in SHAPES]
+
+
+def _model(
+    start: Rig | Mapping[str, float] | None,
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    sigma: float,
+) -> Rig:
+    if isinstance(start, Rig):
+        return start
+    known: dict[str, Any] = dict(start or {})
+    if "w0" not in known:
+        rough = rough_start(time, theta, sigma)
+        if rough is None:
+            raise TooShortError("the record holds fewer than two half swings: there is no start")
+        known = rough | known
+    return Rig(**known)
+
+
+def _warnings(fit: TrajectoryFit, estimates: Mapping[str, Estimate], reading: Reading) -> list[str]:
+    found = []
+    for name in ("c_over_m", "Tr"):
+        if name in estimates and estimates[name].value < 0:
+            low, high = estimates[name].ci95 or (-math.inf, math.inf)
+            found.append(
+                f"{name} is {estimates[name].value:.3g}, which no pendulum has: "
+                + (
+                    "its interval reaches 0"
+                    if low <= 0 <= high
+                    else "an effect is missing in the model"
+                )
+            )
+    ratio = fit.chi2 / max(fit.degrees, 1)
+    if fit.widening > 1:
+        found.append(
+            f"the model does not fit: residuals are {math.sqrt(ratio):.2g} times the noise, and "
+            "the intervals are widened by that factor; an effect is missing in the model"
+        )
+    elif ratio < TOO_GOOD and not reading.coarse:
+        found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
+    if not fit.converged:
+        found.append("the search did not converge")
+    lost = [name for name, e in estimates.items() if e.ci95 is None]
+    if lost:
+        found.append(f"no end was found for the interval of {', '.join(lost)}")
+    if reading.coarse:
+        found.append(
+            f"the sensor's count ({reading.count:.3g} rad) is coarser than its noise: readings on "
+            "one count are taken for one"
+        )
+    return found

@@ -1,0 +1,164 @@
+//! Residuals of a window and their derivatives.
+
+use std::sync::Arc;
+
+use super::problem::{Columns, MOST_READINGS, Problem, Shaped, Slot};
+use super::window::Window;
+use crate::integrate::State;
+use crate::integrate::course::Course;
+use crate::integrate::sample::sample;
+use crate::integrate::tangent::{Number, Tangent};
+use crate::model::{Observation, Pendulum};
+
+/// The most derivatives that one pass carries.
+const WIDEST: usize = 16;
+/// A trial that needs more steps than this, and than that in a unit of time, is far off: it is given
+/// up. Ten in a unit of time are common.
+const MOST_STEPS: usize = 1000;
+const MOST_STEPS_A_TIME: f64 = 50.0;
+/// The free parameters of a reading, and the angle.
+const READINGS: usize = MOST_READINGS + 1;
+
+/// A window at one point of the search.
+#[derive(Clone, Debug)]
+pub struct Linear {
+    /// Angle, not wrapped, and velocity at each sample.
+    pub states: Vec<State>,
+    /// Reading less model over the standard error; 0 where a sample does not count.
+    pub residuals: Vec<f64>,
+    /// For each sample a row of derivatives of the model over the standard error: by the record's
+    /// columns, then by the initial angle and velocity.
+    pub rows: Vec<f64>,
+    /// The length of a row.
+    pub width: usize,
+}
+
+impl Linear {
+    /// The row of one sample.
+    #[must_use]
+    pub fn row(&self, sample: usize) -> &[f64] {
+        &self.rows[sample * self.width..(sample + 1) * self.width]
+    }
+
+    /// The sum of the squared residuals; not a number where the motion was lost.
+    #[must_use]
+    pub fn chi2(&self) -> f64 {
+        self.residuals.iter().map(|r| r * r).sum()
+    }
+}
+
+/// Follows `window` with the pendulum of its record.
+#[must_use]
+pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: &Window) -> Linear {
+    let directions = columns.motion.len() + 2;
+    let follow = Follow { problem, shaped, columns, window, directions };
+    let samples = window.to - window.from;
+    let mut slopes = vec![0.0; samples * directions];
+    let mut states = Vec::new();
+    let mut first = 0;
+    while first < directions {
+        let left = directions - first;
+        // The narrowest numbers that hold what is left.
+        let pass = match left {
+            ..=2 => Follow::pass::<2>,
+            3 => Follow::pass::<3>,
+            4 => Follow::pass::<4>,
+            5 => Follow::pass::<5>,
+            6 => Follow::pass::<6>,
+            7..=8 => Follow::pass::<8>,
+            9..=12 => Follow::pass::<12>,
+            _ => Follow::pass::<WIDEST>,
+        };
+        pass(&follow, first, &mut slopes, &mut states);
+        first += left.min(WIDEST);
+    }
+    follow.read(states, &slopes)
+}
+
+struct Follow<'a> {
+    problem: &'a Problem,
+    shaped: &'a Shaped,
+    columns: &'a Columns,
+    window: &'a Window,
+    directions: usize,
+}
+
+impl Follow<'_> {
+    /// The derivatives of the angle in `N` directions from `first` on.
+    fn pass<const N: usize>(&self, first: usize, slopes: &mut [f64], states: &mut Vec<State>) {
+        let record = &self.problem.records[self.window.record];
+        let motion = &self.columns.motion;
+        let number = |slot: Slot, value: f64| {
+            // A direction of another pass has no place in this one.
+            let direction = motion.iter().position(|(_, other)| *other == slot);
+            let place = direction.map_or(usize::MAX, |direction| direction.wrapping_sub(first));
+            Tangent::<f64, N>::seeded(value, place)
+        };
+        let Shaped { pendulum, gravity } = self.shaped;
+        let parameter = |index: usize, value: f64| number(Slot::Parameter(index), value);
+        let mut course = Course::new(pendulum, true, self.problem.tolerance, parameter)
+            .watched()
+            .with_gravity(number(Slot::Gravity, *gravity));
+        if let Some(recorded) = &record.recorded {
+            course = course.driven_by(Arc::clone(recorded));
+        }
+        let times = &record.times[self.window.from..self.window.to];
+        let rate = pendulum.motion().omega.max(1.0);
+        let most =
+            MOST_STEPS + (MOST_STEPS_A_TIME * rate * (times[times.len() - 1] - times[0])) as usize;
+        let begin = |of: usize| {
+            let place = (motion.len() + of).wrapping_sub(first);
+            Tangent::<f64, N>::seeded(self.window.start[of], place)
+        };
+        let run =
+            sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
+        let filled = N.min(self.directions - first);
+        for (row, state) in slopes.chunks_exact_mut(self.directions).zip(&run.states) {
+            row[first..first + filled].copy_from_slice(&state[0].slope[..filled]);
+        }
+        *states = run.states.iter().map(|state| state.map(Number::value)).collect();
+    }
+
+    /// What the sensor makes of the angles.
+    fn read(&self, states: Vec<State>, slopes: &[f64]) -> Linear {
+        let record = &self.problem.records[self.window.record];
+        let sensor = Sensor::new(&self.shaped.pendulum, self.columns);
+        let (moving, reading) = (self.columns.motion.len(), self.columns.reading.len());
+        let width = moving + reading + 2;
+        let mut residuals = Vec::with_capacity(states.len());
+        let mut rows = Vec::with_capacity(states.len() * width);
+        for (k, state) in states.iter().enumerate() {
+            let sample = self.window.from + k;
+            let weight = record.weights[sample];
+            if weight == 0.0 {
+                residuals.push(0.0);
+                rows.extend(std::iter::repeat_n(0.0, width));
+                continue;
+            }
+            let slopes = &slopes[k * self.directions..(k + 1) * self.directions];
+            let read = sensor.read(state[0]);
+            residuals.push(weight * (record.readings[sample] - read.value));
+            let by_angle = weight * read.slope[0];
+            rows.extend(slopes[..moving].iter().map(|slope| by_angle * slope));
+            rows.extend(read.slope[1..=reading].iter().map(|slope| weight * slope));
+            rows.extend(slopes[moving..].iter().map(|slope| by_angle * slope));
+        }
+        Linear { states, residuals, rows, width }
+    }
+}
+
+/// The sensor, with derivatives by the angle and by its free parameters.
+struct Sensor(Observation<Tangent<f64, READINGS>>);
+
+impl Sensor {
+    fn new(pendulum: &Pendulum, columns: &Columns) -> Self {
+        Self(Observation::lift(pendulum, |index, value| {
+            let place = columns.reading.iter().position(|(_, own)| *own == index);
+            Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 1))
+        }))
+    }
+
+    fn read(&self, theta: f64) -> Tangent<f64, READINGS> {
+        self.0.read(Tangent::seeded(theta, 0))
+    }
+}

@@ -1,0 +1,24 @@
+//! Fitting a pendulum to records: least squares by multiple shooting on the reference integrator.
+//!
+//! - [`problem`]: records, and which parameters of their pendulums are free
+//! - [`window`]: a record cut into windows, each with an initial state of its own
+//! - [`linear`]: residuals of a window and their derivatives
+//! - [`normal`]: the normal equations, with the initial states eliminated
+//! - [`descent`]: Gauss-Newton steps with Levenberg's and Marquardt's damping
+//! - [`stages`]: from short windows to long ones
+//! - [`profile`]: intervals from the profile of the likelihood
+//!
+//! Multiple shooting: Bock (1983), Progress in Scientific Computing 2, 95; without conditions of
+//! continuity between windows, so that each window stands for itself. Time is counted in `1 / w_ref`
+//! with a fixed `w_ref` near `w0`; `w0` itself is the parameter [`Slot::Gravity`](problem::Slot).
+
+pub mod descent;
+pub mod linear;
+pub mod normal;
+pub mod problem;
+pub mod profile;
+pub mod stages;
+pub mod window;
+
+pub use problem::{Free, Problem, Record, Slot};
+pub use stages::{Fit, Settings, fit};

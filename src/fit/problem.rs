@@ -1,0 +1,240 @@
+//! Records, and which parameters of their pendulums are free.
+
+use std::sync::Arc;
+
+use crate::error::Error;
+use crate::model::effects::Action;
+use crate::model::{Pendulum, Recorded};
+
+/// The most free parameters of a record's reading.
+pub const MOST_READINGS: usize = 7;
+
+/// A record of one motion, and the pendulum that it is thought to be of.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// Everything that is not free.
+    pub pendulum: Pendulum,
+    /// A recorded motion of the pivot.
+    pub recorded: Option<Arc<Recorded>>,
+    /// Times of the samples, times `w_ref`; each after the one before it.
+    pub times: Vec<f64>,
+    /// What the sensor read, rad.
+    pub readings: Vec<f64>,
+    /// One over the standard error of each reading; 0 for readings that are not to be trusted.
+    pub weights: Vec<f64>,
+    /// The longest window, times `w_ref`; infinite where one may cover the whole record.
+    pub longest: f64,
+}
+
+/// A place for a number in a pendulum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slot {
+    /// `(w0 / w_ref)^2`.
+    Gravity,
+    /// That place in [`Pendulum::parameters`].
+    Parameter(usize),
+}
+
+/// A free parameter.
+#[derive(Clone, Debug)]
+pub struct Free {
+    /// What it is in which records; the same number in all of them, at most once in each.
+    pub places: Vec<(usize, Slot)>,
+    /// Where the search starts.
+    pub start: f64,
+}
+
+impl Free {
+    /// What it is in record `index`.
+    fn slot(&self, index: usize) -> Option<Slot> {
+        self.places.iter().find(|(record, _)| *record == index).map(|(_, slot)| *slot)
+    }
+}
+
+/// Records and free parameters.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// The records.
+    pub records: Vec<Record>,
+    /// The free parameters.
+    pub free: Vec<Free>,
+    /// The error allowed to a step of the integrator.
+    pub tolerance: f64,
+}
+
+/// A record's pendulum with values for the free parameters.
+#[derive(Clone, Debug)]
+pub struct Shaped {
+    /// The pendulum.
+    pub pendulum: Pendulum,
+    /// `(w0 / w_ref)^2`.
+    pub gravity: f64,
+}
+
+/// The free parameters of one record: their places in [`Problem::free`], and what they are.
+#[derive(Clone, Debug, Default)]
+pub struct Columns {
+    /// Those that the motion depends on.
+    pub motion: Vec<(usize, Slot)>,
+    /// Those that only the reading depends on, with their place in [`Pendulum::parameters`].
+    pub reading: Vec<(usize, usize)>,
+}
+
+impl Columns {
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.motion.len() + self.reading.len()
+    }
+
+    /// Their places in [`Problem::free`], those of the motion first.
+    pub fn places(&self) -> impl Iterator<Item = usize> + '_ {
+        self.motion.iter().map(|(place, _)| *place).chain(self.reading.iter().map(|(p, _)| *p))
+    }
+}
+
+impl Problem {
+    /// Checks lengths, times, numbers and places.
+    ///
+    /// # Errors
+    /// [`Error::Lengths`] where a record's arrays differ in length, [`Error::Range`] for a number
+    /// that is not finite, a time that is not after the one before it, a negative weight, a record
+    /// with fewer than 3 trusted samples, or a free parameter that its record does not have.
+    pub fn new(records: Vec<Record>, free: Vec<Free>, tolerance: f64) -> Result<Self, Error> {
+        for record in &records {
+            record.check()?;
+        }
+        let known: Vec<usize> = records.iter().map(|r| r.pendulum.parameters().len()).collect();
+        for Free { places, start } in &free {
+            if !start.is_finite() {
+                return Err(range("start of a free parameter", *start, "any finite number"));
+            }
+            for (record, slot) in places {
+                let Some(known) = known.get(*record) else {
+                    let allowed = "one of those given";
+                    return Err(range("record of a free parameter", *record as f64, allowed));
+                };
+                if let Slot::Parameter(index) = *slot
+                    && index >= *known
+                {
+                    let allowed = "one that the pendulum has";
+                    return Err(range("place of a free parameter", index as f64, allowed));
+                }
+            }
+        }
+        let problem = Self { records, free, tolerance };
+        for index in 0..problem.records.len() {
+            let count = problem.columns(index).reading.len();
+            if count > MOST_READINGS {
+                return Err(range(
+                    "number of free parameters of the reading",
+                    count as f64,
+                    "7 or fewer",
+                ));
+            }
+        }
+        if !(tolerance > 0.0 && tolerance.is_finite()) {
+            return Err(range("tolerance", tolerance, "a number above 0"));
+        }
+        Ok(problem)
+    }
+
+    /// The values from which the search starts.
+    #[must_use]
+    pub fn start(&self) -> Vec<f64> {
+        self.free.iter().map(|free| free.start).collect()
+    }
+
+    /// The free parameters of record `index`.
+    #[must_use]
+    pub fn columns(&self, index: usize) -> Columns {
+        let pendulum = &self.records[index].pendulum;
+        let reads = |parameter: usize| {
+            let owner = pendulum.owner(parameter);
+            owner.is_some_and(|(effect, _)| pendulum.effects[effect].is(&[Action::Reading]))
+        };
+        let mut columns = Columns::default();
+        for (place, free) in self.free.iter().enumerate() {
+            match free.slot(index) {
+                Some(Slot::Parameter(parameter)) if reads(parameter) => {
+                    columns.reading.push((place, parameter));
+                }
+                Some(slot) => columns.motion.push((place, slot)),
+                None => {}
+            }
+        }
+        columns
+    }
+
+    /// The pendulum of record `index` with `values` for the free parameters; none where one is
+    /// outside the range in which its formula means something. Negative damping and friction are
+    /// allowed: what is missing in a model may drive them there.
+    #[must_use]
+    pub fn shaped(&self, index: usize, values: &[f64]) -> Option<Shaped> {
+        let mut shaped = Shaped { pendulum: self.records[index].pendulum.clone(), gravity: 1.0 };
+        for (free, value) in self.free.iter().zip(values) {
+            match free.slot(index) {
+                Some(Slot::Gravity) => shaped.gravity = *value,
+                Some(Slot::Parameter(place)) => shaped.pendulum.set_parameter(place, *value),
+                None => {}
+            }
+        }
+        shaped.is_sound().then_some(shaped)
+    }
+
+    /// How many samples count.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        let trusted = |record: &Record| record.weights.iter().filter(|w| **w > 0.0).count();
+        self.records.iter().map(trusted).sum()
+    }
+}
+
+impl Shaped {
+    fn is_sound(&self) -> bool {
+        let numbers = self.pendulum.parameters();
+        let finite = numbers.iter().all(|(_, value)| value.is_finite());
+        let in_range = self.pendulum.effects.iter().all(|effect| {
+            let parameters = effect.kind.definition().parameters;
+            let fits = |(p, v): (&crate::model::effects::Parameter, &f64)| {
+                (p.range[0]..=p.range[1]).contains(v)
+            };
+            parameters.iter().zip(effect.values()).all(fits)
+        });
+        finite && in_range && self.pendulum.motion().omega > 0.0 && self.gravity > 0.0
+    }
+}
+
+impl Record {
+    fn check(&self) -> Result<(), Error> {
+        for (name, values) in [("readings", &self.readings), ("weights", &self.weights)] {
+            if values.len() != self.times.len() {
+                let given = (self.times.len(), values.len());
+                return Err(Error::Lengths { given, names: ("times", name) });
+            }
+            if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+                return Err(range("reading or weight", *value, "any finite number"));
+            }
+        }
+        if let Some(value) = self.weights.iter().find(|weight| **weight < 0.0) {
+            return Err(range("weight", *value, "0 or more"));
+        }
+        let late = self.times.windows(2).find(|pair| pair[1] <= pair[0]).map(|pair| pair[1]);
+        if let Some(value) = self.times.iter().copied().find(|time| !time.is_finite()).or(late) {
+            return Err(range("time of a sample", value, "a finite time after the one before it"));
+        }
+        let trusted = self.weights.iter().filter(|weight| **weight > 0.0).count();
+        if trusted < 3 {
+            return Err(range(
+                "number of trusted samples",
+                trusted as f64,
+                "3 or more in a record",
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn range(name: &'static str, value: f64, allowed: &'static str) -> Error {
+    Error::Range { name, value, allowed }
+}

@@ -1,0 +1,161 @@
+//! From short windows to long ones.
+//!
+//! Within a window of about a swing the model is nearly linear in all that is not known, so that the
+//! search converges from far; each stage starts from the last one's curve. Long windows are precise,
+//! since small errors of the parameters add up in them.
+
+use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
+
+use super::descent::{Limit, Point, descend};
+use super::normal::Normal;
+use super::problem::Problem;
+use super::window::{Window, cut, guess, halves};
+use crate::error::Error;
+use crate::integrate::State;
+
+/// Windows whose mean squared residual is so many times the median's squared are split.
+const ASTRAY: f64 = 36.0;
+/// How often they are.
+const MOST_SPLITS: usize = 3;
+
+/// Choices of a fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Length of the first windows, in units of time; infinite to begin with the longest.
+    pub shortest: f64,
+    /// By how much windows grow from stage to stage.
+    pub growth: f64,
+    /// The most steps of a stage.
+    pub steps: usize,
+    /// The gain in the sum of squares that is worth no further step.
+    pub gain: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { shortest: TAU, growth: 4.0, steps: 40, gain: 1e-3 }
+    }
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The best point.
+    pub point: Point,
+    /// Steps of all stages together.
+    pub steps: usize,
+    /// Stages.
+    pub stages: usize,
+    /// Whether the last stage converged.
+    pub converged: bool,
+}
+
+impl Fit {
+    /// By which factor the sum of squares exceeds its degrees of freedom, where that is more than
+    /// chance and an error of `doubt` (relative) of the standard errors allow; else 1. Birge (1932),
+    /// Physical Review 40, 207: the intervals of a model that does not fit are widened by its root.
+    #[must_use]
+    pub fn widening(&self, problem: &Problem, doubt: f64) -> f64 {
+        let degrees = self.point.degrees(problem).max(1) as f64;
+        let ratio = self.point.normal.chi2 / degrees;
+        let allowed = 1.0 + 4.0 * (2.0 / degrees + 4.0 * doubt * doubt).sqrt();
+        if ratio > allowed { ratio } else { 1.0 }
+    }
+}
+
+/// Fits the free parameters of `problem`. With `windows` the search begins at these, and at the
+/// parameters' starts, with one stage alone.
+///
+/// # Errors
+/// [`Error::Diverges`] where a motion leaves the range of numbers at the start,
+/// [`Error::Interrupted`] when `cancel` is set.
+pub fn fit(
+    problem: &Problem,
+    settings: Settings,
+    windows: Option<Vec<Window>>,
+    cancel: &AtomicBool,
+) -> Result<Fit, Error> {
+    let last = Limit { gain: settings.gain, part: 1e-9, steps: settings.steps };
+    let Some(windows) = windows else { return widened(problem, settings, last, cancel) };
+    let mut point = Point::new(problem, problem.start(), windows)?;
+    let outcome = descend(problem, &mut point, &[], last, cancel)?;
+    Ok(Fit { point, steps: outcome.steps, stages: 1, converged: outcome.converged })
+}
+
+fn widened(
+    problem: &Problem,
+    settings: Settings,
+    last: Limit,
+    cancel: &AtomicBool,
+) -> Result<Fit, Error> {
+    let span = |times: &[f64]| times[times.len() - 1] - times[0];
+    let most = problem.records.iter().map(|r| span(&r.times).min(r.longest)).fold(0.0, f64::max);
+    let rough = Limit { gain: 0.1, part: 1e-3, steps: settings.steps };
+    let mut length = settings.shortest.min(most);
+    let windows = cut(problem, length, |record, at| guess(&problem.records[record], at));
+    let mut point = Point::new(problem, problem.start(), windows)?;
+    let (mut steps, mut stages) = (0, 0);
+    loop {
+        let limit = if length < most { rough } else { last };
+        let mut outcome = descend(problem, &mut point, &[], limit, cancel)?;
+        (steps, stages) = (steps + outcome.steps, stages + 1);
+        for _ in 0..MOST_SPLITS {
+            let Some(split) = split(problem, &point) else { break };
+            point = split;
+            outcome = descend(problem, &mut point, &[], limit, cancel)?;
+            steps += outcome.steps;
+        }
+        if length >= most {
+            return Ok(Fit { point, steps, stages, converged: outcome.converged });
+        }
+        // Not a rest of the record at the end that is much shorter than the others.
+        length *= settings.growth;
+        if length > 0.6 * most {
+            length = most;
+        }
+        let windows = cut(problem, length, states(problem, &point));
+        // A curve that was good in parts may be lost as a whole: then the initial states are all
+        // that is known.
+        point = match Point::new(problem, point.values.clone(), windows) {
+            Ok(next) => next,
+            Err(_) => return Ok(Fit { point, steps, stages, converged: false }),
+        };
+    }
+}
+
+/// The states at the samples of a point's windows; where no window is, what the readings say.
+fn states<'a>(problem: &'a Problem, point: &'a Point) -> impl FnMut(usize, usize) -> State + 'a {
+    |record, at| {
+        let within = |w: &Window| w.record == record && (w.from..w.to).contains(&at);
+        point.windows.iter().position(within).map_or_else(
+            || guess(&problem.records[record], at),
+            |k| point.normal.states[k][at - point.windows[k].from],
+        )
+    }
+}
+
+/// The point with the windows split whose residuals stand out; none where none does.
+fn split(problem: &Problem, point: &Point) -> Option<Point> {
+    let Normal { residuals, .. } = &point.normal;
+    let mean = |all: &Vec<f64>| {
+        let counted = all.iter().filter(|r| **r != 0.0).count().max(1);
+        all.iter().map(|r| r * r).sum::<f64>() / counted as f64
+    };
+    let means: Vec<f64> = residuals.iter().map(mean).collect();
+    let mut sorted = means.clone();
+    sorted.sort_by(f64::total_cmp);
+    let limit = ASTRAY * sorted[(sorted.len() - 1) / 2].max(1.0);
+    let mut windows = Vec::with_capacity(means.len());
+    for (window, mean) in point.windows.iter().zip(&means) {
+        let parts = if *mean > limit { halves(problem, window) } else { None };
+        match parts {
+            Some(parts) => windows.extend(parts),
+            None => windows.push(*window),
+        }
+    }
+    if windows.len() == point.windows.len() {
+        return None;
+    }
+    Point::new(problem, point.values.clone(), windows).ok()
+}

@@ -1,0 +1,112 @@
+//! A record cut into windows, each with an initial state of its own.
+
+use super::problem::{Problem, Record};
+use crate::integrate::State;
+
+/// A window needs so many trusted samples to say anything about the parameters.
+const FEWEST: usize = 8;
+/// The initial state comes from a cubic through the readings within this time on either side.
+const REACH: f64 = 0.5;
+
+/// A stretch of a record, from sample `from` to before sample `to`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Of which record.
+    pub record: usize,
+    /// Its first sample.
+    pub from: usize,
+    /// One after its last sample.
+    pub to: usize,
+    /// Angle and velocity at its first sample.
+    pub start: State,
+}
+
+/// Windows of about `length` of all records, one after the other; none is longer than its record
+/// allows. `state` tells the state at a sample of a record.
+pub fn cut(
+    problem: &Problem,
+    length: f64,
+    mut state: impl FnMut(usize, usize) -> State,
+) -> Vec<Window> {
+    let mut windows = Vec::new();
+    for (index, record) in problem.records.iter().enumerate() {
+        let span = record.times[record.times.len() - 1] - record.times[0];
+        let count =
+            (span / length.min(record.longest)).ceil().clamp(1.0, record.times.len() as f64);
+        let mut from = 0;
+        for k in 1..=count as usize {
+            let end = record.times[0] + span * k as f64 / count;
+            let mut to = record.times.partition_point(|time| *time < end);
+            if k == count as usize || trusted(record, to, record.times.len()) < FEWEST {
+                to = record.times.len();
+            }
+            if trusted(record, from, to) >= FEWEST || to == record.times.len() && from < to {
+                windows.push(Window { record: index, from, to, start: state(index, from) });
+                from = to;
+            }
+        }
+    }
+    windows
+}
+
+/// The halves of a window; none where they would be too short.
+#[must_use]
+pub fn halves(problem: &Problem, window: &Window) -> Option<[Window; 2]> {
+    let record = &problem.records[window.record];
+    let Window { from, to, .. } = *window;
+    let middle = 0.5 * (record.times[from] + record.times[to - 1]);
+    let between = from + record.times[from..to].partition_point(|time| *time < middle);
+    let enough = [(from, between), (between, to)]
+        .iter()
+        .all(|(from, to)| trusted(record, *from, *to) >= 2 * FEWEST);
+    enough.then(|| {
+        [(from, between), (between, to)].map(|(from, to)| Window {
+            record: window.record,
+            from,
+            to,
+            start: guess(record, from),
+        })
+    })
+}
+
+/// Angle and velocity at a sample from a cubic through the readings about it, by least squares.
+#[must_use]
+pub fn guess(record: &Record, at: usize) -> State {
+    let now = record.times[at];
+    let mut reach = REACH;
+    loop {
+        let from = record.times.partition_point(|time| *time < now - reach);
+        let to = record.times.partition_point(|time| *time <= now + reach);
+        let whole = from == 0 && to == record.times.len();
+        if trusted(record, from, to) >= FEWEST || whole {
+            return cubic(record, from, to, now);
+        }
+        reach *= 2.0;
+    }
+}
+
+fn trusted(record: &Record, from: usize, to: usize) -> usize {
+    record.weights[from..to].iter().filter(|weight| **weight > 0.0).count()
+}
+
+/// Value and slope at `now` of the cubic through the trusted readings; a line through few.
+fn cubic(record: &Record, from: usize, to: usize, now: f64) -> State {
+    let count = if trusted(record, from, to) >= FEWEST { 4 } else { 2 };
+    let mut normal = nalgebra::DMatrix::<f64>::zeros(count, count);
+    let mut right = nalgebra::DVector::<f64>::zeros(count);
+    for k in (from..to).filter(|k| record.weights[*k] > 0.0) {
+        let row: Vec<f64> = (0..count).map(|i| (record.times[k] - now).powi(i as i32)).collect();
+        for i in 0..count {
+            right[i] += row[i] * record.readings[k];
+            for j in 0..count {
+                normal[(i, j)] += row[i] * row[j];
+            }
+        }
+    }
+    let nearest = (from..to).find(|k| record.weights[*k] > 0.0).unwrap_or(from);
+    let fallback = [record.readings[nearest], 0.0];
+    normal.cholesky().map_or(fallback, |factor| {
+        let all = factor.solve(&right);
+        [all[0], all[1]]
+    })
+}

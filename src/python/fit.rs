@@ -1,0 +1,192 @@
+//! Bindings of `fit`.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use super::watch::watched;
+use super::{Parameters, pendulum};
+use crate::fit::descent::Point;
+use crate::fit::profile::intervals;
+use crate::fit::window::Window;
+use crate::fit::{Free, Problem, Record, Settings, Slot, fit};
+use crate::model::Recorded;
+use crate::model::recorded::{Quantity, Samples};
+
+type Floats<'py> = PyReadonlyArray1<'py, f64>;
+
+/// `([(record, place), ...], start)`: which place in the list of parameters it is in which records,
+/// -1 for gravity; where the search starts.
+type FreeTuple = (Vec<(usize, isize)>, f64);
+
+/// `(record, first sample, one after the last, angle, velocity)`.
+type WindowTuple = (usize, usize, usize, f64, f64);
+
+/// A recorded motion of the pivot as Python hands it over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Pivot<'py> {
+    quantity: String,
+    time: Floats<'py>,
+    vertical: Option<Floats<'py>>,
+    horizontal: Option<Floats<'py>>,
+}
+
+impl Pivot<'_> {
+    fn recorded(&self) -> PyResult<Recorded> {
+        let quantity = match self.quantity.as_str() {
+            "position" => Quantity::Position,
+            "velocity" => Quantity::Velocity,
+            _ => Quantity::Acceleration,
+        };
+        let slice = |values: &Option<Floats<'_>>| {
+            values.as_ref().map(|values| values.as_slice().map(<[f64]>::to_vec)).transpose()
+        };
+        let (vertical, horizontal) = (slice(&self.vertical)?, slice(&self.horizontal)?);
+        let vertical = vertical.as_deref().map(|values| Samples { quantity, values });
+        let horizontal = horizontal.as_deref().map(|values| Samples { quantity, values });
+        Ok(Recorded::new(self.time.as_slice()?, vertical, horizontal)?)
+    }
+}
+
+/// A record as Python hands it over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Run<'py> {
+    parameters: Parameters,
+    time: Floats<'py>,
+    reading: Floats<'py>,
+    weight: Floats<'py>,
+    longest: f64,
+    pivot: Option<Pivot<'py>>,
+}
+
+impl Run<'_> {
+    fn record(self) -> PyResult<Record> {
+        let recorded = self.pivot.as_ref().map(Pivot::recorded).transpose()?;
+        Ok(Record {
+            pendulum: pendulum(self.parameters)?,
+            recorded: recorded.map(Arc::new),
+            times: self.time.as_slice()?.to_vec(),
+            readings: self.reading.as_slice()?.to_vec(),
+            weights: self.weight.as_slice()?.to_vec(),
+            longest: self.longest,
+        })
+    }
+}
+
+/// Choices of a fit as Python hands them over.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct FitChoices {
+    tolerance: f64,
+    shortest: f64,
+    growth: f64,
+    steps: usize,
+    gain: f64,
+    profiled: Vec<usize>,
+    level: f64,
+    doubt: f64,
+}
+
+fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<Problem> {
+    let records = runs.into_iter().map(Run::record).collect::<PyResult<_>>()?;
+    let place = |index: isize| usize::try_from(index).map_or(Slot::Gravity, Slot::Parameter);
+    let free = free.iter().map(|(places, start)| {
+        let places = places.iter().map(|(record, index)| (*record, place(*index))).collect();
+        Free { places, start: *start }
+    });
+    Ok(Problem::new(records, free.collect(), tolerance)?)
+}
+
+fn windows(given: Vec<WindowTuple>) -> Vec<Window> {
+    let window =
+        |(record, from, to, theta, velocity)| Window { record, from, to, start: [theta, velocity] };
+    given.into_iter().map(window).collect()
+}
+
+/// The best values of the free parameters, and what follows from them.
+#[pyfunction]
+#[pyo3(signature = (runs, free, choices, windows=None))]
+pub fn fit_runs<'py>(
+    py: Python<'py>,
+    runs: Vec<Run<'py>>,
+    free: Vec<FreeTuple>,
+    choices: FitChoices,
+    windows: Option<Vec<WindowTuple>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let problem = problem(runs, &free, choices.tolerance)?;
+    let given = windows.map(self::windows);
+    let FitChoices { shortest, growth, steps, gain, .. } = choices;
+    let settings = Settings { shortest, growth, steps, gain };
+    let (found, ends) = watched(py, None, |control| {
+        let found = fit(&problem, settings, given, control.flag())?;
+        let level = choices.level * found.widening(&problem, choices.doubt);
+        let ends = intervals(&problem, &found.point, &choices.profiled, level, control.flag())?;
+        Ok((found, ends))
+    })?;
+    let dict = point(py, &problem, &found.point)?;
+    dict.set_item("covariance", matrix(py, &found.point.normal.covariance())?)?;
+    dict.set_item("intervals", ends.iter().map(|[a, b]| (*a, *b)).collect::<Vec<_>>())?;
+    dict.set_item("widening", found.widening(&problem, choices.doubt))?;
+    dict.set_item("steps", found.steps)?;
+    dict.set_item("stages", found.stages)?;
+    dict.set_item("converged", found.converged)?;
+    Ok(dict)
+}
+
+/// The equations at the starts of the free parameters and of the windows, without a step.
+#[pyfunction]
+pub fn fit_equations<'py>(
+    py: Python<'py>,
+    runs: Vec<Run<'py>>,
+    free: Vec<FreeTuple>,
+    tolerance: f64,
+    windows: Vec<WindowTuple>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let problem = problem(runs, &free, tolerance)?;
+    let windows = self::windows(windows);
+    let at = watched(py, None, |_| Point::new(&problem, problem.start(), windows))?;
+    point(py, &problem, &at)
+}
+
+fn point<'py>(py: Python<'py>, problem: &Problem, at: &Point) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    let (information, pull) = at.normal.reduced(0.0);
+    dict.set_item("values", at.values.clone().into_pyarray(py))?;
+    dict.set_item("chi2", at.normal.chi2)?;
+    dict.set_item("samples", problem.samples())?;
+    dict.set_item("degrees", at.degrees(problem))?;
+    dict.set_item("information", matrix(py, &information)?)?;
+    dict.set_item("pull", pull.as_slice().to_vec().into_pyarray(py))?;
+    let window = |w: &Window| (w.record, w.from, w.to, w.start[0], w.start[1]);
+    dict.set_item("windows", at.windows.iter().map(window).collect::<Vec<_>>())?;
+    let runs = PyList::empty(py);
+    for (index, record) in problem.records.iter().enumerate() {
+        // Where no window is, nothing is known.
+        let mut curve = [(); 3].map(|()| vec![f64::NAN; record.times.len()]);
+        let windows = at.windows.iter().zip(&at.normal.states).zip(&at.normal.residuals);
+        for ((window, states), residuals) in windows.filter(|((w, _), _)| w.record == index) {
+            for (k, (state, residual)) in states.iter().zip(residuals).enumerate() {
+                for (column, value) in curve.iter_mut().zip([state[0], state[1], *residual]) {
+                    column[window.from + k] = value;
+                }
+            }
+        }
+        let run = PyDict::new(py);
+        for (name, column) in ["theta", "velocity", "residual"].into_iter().zip(curve) {
+            run.set_item(name, column.into_pyarray(py))?;
+        }
+        runs.append(run)?;
+    }
+    dict.set_item("runs", runs)?;
+    Ok(dict)
+}
+
+fn matrix<'py>(py: Python<'py>, matrix: &DMatrix<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rows: Vec<Vec<f64>> = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
+    Ok(PyArray2::from_vec2(py, &rows)?)
+}
