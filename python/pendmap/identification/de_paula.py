@@ -65,7 +65,8 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
 
     References
     ----------
-    De Paula, Savi & Pereira-Pinto (2006), J. Sound Vib. 294, 585-595.
+    De Paula, Savi & Pereira-Pinto (2006), "Chaos and transient chaos in an experimental nonlinear
+    pendulum", J. Sound Vib.; the windows are ours.
     """
     peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     return from_peaks(peaks, fast=fast, slow=slow)

@@ -62,7 +62,8 @@ def identify(
 
     References
     ----------
-    Liang & Feeny (2006), Nonlinear Dynamics 46, 17-33.
+    Liang & Feeny (2006), "Balancing energy to estimate damping parameters in forced oscillators",
+    J. Sound Vib.; the balance here is that of a free decay, half cycle by half cycle.
     """
     peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     t, x = samples(time, theta, trusted)

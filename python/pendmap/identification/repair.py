@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import least_squares
 
-from pendmap.identification.combined import CUT, recursion, small_peaks, unphysical
+from pendmap.identification.combined import CUT, small_peaks, unphysical
+from pendmap.identification.decrement import recursion
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.period import frequency
 from pendmap.identification.result import Identification
