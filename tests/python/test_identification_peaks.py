@@ -10,7 +10,8 @@ import pytest
 from decays import decay, record
 from pendmap import InputError
 from pendmap.identification import Peaks, find_peaks
-from pendmap.identification.local_fit import count_of, noise_of
+from pendmap.identification.local_fit import count_of
+from pendmap.identification.reading import reading_of
 
 WIDE = decay()
 
@@ -163,7 +164,7 @@ def test_what_does_not_swing_has_no_peaks() -> None:
 def test_the_noise_floor_and_the_count_are_seen() -> None:
     for noise_deg in (0.05, 0.1, 0.5):
         time, angle = record(WIDE, noise_deg=noise_deg)
-        assert noise_of(time, angle) == pytest.approx(math.radians(noise_deg), rel=0.03)
+        assert reading_of(time, angle).sigma == pytest.approx(math.radians(noise_deg), rel=0.03)
         assert count_of(angle) == 0
     time, angle = record(WIDE, noise_deg=0.1, counts=4096)
     assert count_of(angle) == pytest.approx(math.tau / 4096, rel=1e-6)

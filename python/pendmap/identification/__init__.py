@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pendmap.identification.methods import METHODS, Method, identify
 from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.report import IdentificationReport, identify_experiment
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.start import StartingValues, global_start, starting_values
 from pendmap.identification.table1 import PeakErrors, Row, Table1, table1
@@ -12,6 +13,7 @@ __all__ = [
     "METHODS",
     "Estimate",
     "Identification",
+    "IdentificationReport",
     "Method",
     "PeakErrors",
     "Peaks",
@@ -21,6 +23,7 @@ __all__ = [
     "find_peaks",
     "global_start",
     "identify",
+    "identify_experiment",
     "starting_values",
     "table1",
 ]

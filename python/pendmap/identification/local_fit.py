@@ -1,4 +1,4 @@
-"""Polynomials fitted to a few samples around an instant, and the noise that they leave."""
+"""Polynomials fitted to a few samples around an instant, and the step of a counting sensor."""
 
 from __future__ import annotations
 
@@ -13,14 +13,13 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["LocalFit", "count_of", "fit_around", "noise_of", "smoothed_velocity"]
+__all__ = ["LocalFit", "count_of", "fit_around", "smoothed_velocity"]
 
 _NORMAL_MAD: Final = 0.674489750196
 """Median of the absolute value of a standard normal variable."""
 _OUTLIER: Final = 4.5
 _ROUNDS: Final = 4
 _ROUNDING: Final = 1e-9
-_POINTS, _DEGREE = 9, 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,36 +162,6 @@ def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     coefficients = inverse @ (rows.T @ x)
     return inverse, coefficients, x - rows @ coefficients
-
-
-def noise_of(time: Floats, theta: Floats) -> float:
-    """Return the standard deviation of the noise without a model of the motion, rad.
-
-    The residual of a quartic through nine neighbouring samples, by its median absolute value, over
-    the filter's noise gain. Where the reading moves in steps coarser than the noise, the steps'
-    own ``count / sqrt(12)`` is returned. Samples at rest within a step say nothing and are left
-    out. Times need not be evenly spaced: gaps and jitter only add a little.
-
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s and rad.
-    """
-    del time  # nine neighbours of an even clock; kept so that another floor can take its place
-    if theta.size < 2 * _POINTS:
-        return 0.0
-    s = np.linspace(-1, 1, _POINTS)
-    rows = s[:, None] ** np.arange(_DEGREE + 1)
-    hat = rows @ np.linalg.pinv(rows)
-    kernel = np.eye(_POINTS)[_POINTS // 2] - hat[_POINTS // 2]
-    residual = np.correlate(theta, kernel, mode="valid") / math.sqrt(float(kernel @ kernel))
-    step = count_of(theta)
-    windows = np.lib.stride_tricks.sliding_window_view(theta, _POINTS)
-    moving = np.ptp(windows, axis=1) > 2 * step
-    if moving.sum() >= _POINTS:
-        residual = residual[moving]
-    floor = float(np.median(np.abs(residual))) / _NORMAL_MAD
-    return max(floor, step / math.sqrt(12))
 
 
 def count_of(theta: Floats) -> float:

@@ -2,92 +2,98 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Protocol
+import dataclasses
+import functools
+from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.identification import combined, de_paula, energy_balance, log_decrement, repair
+from pendmap.identification import (
+    combined,
+    de_paula,
+    energy_balance,
+    log_decrement,
+    repair,
+    trajectory,
+)
+from pendmap.identification.result import Identification
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from pendmap.identification.result import Identification
+    from pendmap.identification.peaks import Peaks
 
-__all__ = ["METHODS", "Method", "identify"]
+__all__ = ["METHODS", "Method", "check_names", "identify"]
 
 
-class Method(Protocol):
-    """What every method is: a record in, an identification out."""
+@dataclasses.dataclass(frozen=True)
+class Method:
+    """A method: a record in, an identification out.
 
-    def __call__(
-        self,
-        time: ArrayLike,
-        theta: ArrayLike,
-        *,
-        sigma: float | None = None,
-        trusted: ArrayLike | None = None,
-    ) -> Identification:
-        """Identify the damping in a record."""
-        ...
+    Parameters
+    ----------
+    identify : callable
+        Of ``time``, ``theta``, ``sigma=`` and ``trusted=``, as :func:`identify` has them.
+    from_peaks : callable or None
+        Of :class:`Peaks`, for records of peaks alone; none where it needs every sample.
+    """
+
+    identify: Callable[..., Identification]
+    from_peaks: Callable[[Peaks], Identification] | None = None
 
 
 METHODS: Final[dict[str, Method]] = {
-    "combined": combined.identify,
-    "combined_odd_ends": combined.identify_odd_ends,
-    "combined_odd_triplets": combined.identify_odd_triplets,
-    "combined_repaired": repair.identify,
-    "log_decrement": log_decrement.identify,
-    "de_paula": de_paula.identify,
-    "energy_balance": energy_balance.identify,
+    "trajectory": Method(trajectory.identify),
+    "combined": Method(combined.identify, combined.from_peaks),
+    "combined_odd_ends": Method(
+        combined.identify_odd_ends, functools.partial(combined.from_peaks, reading="odd_ends")
+    ),
+    "combined_odd_triplets": Method(
+        combined.identify_odd_triplets,
+        functools.partial(combined.from_peaks, reading="odd_triplets"),
+    ),
+    "combined_repaired": Method(repair.identify, repair.from_peaks),
+    "log_decrement": Method(log_decrement.identify, log_decrement.from_peaks),
+    "de_paula": Method(de_paula.identify, de_paula.from_peaks),
+    "energy_balance": Method(energy_balance.identify),
 }
-"""Every method by its name, in the order of tables."""
+"""Every method by its name, the default first, then in the order of the paper's tables."""
 
 
-class _Run(Protocol):
-    """A run of an experiment, as far as it matters here."""
+def check_names(methods: Iterable[str] | None) -> list[str]:
+    """Return the names of methods, all by default.
 
-    @property
-    def kind(self) -> str: ...
-    @property
-    def hold_out(self) -> bool: ...
-    @property
-    def time(self) -> NDArray[np.float64]: ...
-    @property
-    def theta(self) -> NDArray[np.float64]: ...
-    @property
-    def trusted(self) -> NDArray[np.bool_]: ...
-
-
-class _Experiment(Protocol):
-    """An experiment, as far as it matters here."""
-
-    @property
-    def runs(self) -> tuple[_Run, ...]: ...
+    Raises
+    ------
+    InputError
+        If one is not known.
+    """
+    names = list(METHODS) if methods is None else list(dict.fromkeys(methods))
+    unknown = [name for name in names if name not in METHODS]
+    if unknown:
+        raise InputError(f"method {unknown[0]!r} is not known: allowed are {', '.join(METHODS)}")
+    return names
 
 
 def identify(
-    record: _Experiment | ArrayLike,
-    theta: ArrayLike | None = None,
+    time: ArrayLike,
+    theta: ArrayLike,
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
     methods: Iterable[str] | None = None,
 ) -> dict[str, Identification]:
-    """Identify the damping of a pendulum by several methods.
+    """Identify the damping of a pendulum from one free decay by several methods.
 
     Parameters
     ----------
-    record : experiment or array, shape (N,)
-        An experiment, of which the longest free run that is not held out is used (each of these
-        methods reads one decay), or times in s.
-    theta : array, shape (N,), optional
-        Angles from the downward rest, unwrapped, rad, where ``record`` holds times.
+    time, theta : array, shape (N,)
+        s, increasing, and rad from the downward rest, unwrapped.
     sigma : float, optional
-        Noise of a sample, rad; by default each method estimates it from the record.
+        Noise of a sample, rad; by default estimated from the record.
     trusted : array of bool, shape (N,), optional
-        Samples that may be used; an experiment brings its own.
+        Samples that may be used; by default all.
     methods : iterable of str, optional
         Names of :data:`METHODS`; by default all.
 
@@ -99,23 +105,26 @@ def identify(
     Raises
     ------
     InputError
-        If a method is not known, there is no free run, or the arrays are not a record.
+        If a method is not known or the arrays are not a record.
     """
-    names = list(METHODS) if methods is None else list(methods)
-    unknown = [name for name in names if name not in METHODS]
-    if unknown:
-        raise InputError(f"method {unknown[0]!r} is not known: allowed are {', '.join(METHODS)}")
-    runs: tuple[_Run, ...] | None = getattr(record, "runs", None)
-    if runs is not None:
-        if theta is not None or trusted is not None:
-            raise InputError("theta is given with an experiment: allowed is one of them")
-        free = [run for run in runs if run.kind == "free" and not run.hold_out]
-        if not free:
-            raise InputError("no run is free and not held out: allowed is a free decay to identify")
-        run = max(free, key=lambda each: float(each.time[-1] - each.time[0]))
-        time, theta, trusted = run.time, run.theta, run.trusted
-    elif theta is None:
-        raise InputError("theta is missing: allowed are times and angles, or an experiment")
-    else:
-        time = record  # type: ignore[assignment]
-    return {n: METHODS[n](time, theta, sigma=sigma, trusted=trusted) for n in names}
+    return {
+        name: METHODS[name].identify(time, theta, sigma=sigma, trusted=trusted)
+        for name in check_names(methods)
+    }
+
+
+def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[str, Identification]:
+    """Do the same where nothing but peaks was measured.
+
+    Methods that need every sample say that they are not applicable.
+    """
+    found = {}
+    for name in check_names(methods):
+        from_peaks = METHODS[name].from_peaks
+        text = "not applicable: the record holds peaks alone, and this method needs every sample"
+        found[name] = (
+            Identification(name, warnings=(text,), applicable=False)
+            if from_peaks is None
+            else from_peaks(peaks)
+        )
+    return found

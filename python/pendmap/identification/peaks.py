@@ -12,7 +12,7 @@ from scipy.special import ellipk
 
 from pendmap.errors import InputError
 from pendmap.identification.finder import Finder
-from pendmap.identification.local_fit import count_of, noise_of
+from pendmap.identification.reading import reading_of
 from pendmap.identification.turning import outline
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def find_peaks(
     standard errors count three samples for each count that the window sees.
     """
     t, x = samples(time, theta, trusted)
-    noise = noise_of(t, x) if sigma is None else max(float(sigma), count_of(x) / math.sqrt(12))
+    noise = reading_of(t, x, sigma).sigma
     course = outline(t, x, noise)
     if course is None:
         none = np.empty(0)

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.identification.local_fit import count_of
+from pendmap.records.noise import noise_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["Reading", "reading_of"]
 
-WINDOW, DEGREE = 9, 4
-"""Points and degree of the local fit."""
 DITHERED: Final = 0.45
 """Noise below this part of a count no longer makes the errors of successive readings different."""
-MAD: Final = 1.482602218505602
-"""The standard deviation of a normal distribution over its median absolute deviation."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,23 +46,38 @@ class Reading:
     coarse: bool
 
 
-def reading_of(theta: NDArray[np.float64], sigma: float | None = None) -> Reading:
-    """Return the standard errors of equally spaced readings.
+def reading_of(
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    sigma: float | None = None,
+    *,
+    trusted: NDArray[np.bool_] | None = None,
+    count: float | None = None,
+) -> Reading:
+    """Return the standard errors of readings.
 
-    The noise is the scatter about a quartic through 9 neighbours, by the median absolute
-    deviation; it is at least that of the count, ``count / sqrt(12)``.
+    The noise is that of :func:`pendmap.noise_floor`; it is at least that of the count,
+    ``count / sqrt(12)``.
 
     Parameters
     ----------
-    theta : ndarray of float, shape (n,)
-        The readings, rad.
+    time, theta : ndarray of float, shape (n,)
+        s, and the readings, rad.
     sigma : float, optional
         Their noise, where it is known, rad.
+    trusted : ndarray of bool, shape (n,), optional
+        Which of them count for the noise.
+    count : float, optional
+        The step of the sensor, rad, where it is known.
     """
-    count = _count(theta)
+    if count is None:
+        count = count_of(theta)
     doubt = 0.0
     if sigma is None:
-        sigma, doubt = _noise(theta)
+        floor = noise_of(time, theta, trusted=trusted, count=count)
+        known = math.isfinite(floor.sigma) and floor.sigma > 0
+        sigma = floor.sigma if known else 0.0
+        doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
     sigma = max(sigma, count / math.sqrt(12), 1e-15)
     coarse = sigma < DITHERED * count
     each = np.full(theta.shape, sigma)
@@ -72,29 +86,3 @@ def reading_of(theta: NDArray[np.float64], sigma: float | None = None) -> Readin
         lengths = np.diff(np.concatenate([[0], change, [len(theta)]]))
         each = sigma * np.sqrt(np.repeat(lengths, lengths))
     return Reading(sigma, count, each, doubt, coarse)
-
-
-def _noise(theta: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the noise and its relative standard error."""
-    if len(theta) < 4 * WINDOW:
-        return 0.0, 1.0
-    powers = np.vander(np.arange(WINDOW) - WINDOW // 2, DEGREE + 1, increasing=True)
-    weights = -np.linalg.pinv(powers)[0]
-    weights[WINDOW // 2] += 1
-    rest = np.convolve(theta, weights[::-1], mode="valid")
-    # Where the reading does not move the count hides the noise.
-    steps = np.convolve(np.diff(theta) != 0, np.ones(WINDOW - 1), mode="valid") > 0
-    moving = rest[steps] if np.count_nonzero(steps) >= 4 * WINDOW else rest
-    size = MAD * float(np.median(np.abs(moving - np.median(moving))))
-    return size / float(np.linalg.norm(weights)), 1.2 / math.sqrt(len(moving))
-
-
-def _count(theta: NDArray[np.float64]) -> float:
-    """Return the step of a sensor with counts; 0 where readings are too many to be counts."""
-    values = np.unique(theta)
-    if len(values) < 2 or len(values) > 0.5 * len(theta):  # noqa: PLR2004 (two make a step)
-        return 0.0
-    steps = np.diff(values)
-    # Text files round: the smallest step that stands for many.
-    real = steps[steps > 1e-9 * max(1.0, float(np.abs(values).max()))]
-    return float(np.quantile(real, 0.1)) if len(real) else 0.0

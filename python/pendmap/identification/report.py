@@ -1,29 +1,152 @@
-"""Damping from an experiment by every method, with all that a table or a figure of it needs."""
+"""Damping from an experiment by every method, with all that tables and figures of it need."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
-from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
-from pendmap.identification.fitting import TrajectoryFit
-from pendmap.identification.fitting_experiment import fit_experiment
-from pendmap.identification.methods import METHODS, identify
+from pendmap.identification.joint import JointFit, fit_together
+from pendmap.identification.methods import check_names, identify, identify_peaks
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.result import Identification
-from pendmap.identification.table1 import Table1, table1
-from pendmap.model import Rig
+from pendmap.identification.table1 import Table1, table_of
+from pendmap.identification.trajectory import METHOD as BEST
+from pendmap.identification.trajectory import TooShortError, identification_of
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from pendmap.model.effects import Effect
+    from pendmap.model import Effect, Rig
     from pendmap.records import Experiment, Run
 
-__all__ = ["BEST", "IdentificationReport", "identify_experiment"]
+__all__ = ["BEST", "IdentificationReport", "decay_of", "identify_experiment"]
 
-BEST: Final = "trajectory"
-"""The method whose result becomes the model."""
+
+@dataclasses.dataclass(frozen=True)
+class IdentificationReport:
+    """What every method says of an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        The records.
+    run : Run
+        The free decay that the methods of peaks read, and that is drawn.
+    peaks : Peaks
+        Its peaks.
+    methods : mapping of str to Identification
+        By method, the best one first.
+    joint : JointFit or None
+        What stands behind the best one; none where it was not asked for or cannot be applied.
+    table : Table1
+        Table 1 and figure 7 of the decay.
+    """
+
+    experiment: Experiment
+    run: Run
+    peaks: Peaks
+    methods: dict[str, Identification]
+    joint: JointFit | None
+    table: Table1
+
+    @property
+    def best(self) -> Identification:
+        """The first method that could be applied.
+
+        Raises
+        ------
+        InputError
+            If none could.
+        """
+        for found in self.methods.values():
+            if found.applicable and "w0" in found.estimates:
+                return found
+        reasons = "; ".join(self.methods[next(iter(self.methods))].warnings)
+        raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
+
+    @property
+    def model(self) -> Rig:
+        """The pendulum that the best method found, with its effects."""
+        if self.joint is not None and self.best.method == BEST:
+            return self.joint.fit.model
+        return self.best.rig
+
+
+def decay_of(experiment: Experiment) -> Run:
+    """Return the longest free run of an experiment that is not held out.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    free = [run for run in experiment.runs if run.kind == "free" and not run.hold_out]
+    if not free:
+        raise InputError(
+            f"{experiment.path}: no run is free and not held out: allowed is an experiment with a "
+            "free decay"
+        )
+    return max(free, key=lambda run: float(run.time[-1] - run.time[0]))
+
+
+def identify_experiment(
+    experiment: Experiment,
+    *,
+    methods: Iterable[str] | None = None,
+    start: Rig | None = None,
+    effects: Sequence[Effect] = (),
+) -> IdentificationReport:
+    """Identify damping from an experiment by every method.
+
+    The trajectory method fits all free runs that are not held out together, each with a start of
+    its own; the others read the longest of them.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As of :func:`pendmap.read_experiment`.
+    methods : iterable of str, optional
+        Names of :data:`pendmap.identification.METHODS`; by default all.
+    start : Rig, optional
+        Where the trajectory method begins, with its effects; by default found from the record.
+    effects : sequence of Effect
+        Further effects that it fits the sizes of.
+
+    Raises
+    ------
+    InputError
+        If a method is not known, or there is no free decay.
+    """
+    names = check_names(methods)
+    run = decay_of(experiment)
+    if run.peaks_only:
+        peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
+        found = identify_peaks(peaks, names)
+        return IdentificationReport(experiment, run, peaks, found, None, table_of(peaks, found))
+    sigma, joint, found = None, None, {}
+    if BEST in names:
+        joint, found[BEST] = _best(experiment, run, start, effects)
+        if joint is not None:
+            sigma = joint.readings[0].sigma
+    others = [name for name in names if name != BEST]
+    found |= identify(run.time, run.theta, sigma=sigma, trusted=run.trusted, methods=others)
+    peaks = find_peaks(run.time, run.theta, sigma=sigma, trusted=run.trusted)
+    return IdentificationReport(experiment, run, peaks, found, joint, table_of(peaks, found))
+
+
+def _best(
+    experiment: Experiment, run: Run, start: Rig | None, effects: Sequence[Effect]
+) -> tuple[JointFit | None, Identification]:
+    others = [r for r in experiment.runs if r.kind == "free" and not r.hold_out and r is not run]
+    runs = [run, *(r for r in others if not r.peaks_only)]
+    known = {name: experiment.known[name] for name in ("w0",) if name in experiment.known}
+    try:
+        joint = fit_together(runs, start=start, known=known, effects=effects)
+    except TooShortError as error:
+        return None, Identification(BEST, warnings=(str(error),), applicable=False)
+    span = f"{run.time[0]:g} to {run.time[-1]:g} s"
+    if len(runs) > 1:
+        span = f"{counted(len(runs), 'free run')}"
+    return joint, identification_of(joint.fit, joint.readings, span)

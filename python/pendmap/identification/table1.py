@@ -21,7 +21,16 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["PeakErrors", "Row", "State", "Table1", "first_state", "peak_errors", "table1"]
+__all__ = [
+    "PeakErrors",
+    "Row",
+    "State",
+    "Table1",
+    "first_state",
+    "peak_errors",
+    "table1",
+    "table_of",
+]
 
 PERIODS: Final = (0.26, 1.54)
 """Periods of the paper's table, s. No rig near 6 rad/s has the first: its shortest one stands in
@@ -202,6 +211,17 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, table 1 and figure 7.
     """
     found = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    return table_of(found, identifications, periods=periods, peaks=peaks)
+
+
+def table_of(
+    found: Peaks,
+    identifications: Mapping[str, Identification],
+    *,
+    periods: Sequence[float] = PERIODS,
+    peaks: Sequence[float] = PEAKS,
+) -> Table1:
+    """Do the same with peaks that are known; see :func:`table1`."""
     if len(found.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return Table1((), {})
     start = first_state(found)

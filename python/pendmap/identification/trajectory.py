@@ -27,7 +27,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["fit_decay", "identify"]
+__all__ = [
+    "METHOD",
+    "OFFSET",
+    "TooShortError",
+    "fit_decay",
+    "identification_of",
+    "identify",
+    "sizes",
+    "start_of",
+]
 
 METHOD: Final = "trajectory"
 OFFSET: Final = "encoder_offset"
@@ -103,20 +112,38 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
         )
     except TooShortError as error:
         return Identification(METHOD, warnings=(str(error),), applicable=False)
+    return identification_of(fit, [reading], f"{time[0]:g} to {time[-1]:g} s")
+
+
+def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str) -> Identification:
+    """Return a fit as every method gives its result.
+
+    Parameters
+    ----------
+    fit : TrajectoryFit
+        To one record or more.
+    readings : sequence of Reading
+        Of each record.
+    span : str
+        Which part of them, in words.
+    """
     renamed = {f"{OFFSET}.d": "offset"}
     names = tuple(renamed.get(name, name) for name in fit.names)
     estimates = dict(zip(names, fit.estimates.values(), strict=True))
-    count = len(fit.windows)
-    span = f"{time[0]:g} to {time[-1]:g} s"
-    used = f"{fit.samples} readings of {len(time)}, {span}, as one motion"
-    if count > 1:
-        used = f"{fit.samples} readings of {len(time)}, {span}, in {count} windows"
+    count, whole = len(fit.windows), len(readings)
+    motions = "one motion" if whole == 1 else f"{whole} motions"
+    how = f"as {motions}" if count == whole else f"in {count} windows"
+    total = sum(len(reading.each) for reading in readings)
+    noise = " to ".join(
+        f"{x:.2e}" for x in sorted({min(r.sigma for r in readings), max(r.sigma for r in readings)})
+    )
     return Identification(
         METHOD,
         estimates=estimates,
-        used=f"{used}; noise {reading.sigma:.2e} rad",
-        warnings=tuple(_warnings(fit, estimates, reading)),
+        used=f"{fit.samples} readings of {total}, {span}, {how}; noise {noise} rad",
+        warnings=tuple(_warnings(fit, estimates, readings)),
         covariance=(names, fit.covariance),
+        misfit=fit.chi2 / max(fit.degrees, 1),
     )
 
 
@@ -157,8 +184,8 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if good.shape != time.shape:
         raise InputError("trusted and time differ in length: they must be as many")
-    reading = reading_of(theta, sigma)
-    model = _model(start, time[good], theta[good], reading.sigma)
+    reading = reading_of(time, theta, sigma, trusted=good)
+    model = start_of(start, time[good], theta[good], reading.sigma)
     extra = [*effects]
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
     if not friction:
@@ -166,7 +193,7 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     if offset and all(effect.name != OFFSET for effect in effects):
         extra.append(Effect(OFFSET, {"d": 0.0}))
     model = dataclasses.replace(model, effects=tuple(extra))
-    names += _sizes(extra) if free is None else [*free, *_sizes(extra[len(effects) :])]
+    names += sizes(extra) if free is None else [*free, *sizes(extra[len(effects) :])]
     run = FitRun(time, theta, reading.each, trusted=good)
     return fit_runs([run], model, names, sigma_doubt=reading.doubt), reading
 
@@ -175,16 +202,24 @@ SHAPES: Final = ("n", "w", "vs")
 """Parameters of effects that say how they act, not how strongly."""
 
 
-def _sizes(effects: Sequence[Effect]) -> list[str]:
+def sizes(effects: Sequence[Effect]) -> list[str]:
+    """Return the names of all parameters of effects but those of shape."""
     return [f"{e.name}.{p}" for e in effects for p in e.parameters if p not in SHAPES]
 
 
-def _model(
+def start_of(
     start: Rig | Mapping[str, float] | None,
     time: NDArray[np.float64],
     theta: NDArray[np.float64],
     sigma: float,
 ) -> Rig:
+    """Return where a search starts: what is given, the rest from the half swings of the record.
+
+    Raises
+    ------
+    TooShortError
+        If ``w0`` is not known and the record holds fewer than two half swings.
+    """
     if isinstance(start, Rig):
         return start
     known: dict[str, Any] = dict(start or {})
@@ -196,7 +231,9 @@ def _model(
     return Rig(**known)
 
 
-def _warnings(fit: TrajectoryFit, estimates: Mapping[str, Estimate], reading: Reading) -> list[str]:
+def _warnings(
+    fit: TrajectoryFit, estimates: Mapping[str, Estimate], readings: Sequence[Reading]
+) -> list[str]:
     found = []
     for name in ("c_over_m", "Tr"):
         if name in estimates and estimates[name].value < 0:
@@ -215,16 +252,17 @@ def _warnings(fit: TrajectoryFit, estimates: Mapping[str, Estimate], reading: Re
             f"the model does not fit: residuals are {math.sqrt(ratio):.2g} times the noise, and "
             "the intervals are widened by that factor; an effect is missing in the model"
         )
-    elif ratio < TOO_GOOD and not reading.coarse:
+    elif ratio < TOO_GOOD and not any(reading.coarse for reading in readings):
         found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
     if not fit.converged:
         found.append("the search did not converge")
     lost = [name for name, e in estimates.items() if e.ci95 is None]
     if lost:
         found.append(f"no end was found for the interval of {', '.join(lost)}")
-    if reading.coarse:
+    coarse = [reading.count for reading in readings if reading.coarse]
+    if coarse:
         found.append(
-            f"the sensor's count ({reading.count:.3g} rad) is coarser than its noise: readings on "
+            f"the sensor's count ({max(coarse):.3g} rad) is coarser than its noise: readings on "
             "one count are taken for one"
         )
     return found

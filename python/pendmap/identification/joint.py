@@ -1,0 +1,110 @@
+"""The trajectory method on an experiment: all its runs together, each with its own start."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+from pendmap.errors import InputError
+from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit, fit_runs
+from pendmap.identification.reading import Reading, reading_of
+from pendmap.identification.trajectory import OFFSET, sizes, start_of
+from pendmap.model import Effect
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.model import Rig
+    from pendmap.records import Run
+
+__all__ = ["JointFit", "as_fit_run", "fit_together"]
+
+QUANTITIES: Final = {"m/s2": "acceleration", "m/s": "velocity", "m": "position"}
+"""What a recorded motion of the pivot is, by its unit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class JointFit:
+    """A pendulum fitted to several runs, and what it was fitted to.
+
+    Parameters
+    ----------
+    fit : TrajectoryFit
+        Curves and residuals in the order of ``runs``.
+    runs : tuple of Run
+        The records.
+    readings : tuple of Reading
+        What the readings of each are worth.
+    """
+
+    fit: TrajectoryFit
+    runs: tuple[Run, ...]
+    readings: tuple[Reading, ...]
+
+
+def as_fit_run(run: Run, reading: Reading) -> FitRun:
+    """Return a run as the fit takes it."""
+    pivot = None
+    if run.pivot is not None:
+        quantity = QUANTITIES[run.pivot_unit or "m/s2"]
+        pivot = Pivot(
+            run.time, run.pivot.get("vertical"), run.pivot.get("horizontal"), quantity=quantity
+        )
+    return FitRun(
+        run.time,
+        run.theta,
+        reading.each,
+        trusted=run.trusted,
+        drive=run.drive,
+        pivot=pivot,
+        lab_time_s=run.lab_time_s,
+        name=run.name,
+    )
+
+
+def fit_together(
+    runs: Sequence[Run],
+    *,
+    start: Rig | None = None,
+    known: dict[str, float] | None = None,
+    effects: Sequence[Effect] = (),
+) -> JointFit:
+    """Fit natural frequency, damping, the sensor's zero and effects to runs.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        One or more; the start comes from the first.
+    start : Rig, optional
+        Where the search begins, with its effects.
+    known : dict of str to float, optional
+        Starting values of some parameters.
+    effects : sequence of Effect
+        Whatever else acts, parameters in SI; their sizes are fitted.
+
+    Raises
+    ------
+    InputError
+        If no run can be fitted.
+    TooShortError
+        If the first holds fewer than two half swings and there is no start.
+    """
+    if not runs:
+        raise InputError("runs is empty: allowed is one record or more")
+    readings = [
+        reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
+    ]
+    first, good = runs[0], runs[0].trusted
+    model = start_of(start or known, first.time[good], first.theta[good], readings[0].sigma)
+    extra = [*model.effects, *effects]
+    if all(effect.name != OFFSET for effect in extra):
+        extra.append(Effect(OFFSET, {"d": 0.0}))
+    model = dataclasses.replace(model, effects=tuple(extra))
+    names = ["w0", "c_over_m", "Tr", *sizes(extra)]
+    fit = fit_runs(
+        [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
+        model,
+        names,
+        sigma_doubt=max(reading.doubt for reading in readings),
+    )
+    return JointFit(fit, tuple(runs), tuple(readings))
