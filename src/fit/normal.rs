@@ -218,6 +218,10 @@ impl Normal {
 #[must_use]
 pub fn pseudo_inverse(matrix: &DMatrix<f64>, held: &[usize]) -> DMatrix<f64> {
     let count = matrix.nrows();
+    if count == 0 {
+        // Nothing is free but the states: a model is compared with a record.
+        return matrix.clone();
+    }
     let scale: Vec<f64> = (0..count)
         .map(|i| {
             let size = matrix[(i, i)];

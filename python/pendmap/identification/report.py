@@ -69,8 +69,6 @@ class IdentificationReport:
     @property
     def model(self) -> Rig:
         """The pendulum that the best method found, with its effects."""
-        if self.joint is not None and self.best.method == BEST:
-            return self.joint.fit.model
         return self.best.rig
 
 

@@ -144,6 +144,7 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str
         warnings=tuple(_warnings(fit, estimates, readings)),
         covariance=(names, fit.covariance),
         misfit=fit.chi2 / max(fit.degrees, 1),
+        model=fit.model,
     )
 
 
