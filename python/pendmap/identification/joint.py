@@ -67,7 +67,7 @@ def fit_together(
     *,
     start: Rig | None = None,
     known: dict[str, float] | None = None,
-    effects: Sequence[Effect] = (),
+    effects: Sequence[Effect | str] = (),
 ) -> JointFit:
     """Fit natural frequency, damping, the sensor's zero and effects to runs.
 
@@ -79,8 +79,8 @@ def fit_together(
         Where the search begins, with its effects.
     known : dict of str to float, optional
         Starting values of some parameters.
-    effects : sequence of Effect
-        Whatever else acts, parameters in SI; their sizes are fitted.
+    effects : sequence of Effect or str
+        Whatever else acts, parameters in SI, or its name; their sizes are fitted.
 
     Raises
     ------
@@ -96,7 +96,8 @@ def fit_together(
     ]
     first, good = runs[0], runs[0].trusted
     model = start_of(start or known, first.time[good], first.theta[good], readings[0].sigma)
-    extra = [*model.effects, *effects]
+    named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
+    extra = [*model.effects, *named]
     if all(effect.name != OFFSET for effect in extra):
         extra.append(Effect(OFFSET, {"d": 0.0}))
     model = dataclasses.replace(model, effects=tuple(extra))

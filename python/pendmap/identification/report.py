@@ -94,7 +94,7 @@ def identify_experiment(
     *,
     methods: Iterable[str] | None = None,
     start: Rig | None = None,
-    effects: Sequence[Effect] = (),
+    effects: Sequence[Effect | str] = (),
 ) -> IdentificationReport:
     """Identify damping from an experiment by every method.
 
@@ -109,8 +109,8 @@ def identify_experiment(
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
         Where the trajectory method begins, with its effects; by default found from the record.
-    effects : sequence of Effect
-        Further effects that it fits the sizes of.
+    effects : sequence of Effect or str
+        Further effects, or their names, that it fits the sizes of.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def identify_experiment(
 
 
 def _best(
-    experiment: Experiment, run: Run, start: Rig | None, effects: Sequence[Effect]
+    experiment: Experiment, run: Run, start: Rig | None, effects: Sequence[Effect | str]
 ) -> tuple[JointFit | None, Identification]:
     others = [r for r in experiment.runs if r.kind == "free" and not r.hold_out and r is not run]
     runs = [run, *(r for r in others if not r.peaks_only)]

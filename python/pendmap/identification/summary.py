@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pendmap.identification.report import IdentificationReport
     from pendmap.identification.result import Estimate, Identification
 
-__all__ = ["COLUMNS", "as_json", "as_text", "cells", "with_error"]
+__all__ = ["COLUMNS", "as_json", "as_text", "methods_table", "table1_table", "with_error"]
 
 COLUMNS: Final = {
     "w0": "w0 (rad/s)",
@@ -75,7 +75,7 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
     yield from findings_said(report.experiment, report.run)
 
 
-def cells(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
+def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of methods."""
     extra = [n for n in report.best.estimates if n not in COLUMNS]
     names = [*COLUMNS, *extra]
@@ -87,6 +87,20 @@ def cells(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
             shown = ["not applicable", *[""] * (len(names) - 1)]
         rows.append([method, *shown])
     return ["method", *COLUMNS.values(), *extra], rows
+
+
+def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
+    """Return heads and rows of table 1: percent errors of each method's simulation."""
+    rows = []
+    for name, errors in report.table.errors.items():
+        percent = [
+            "at rest" if math.isnan(row.errors[name]) else f"{row.errors[name]:.3g} %"
+            for row in report.table.rows
+        ]
+        rows.append([name, *percent, f"{errors.period_rms:.3g} %", f"{errors.peak_rms:.3g} %"])
+    units = {"period": "s", "peak": "rad"}
+    measured = [f"{r.what} {r.measured:.4g} {units[r.what]}" for r in report.table.rows]
+    return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows
 
 
 def with_error(estimate: Estimate) -> str:

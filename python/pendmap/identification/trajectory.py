@@ -199,13 +199,9 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     return fit_runs([run], model, names, sigma_doubt=reading.doubt), reading
 
 
-SHAPES: Final = ("n", "w", "vs")
-"""Parameters of effects that say how they act, not how strongly."""
-
-
 def sizes(effects: Sequence[Effect]) -> list[str]:
     """Return the names of all parameters of effects but those of shape."""
-    return [f"{e.name}.{p}" for e in effects for p in e.parameters if p not in SHAPES]
+    return [f"{effect.name}.{size}" for effect in effects for size in effect.sizes]
 
 
 def start_of(
