@@ -14,6 +14,8 @@ __all__ = ["rough_start"]
 
 FEWEST_SWINGS: Final = 2
 """Half swings that a start needs."""
+QUIET: Final = 10.0
+"""Readings at rest lie within so many standard errors."""
 
 
 def rough_start(
@@ -40,9 +42,9 @@ def rough_start(
     from scipy.optimize import nnls  # noqa: PLC0415 (heavy)
     from scipy.special import ellipe, ellipk  # noqa: PLC0415 (heavy)
 
-    centre = float(np.mean(theta[-max(len(theta) // 10, 1) :]))
-    if abs(centre) > 0.5:  # noqa: PLR2004 (rad: it still moves at the end)
-        centre = 0.0
+    tail = theta[-max(len(theta) // 10, 1) :]
+    # Of a motion that goes on at the end the mean says little.
+    centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0
     times, peaks = _half_swings(time, theta - centre, 4.0 * sigma)
     if len(peaks) < FEWEST_SWINGS:
         return None

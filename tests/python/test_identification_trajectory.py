@@ -1,0 +1,261 @@
+"""The trajectory method on motions that scipy made."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from decays import motion
+from pendmap.errors import InputError
+from pendmap.identification.fitting import FitRun, Pivot, fit_runs, score
+from pendmap.identification.reading import reading_of
+from pendmap.identification.rough import rough_start
+from pendmap.identification.trajectory import fit_decay, identify
+from pendmap.model import Rig
+from pendmap.model.effects import Effect
+
+TIME = np.arange(3000) * 0.01
+TRUTH = {"w0": 6.2, "c_over_m": 0.062, "friction": 0.1}
+NAMES = {"w0": "w0", "c_over_m": "c_over_m", "Tr": "friction"}
+OFFSET = Effect("encoder_offset", {"d": 0.0})
+
+
+@pytest.fixture(scope="module")
+def decay() -> np.ndarray:
+    return motion(TIME, (3.0, 0.0), **TRUTH)
+
+
+def noisy(theta: np.ndarray, sigma: float, seed: int) -> np.ndarray:
+    return theta + np.random.default_rng(seed).normal(0, sigma, theta.shape)
+
+
+def test_a_record_without_noise_gives_its_parameters_back(decay: np.ndarray) -> None:
+    found = identify(TIME, decay + 0.002, sigma=1e-6)
+    for name, own in NAMES.items():
+        assert found[name] == pytest.approx(TRUTH[own], rel=1e-8)
+    assert found["offset"] == pytest.approx(0.002, abs=1e-9)
+    names, covariance = found.covariance or ((), np.empty(0))
+    assert names == ("w0", "c_over_m", "Tr", "offset")
+    for k, name in enumerate(names):
+        estimate = found.estimates[name]
+        assert estimate.stderr == pytest.approx(math.sqrt(covariance[k, k]))
+        low, high = estimate.ci95 or (math.nan, math.nan)
+        assert high - low == pytest.approx(3.92 * math.sqrt(covariance[k, k]), rel=0.05)
+    assert found.rig.Tr == found["Tr"]
+    assert "3000 readings of 3000" in found.used
+
+
+@pytest.mark.parametrize(("w0", "damping"), [(1.05, 3.0), (0.95, 1 / 3), (1.05, 1 / 3), (0.95, 3)])
+def test_the_search_converges_from_far(decay: np.ndarray, w0: float, damping: float) -> None:
+    start = Rig(w0=6.2 * w0, c_over_m=0.062 * damping, Tr=0.1 / damping)
+    found = identify(TIME, noisy(decay, 2e-3, 1), start=start)
+    best = identify(TIME, noisy(decay, 2e-3, 1))
+    for name in NAMES:
+        allowed = 0.02 * (best.estimates[name].stderr or 0)
+        assert found[name] == pytest.approx(best[name], abs=allowed)
+    assert not found.warnings
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
+    covered = []
+    for seed in range(12):
+        rng = np.random.default_rng([5, seed])
+        truth = {"w0": rng.uniform(5, 7), "friction": rng.uniform(0.02, 0.3)}
+        truth["c_over_m"] = 2 * truth["w0"] * rng.uniform(0.002, 0.01)
+        theta = motion(TIME, (rng.uniform(2.9, 3.05), 0.0), **truth)
+        for again in range(5):
+            sigma = math.radians(rng.uniform(0.05, 0.5))
+            found = identify(TIME, noisy(theta, sigma, 100 * seed + again))
+            for name, own in NAMES.items():
+                low, high = found.estimates[name].ci95 or (math.nan, math.nan)
+                covered.append(low <= truth[own] <= high)
+    # 180 of which 171 are expected; the three of a record hang together.
+    assert 160 <= sum(covered) <= 179
+
+
+def test_the_error_is_the_bound(decay: np.ndarray) -> None:
+    # The covariance against the information of finite differences by scipy, state included.
+    found = identify(TIME, noisy(decay, 1e-3, 2), sigma=1e-3)
+    columns = [np.ones_like(TIME)]
+    for name in ("w0", "c_over_m", "friction"):
+        ends = [motion(TIME, (3.0, 0.0), **TRUTH | {name: TRUTH[name] + h}) for h in (1e-5, -1e-5)]
+        columns.append((ends[0] - ends[1]) / 2e-5)
+    for start in ((1e-5, 0.0), (0.0, -1e-5)):
+        end = motion(TIME, (3.0 + start[0], start[1]), **TRUTH)
+        columns.append((end - decay) / 1e-5)
+    jacobian = np.stack(columns, axis=1) / 1e-3
+    limits = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    for name, limit in zip(("offset", "w0", "c_over_m", "Tr"), limits[:4], strict=True):
+        assert found.estimates[name].stderr == pytest.approx(limit, rel=0.02)
+
+
+def test_what_the_model_lacks_is_said(decay: np.ndarray) -> None:
+    del decay
+    theta = motion(TIME, (2.5, 0.0), w0=6.0, friction=0.05, drag=0.05)
+    found = identify(TIME, noisy(theta, 2e-4, 3))
+    assert any("does not fit" in warning for warning in found.warnings)
+    assert found["Tr"] < 0
+    assert any(warning.startswith("Tr is -") for warning in found.warnings)
+    assert found.rig.Tr == 0
+    drag = Effect("quadratic_drag", {"q": 0.0})
+    better = identify(TIME, noisy(theta, 2e-4, 3), effects=[drag])
+    assert better["quadratic_drag.q"] == pytest.approx(0.05, rel=0.02)
+    assert better["Tr"] == pytest.approx(0.05, rel=0.02)
+    assert abs(better["c_over_m"]) < 4 * (better.estimates["c_over_m"].stderr or 0)
+
+
+def test_the_score_names_what_is_missing_and_its_size() -> None:
+    theta = motion(TIME, (2.5, 0.0), w0=6.0, c_over_m=0.03, friction=0.05, drag=2e-3)
+    run = FitRun(TIME, noisy(theta, 2e-3, 4), 2e-3)
+    base = Rig(w0=6.01, c_over_m=0.05, Tr=0.05, effects=(OFFSET,))
+    free = ["w0", "c_over_m", "Tr", "encoder_offset.d"]
+    fit = fit_runs([run], base, free)
+    sizes = {"quadratic_drag": "q", "load_dependent_friction": "k", "elastic_restoring": "k"}
+    names = [f"{name}.{size}" for name, size in sizes.items()]
+    extra = tuple(Effect(name, {size: 0.0}) for name, size in sizes.items())
+    wide = dataclasses.replace(base, effects=(OFFSET, *extra))
+    pull, information = score(fit, [run], names, wide)
+    gain = pull**2 / np.diag(information)
+    better = fit_runs([run], wide, [*free, names[0]])
+    assert gain[0] == max(gain)
+    assert gain[0] == pytest.approx(fit.chi2 - better.chi2, rel=0.15)
+    assert pull[0] / information[0, 0] == pytest.approx(better[names[0]], rel=0.15)
+    assert 1 / math.sqrt(information[0, 0]) == pytest.approx(
+        better.estimates[names[0]].stderr, rel=0.15
+    )
+
+
+def test_several_runs_share_what_is_theirs() -> None:
+    time = np.arange(1500) * 0.02
+    p, big_omega, phi = 0.3, 11.0, 0.7
+    free = motion(time, (2.8, 0.0), **TRUTH)
+    forced = motion(
+        time,
+        (0.5, 1.0),
+        w0=6.2,
+        c_over_m=0.062,
+        pivot=lambda t: (p * math.cos(big_omega * t + phi), 0.0),
+    )
+    runs = [
+        FitRun(time, free, 1e-6),
+        FitRun(time, forced, 1e-6, drive={"p": 0.28, "Omega": 11.02, "phi": None}),
+    ]
+    model = Rig(w0=6.3, c_over_m=0.1)
+    # Friction would belong to both: here the forced one has none, so it is fitted alone.
+    fit = fit_runs(runs[1:], model, ["w0", "c_over_m", "p", "Omega"], start={"phi": 0.5})
+    assert fit["p"] == pytest.approx(p, rel=1e-7)
+    assert fit["Omega"] == pytest.approx(big_omega, rel=1e-8)
+    assert fit["phi"] == pytest.approx(phi, rel=1e-7)
+    # Forced motions may be chaotic: their windows stay short.
+    assert len(fit.windows) == 11
+    both = fit_runs(runs, dataclasses.replace(model, Tr=0.05), ["w0", "c_over_m", "Tr"])
+    assert both.names == ("w0", "c_over_m", "Tr", "phi[1]")
+    assert both.widening > 1
+
+
+def test_a_recorded_pivot_drives(decay: np.ndarray) -> None:
+    del decay
+    time = np.arange(1000) * 0.02
+
+    def pivot(t: float) -> tuple[float, float]:
+        return 0.3 * math.sin(5 * t), 0.2 * math.cos(3 * t)
+
+    theta = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.1, pivot=pivot)
+    up, side = np.array([pivot(t) for t in time]).T * 9.81
+    run = FitRun(time, theta, 1e-5, pivot=Pivot(time, up, side))
+    fit = fit_runs([run], Rig(w0=6.4, c_over_m=0.05, gravity=9.81), ["w0", "c_over_m"])
+    assert fit["w0"] == pytest.approx(6.2, rel=1e-6)
+    assert fit["c_over_m"] == pytest.approx(0.1, rel=1e-5)
+
+
+def test_a_coarse_sensor_is_no_more_trusted_than_its_count(decay: np.ndarray) -> None:
+    count = math.tau / 500
+    theta = np.round((decay + 0.3 * count) / count) * count
+    reading = reading_of(theta)
+    assert reading.coarse
+    assert reading.count == pytest.approx(count)
+    assert reading.sigma == pytest.approx(count / math.sqrt(12), rel=0.3)
+    found = identify(TIME, theta)
+    assert any("count" in warning for warning in found.warnings)
+    for name, own in NAMES.items():
+        estimate = found.estimates[name]
+        assert abs(estimate.value - TRUTH[own]) < 4 * (estimate.stderr or 0)
+
+
+@pytest.mark.parametrize("sigma", [1e-4, 1e-3, 1e-2])
+def test_the_noise_is_seen_without_a_model(decay: np.ndarray, sigma: float) -> None:
+    assert reading_of(noisy(decay, sigma, 6)).sigma == pytest.approx(sigma, rel=0.08)
+
+
+def test_half_swings_give_a_start(decay: np.ndarray) -> None:
+    start = rough_start(TIME, noisy(decay, 5e-3, 7), 5e-3)
+    assert start is not None
+    for name, own in NAMES.items():
+        assert start[name] == pytest.approx(TRUTH[own], rel=0.02 if name == "w0" else 0.5)
+
+
+def test_samples_not_trusted_do_not_count(decay: np.ndarray) -> None:
+    theta, trusted = noisy(decay, 1e-3, 8), np.ones(TIME.shape, bool)
+    trusted[500:700] = False
+    theta[500:700] = 4.0
+    found = identify(TIME, theta, sigma=1e-3, trusted=trusted)
+    assert not found.warnings
+    for name, own in NAMES.items():
+        estimate = found.estimates[name]
+        assert abs(estimate.value - TRUTH[own]) < 4 * (estimate.stderr or 0)
+
+
+def test_what_does_not_fit_together_is_refused(decay: np.ndarray) -> None:
+    with pytest.raises(InputError, match="as many"):
+        identify(TIME, decay[:-1])
+    with pytest.raises(InputError, match="sigma is -1"):
+        identify(TIME, decay, sigma=-1)
+    with pytest.raises(InputError, match="finite"):
+        identify(TIME, np.where(TIME > 3, np.nan, decay))
+    with pytest.raises(InputError, match="after the one before"):
+        identify(TIME[::-1], decay[::-1], start={"w0": 6.0})
+    run = FitRun(TIME, decay, 1e-3)
+    with pytest.raises(InputError, match=r"free has 'quadratic_drag.q'"):
+        fit_runs([run], Rig(w0=6.2), ["quadratic_drag.q"])
+    drag = Rig(w0=6.2, effects=(Effect("power_law_drag", {"q": 0.01, "n": 1.5}),))
+    with pytest.raises(InputError, match="whose unit depends on it"):
+        fit_runs([run], drag, ["power_law_drag.q", "power_law_drag.n"])
+    short = identify(TIME[:40], decay[:40])
+    assert not short.applicable
+    assert "half swings" in short.warnings[0]
+
+
+RECORDS = os.environ.get("PENDMAP_RECORDS", "")
+LAWS = {
+    "viscous": (False, False),
+    "coulomb": (True, False),
+    "quadratic": (False, True),
+    "all": (True, True),
+}
+
+
+@pytest.mark.skipif(not RECORDS, reason="PENDMAP_RECORDS names no folder of measured records")
+@pytest.mark.parametrize(
+    ("name", "stretch", "limits"),
+    [
+        ("multiarm_single_free_large", (0.5, 55.0), (0.0281, 0.0185, 0.0227, 0.0028)),
+        ("cartpend_free_long", (0.0, 284.0), (0.0114, 0.0074, 0.0100, 0.0030)),
+    ],
+)
+def test_measured_records(
+    name: str, stretch: tuple[float, float], limits: tuple[float, ...]
+) -> None:
+    columns = np.genfromtxt(Path(RECORDS) / f"{name}.csv", delimiter=",", names=True)
+    time, theta = columns["t_s"], columns["theta_rad"]
+    part = (time >= stretch[0]) & (time <= stretch[1])
+    drag = Effect("quadratic_drag", {"q": 0.0})
+    for (friction, quadratic), limit in zip(LAWS.values(), limits, strict=True):
+        effects = [drag] if quadratic else []
+        fit, _ = fit_decay(time[part], theta[part], friction=friction, effects=effects)
+        assert fit.rms <= limit
+        assert len(fit.windows) == 1
