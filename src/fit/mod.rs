@@ -3,7 +3,7 @@
 //! - [`problem`]: records, and which parameters of their pendulums are free
 //! - [`window`]: a record cut into windows, each with an initial state of its own
 //! - [`linear`]: residuals of a window and their derivatives
-//! - [`normal`]: the normal equations, with the initial states eliminated
+//! - [`normal`]: the equations of all windows, their initial states eliminated
 //! - [`descent`]: Gauss-Newton steps with Levenberg's and Marquardt's damping
 //! - [`stages`]: from short windows to long ones
 //! - [`profile`]: intervals from the profile of the likelihood
