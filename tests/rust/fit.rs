@@ -291,6 +291,35 @@ fn initial_states_are_eliminated_exactly() {
 }
 
 #[test]
+fn chaotic_motion_takes_no_digits_from_the_covariance() {
+    // The state's part of the information is 1e10 times what is left of the parameters' part.
+    let pendulum = driven(0.05, 1.7, 0.87).with_friction(0.02).expect("in range");
+    let start = [1.0, 0.4];
+    let record = record(pendulum, None, start, 45.0);
+    let (slots, values) = everything(&record.pendulum);
+    let count = record.times.len();
+    let problem =
+        Problem::new(vec![record], free(&slots, 1, &values), TOLERANCE).expect("a problem");
+    let window = Window { record: 0, from: 0, to: count, start };
+    let linear = line(&problem, &values, &window);
+    let matrix = DMatrix::from_row_slice(count, linear.width, &linear.rows);
+    let growth = matrix.column(values.len()).amax();
+    assert!(growth > 100.0, "{growth}");
+    let scale = DVector::from_iterator(linear.width, matrix.column_iter().map(|c| c.norm()));
+    let scaled = DMatrix::from_fn(count, linear.width, |i, j| matrix[(i, j)] / scale[j]);
+    let whole = scaled.svd(false, true);
+    let right = whole.v_t.expect("asked for");
+    let own = Normal::at(&problem, &values, &[window]).expect("equations").covariance();
+    for k in 0..values.len() {
+        let sum: f64 = (0..linear.width)
+            .map(|j| (right[(j, k)] / whole.singular_values[j] / scale[k]).powi(2))
+            .sum();
+        let ratio = own[(k, k)] / sum;
+        assert!((ratio - 1.0).abs() < 1e-5, "{k}: {ratio}");
+    }
+}
+
+#[test]
 fn intervals_end_where_the_best_of_the_rest_is_that_much_worse() {
     let (mut problem, _) = several();
     let sigma = 0.3 / 12_f64.sqrt();
