@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from pendmap.cli.options import Outputs
 
+WIDEST = 1000
+
 __all__ = ["open_viewer", "plain", "progress_bar", "show", "write_all", "write_table"]
 
 
@@ -112,8 +114,9 @@ def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     table = Table(*head, box=None, pad_edge=False, header_style="bold")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
-    console = Console(soft_wrap=True)
-    console.print(table, width=max(console.measure(table).maximum, 1), soft_wrap=True)
+    # Wider than any table: columns that were cut to fit a terminal would lose digits.
+    console = Console(width=WIDEST)
+    console.print(table, crop=False, soft_wrap=True)
     console.print()
 
 
