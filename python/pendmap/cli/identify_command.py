@@ -40,7 +40,11 @@ SUFFIX = ".toml"
 @click.option("--quiet", is_flag=True, help="No summary.")
 @output_options((SUFFIX,), "Model")
 def command(
-    *, path: Path, methods: tuple[str, ...], effects: tuple[str, ...], **given: Any  # noqa: ANN401
+    *,
+    path: Path,
+    methods: tuple[str, ...],
+    effects: tuple[str, ...],
+    **given: Any,  # noqa: ANN401
 ) -> None:
     """Identify natural frequency, viscous damping and Coulomb friction from free decays.
 

@@ -42,7 +42,10 @@ def output_options(suffixes: tuple[str, ...] = RESULTS, what: str = "Result") ->
     def add(function: Command) -> Command:
         for option in (
             click.option(
-                "--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files."
+                "--json",
+                "as_json",
+                is_flag=True,
+                help="One JSON object on stdout; alone, no files.",
             ),
             click.option(
                 "--view", is_flag=True, help="Write the recording and open the viewer on it."

@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pendmap.errors import InputError
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 from pendmap.identification.joint import as_fit_run
@@ -17,6 +15,7 @@ from pendmap.identification.table1 import PeakErrors, Table1, table_of
 from pendmap.identification.trajectory import OFFSET
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from pendmap.model import Rig
@@ -138,4 +137,3 @@ def _as_identification(model: Rig) -> Identification:
         if effect.name == OFFSET:
             estimates["offset"] = Estimate(effect.parameters["d"])
     return Identification(MODEL, estimates, model=model)
-

@@ -6,15 +6,14 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit, fit_runs
+from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit
 from pendmap.identification.reading import Reading, reading_of
-from pendmap.identification.trajectory import OFFSET, sizes, start_of
-from pendmap.model import Effect
+from pendmap.identification.trajectory import fit_from_start
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.model import Rig
+    from pendmap.model import Effect, Rig
     from pendmap.records import Run
 
 __all__ = ["JointFit", "as_fit_run", "fit_together"]
@@ -94,18 +93,10 @@ def fit_together(
     readings = [
         reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
     ]
-    first, good = runs[0], runs[0].trusted
-    model = start_of(start or known, first.time[good], first.theta[good], readings[0].sigma)
-    named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
-    extra = [*model.effects, *named]
-    if all(effect.name != OFFSET for effect in extra):
-        extra.append(Effect(OFFSET, {"d": 0.0}))
-    model = dataclasses.replace(model, effects=tuple(extra))
-    names = ["w0", "c_over_m", "Tr", *sizes(extra)]
-    fit = fit_runs(
+    fit = fit_from_start(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
-        model,
-        names,
-        sigma_doubt=max(reading.doubt for reading in readings),
+        readings,
+        start=start or known,
+        effects=effects,
     )
     return JointFit(fit, tuple(runs), tuple(readings))

@@ -62,7 +62,7 @@ def _method(found: Identification) -> dict[str, Any]:
 
 
 def as_text(report: IdentificationReport) -> Iterator[str]:
-    """Yield the lines below the table of methods: table 1, warnings, what was found in the record."""
+    """Yield the lines below the tables: intervals, warnings, what was found in the record."""
     best = report.best
     yield f"{best.method}: {best.used}"
     for name, estimate in {**best.estimates, **best.derived}.items():
@@ -104,7 +104,7 @@ def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str
 
 
 def with_error(estimate: Estimate) -> str:
-    """Return a number with its standard error in the last digits: ``6.2047(12)`` is 6.2047 +- 0.0012."""
+    """Return a number with its standard error in the last digits: ``6.2047(12)``, +- 0.0012."""
     value, error = estimate.value, estimate.stderr
     if error is None or not math.isfinite(error) or error <= 0:
         return f"{value:.5g}"

@@ -19,6 +19,7 @@ from pendmap.identification.fitting import FitRun, TrajectoryFit, fit_runs
 from pendmap.identification.reading import Reading, reading_of
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.rough import rough_start
+from pendmap.identification.start import starting_values
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
 
@@ -32,6 +33,7 @@ __all__ = [
     "OFFSET",
     "TooShortError",
     "fit_decay",
+    "fit_from_start",
     "identification_of",
     "identify",
     "sizes",
@@ -40,6 +42,8 @@ __all__ = [
 
 METHOD: Final = "trajectory"
 OFFSET: Final = "encoder_offset"
+POOR: Final = 0.1
+"""Residuals above this part of the record's own scatter are no fit: the search went astray."""
 TOO_GOOD: Final = 0.7
 """A sum of squares below this part of its degrees of freedom shows that sigma is too large."""
 
@@ -186,17 +190,74 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     if good.shape != time.shape:
         raise InputError("trusted and time differ in length: they must be as many")
     reading = reading_of(time, theta, sigma, trusted=good)
-    model = start_of(start, time[good], theta[good], reading.sigma)
-    extra = [*effects]
-    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
-    if not friction:
-        model = dataclasses.replace(model, Tr=0.0)
-    if offset and all(effect.name != OFFSET for effect in effects):
-        extra.append(Effect(OFFSET, {"d": 0.0}))
-    model = dataclasses.replace(model, effects=tuple(extra))
-    names += sizes(extra) if free is None else [*free, *sizes(extra[len(effects) :])]
     run = FitRun(time, theta, reading.each, trusted=good)
-    return fit_runs([run], model, names, sigma_doubt=reading.doubt), reading
+    found = fit_from_start(
+        [run],
+        [reading],
+        start=start,
+        offset=offset,
+        friction=friction,
+        effects=effects,
+        free=free,
+    )
+    return found, reading
+
+
+def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
+    runs: Sequence[FitRun],
+    readings: Sequence[Reading],
+    *,
+    start: Rig | Mapping[str, float] | None = None,
+    offset: bool = True,
+    friction: bool = True,
+    effects: Sequence[Effect | str] = (),
+    free: Sequence[str] | None = None,
+) -> TrajectoryFit:
+    """Return the fit to several records, from a start that the first of them gives.
+
+    Where a rough start leads to a poor fit, a second one begins where the methods of peaks, or a
+    global search over their envelope, say; the better one counts.
+
+    Parameters
+    ----------
+    runs, readings : sequence
+        The records, and what their readings are worth.
+    start, offset, friction, effects, free
+        As of :func:`identify`; effects may be names, whose sizes then begin small.
+
+    Raises
+    ------
+    TooShortError
+        If the first record holds fewer than two half swings and no start is given.
+    """
+    first = runs[0]
+    good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
+    time, theta = first.time[good], first.theta[good]
+    doubt = max(reading.doubt for reading in readings)
+    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
+
+    def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
+        model = start_of(begin, time, theta, readings[0].sigma)
+        if not friction:
+            model = dataclasses.replace(model, Tr=0.0)
+        named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
+        known = [*model.effects, *named]
+        zero = [] if OFFSET in {e.name for e in known} or not offset else [OFFSET]
+        more = [Effect(name, {"d": 0.0}) for name in zero]
+        model = dataclasses.replace(model, effects=(*known, *more))
+        wanted = sizes(known) if free is None else free
+        return fit_runs(runs, model, [*names, *wanted, *sizes(more)], sigma_doubt=doubt)
+
+    found = fitted(start)
+    poor = not found.converged or found.rms > POOR * float(np.std(theta))
+    if isinstance(start, Rig) or not poor:
+        return found
+    try:
+        other = starting_values(time, theta, sigma=readings[0].sigma)
+        again = fitted({"w0": other.w0, "c_over_m": other.c_over_m, "Tr": other.Tr})
+    except InputError:
+        return found
+    return again if (again.converged, -again.chi2) > (found.converged, -found.chi2) else found
 
 
 def sizes(effects: Sequence[Effect]) -> list[str]:
