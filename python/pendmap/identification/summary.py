@@ -97,7 +97,10 @@ def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str
             "at rest" if math.isnan(row.errors[name]) else f"{row.errors[name]:.3g} %"
             for row in report.table.rows
         ]
-        rows.append([name, *percent, f"{errors.period_rms:.3g} %", f"{errors.peak_rms:.3g} %"])
+        overall = [
+            "" if math.isnan(r) else f"{r:.3g} %" for r in (errors.period_rms, errors.peak_rms)
+        ]
+        rows.append([name, *percent, *overall])
     units = {"period": "s", "peak": "rad"}
     measured = [f"{r.what} {r.measured:.4g} {units[r.what]}" for r in report.table.rows]
     return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows
