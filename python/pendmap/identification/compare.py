@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
+from pendmap.identification.from_start import OFFSET
 from pendmap.identification.joint import as_fit_run
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.reading import reading_of
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.table1 import PeakErrors, Table1, table_of
-from pendmap.identification.trajectory import OFFSET
 
 if TYPE_CHECKING:
     import numpy as np

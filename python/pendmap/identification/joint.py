@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
 from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit
+from pendmap.identification.from_start import fit_from_start
 from pendmap.identification.reading import Reading, reading_of
-from pendmap.identification.trajectory import fit_from_start
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification.trajectory import OFFSET
+from pendmap.identification.from_start import OFFSET
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -6,13 +6,14 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
+from pendmap.identification.from_start import TooShortError
 from pendmap.identification.joint import JointFit, fit_together
 from pendmap.identification.methods import check_names, identify, identify_peaks
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.result import Identification
 from pendmap.identification.table1 import Table1, table_of
 from pendmap.identification.trajectory import METHOD as BEST
-from pendmap.identification.trajectory import TooShortError, identification_of
+from pendmap.identification.trajectory import identification_of
 from pendmap.words import counted
 
 if TYPE_CHECKING:

@@ -7,43 +7,30 @@ from release to rest, stops included, and all its numbers are adapted to all rea
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.identification.fitting import FitRun, TrajectoryFit, fit_runs
+from pendmap.identification.from_start import OFFSET, TooShortError, fit_from_start
 from pendmap.identification.reading import Reading, reading_of
 from pendmap.identification.result import Estimate, Identification
-from pendmap.identification.rough import rough_start
-from pendmap.identification.start import starting_values
-from pendmap.model import Rig
-from pendmap.model.effects import Effect
+from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-__all__ = [
-    "METHOD",
-    "OFFSET",
-    "TooShortError",
-    "fit_decay",
-    "fit_from_start",
-    "identification_of",
-    "identify",
-    "sizes",
-    "start_of",
-]
+    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.model import Rig
+    from pendmap.model.effects import Effect
+
+__all__ = ["METHOD", "fit_decay", "identification_of", "identify"]
 
 METHOD: Final = "trajectory"
-OFFSET: Final = "encoder_offset"
-POOR: Final = 0.1
-"""Residuals above this part of the record's own scatter are no fit: the search went astray."""
 TOO_GOOD: Final = 0.7
 """A sum of squares below this part of its degrees of freedom shows that sigma is too large."""
 
@@ -152,10 +139,6 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str
     )
 
 
-class TooShortError(InputError):
-    """The record holds fewer than two half swings."""
-
-
 def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     time: NDArray[np.float64],
     theta: NDArray[np.float64],
@@ -201,92 +184,6 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
         free=free,
     )
     return found, reading
-
-
-def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
-    runs: Sequence[FitRun],
-    readings: Sequence[Reading],
-    *,
-    start: Rig | Mapping[str, float] | None = None,
-    offset: bool = True,
-    friction: bool = True,
-    effects: Sequence[Effect | str] = (),
-    free: Sequence[str] | None = None,
-) -> TrajectoryFit:
-    """Return the fit to several records, from a start that the first of them gives.
-
-    Where a rough start leads to a poor fit, a second one begins where the methods of peaks, or a
-    global search over their envelope, say; the better one counts.
-
-    Parameters
-    ----------
-    runs, readings : sequence
-        The records, and what their readings are worth.
-    start, offset, friction, effects, free
-        As of :func:`identify`; effects may be names, whose sizes then begin small.
-
-    Raises
-    ------
-    TooShortError
-        If the first record holds fewer than two half swings and no start is given.
-    """
-    first = runs[0]
-    good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
-    time, theta = first.time[good], first.theta[good]
-    doubt = max(reading.doubt for reading in readings)
-    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
-
-    def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
-        model = start_of(begin, time, theta, readings[0].sigma)
-        if not friction:
-            model = dataclasses.replace(model, Tr=0.0)
-        named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
-        known = [*model.effects, *named]
-        zero = [] if OFFSET in {e.name for e in known} or not offset else [OFFSET]
-        more = [Effect(name, {"d": 0.0}) for name in zero]
-        model = dataclasses.replace(model, effects=(*known, *more))
-        wanted = sizes(known) if free is None else free
-        return fit_runs(runs, model, [*names, *wanted, *sizes(more)], sigma_doubt=doubt)
-
-    found = fitted(start)
-    poor = not found.converged or found.rms > POOR * float(np.std(theta))
-    if isinstance(start, Rig) or not poor:
-        return found
-    try:
-        other = starting_values(time, theta, sigma=readings[0].sigma)
-        again = fitted({"w0": other.w0, "c_over_m": other.c_over_m, "Tr": other.Tr})
-    except InputError:
-        return found
-    return again if (again.converged, -again.chi2) > (found.converged, -found.chi2) else found
-
-
-def sizes(effects: Sequence[Effect]) -> list[str]:
-    """Return the names of all parameters of effects but those of shape."""
-    return [f"{effect.name}.{size}" for effect in effects for size in effect.sizes]
-
-
-def start_of(
-    start: Rig | Mapping[str, float] | None,
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
-    sigma: float,
-) -> Rig:
-    """Return where a search starts: what is given, the rest from the half swings of the record.
-
-    Raises
-    ------
-    TooShortError
-        If ``w0`` is not known and the record holds fewer than two half swings.
-    """
-    if isinstance(start, Rig):
-        return start
-    known: dict[str, Any] = dict(start or {})
-    if "w0" not in known:
-        rough = rough_start(time, theta, sigma)
-        if rough is None:
-            raise TooShortError("the record holds fewer than two half swings: there is no start")
-        known = rough | known
-    return Rig(**known)
 
 
 def _warnings(
