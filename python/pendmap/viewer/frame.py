@@ -20,7 +20,18 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["INK", "Frame", "describe", "recording", "screen", "strict", "summary", "text", "write"]
+__all__ = [
+    "INK",
+    "Frame",
+    "describe",
+    "identified",
+    "recording",
+    "screen",
+    "strict",
+    "summary",
+    "text",
+    "write",
+]
 
 INK = (150, 150, 150)
 """Lines and labels in a mid tone: the background may be light or dark."""
@@ -38,7 +49,11 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     content.update(
         np.ascontiguousarray(dataset["label" if "label" in dataset else "theta"].values).data
     )
-    name = content.hexdigest()
+    return identified(content.hexdigest())
+
+
+def identified(name: str) -> rr.RecordingStream:
+    """Return an empty recording that goes by this name, without the time of day in it."""
     stream = rr.RecordingStream("pendmap", recording_id=name, send_properties=False)
     stream.set_log_time_enabled(False)
     return stream
