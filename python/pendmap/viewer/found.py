@@ -11,7 +11,7 @@ from pendmap.words import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from pendmap.identification import Estimate, Identification, IdentificationReport
+    from pendmap.identification import Estimate, IdentificationReport
 
 __all__ = ["page"]
 
@@ -20,15 +20,20 @@ UNITS: Final[Mapping[str, str]] = {
     "c_over_m": "1/s",
     "Tr": "rad/s\N{SUPERSCRIPT TWO}",
     "offset": "rad",
-    "theta_r": "rad",
 }
 """Units of what several methods know; parameters of effects are in SI, as they say themselves."""
 
 COMPARED: Final = ("w0", "c_over_m", "Tr")
 """What all methods are compared by."""
 
+FOLLOWING: Final[Mapping[str, str]] = {"zeta": "", "theta_r": " rad"}
+"""What follows from them, with its unit."""
+
 DIGITS: Final = 5
 """Digits of a number whose uncertainty is not known."""
+
+PLACES: Final = 10
+"""Places after the point up to which a number is written out."""
 
 
 def page(report: IdentificationReport) -> str:
@@ -42,12 +47,15 @@ def _best(report: IdentificationReport) -> Iterator[str]:
     except InputError:
         yield from ("**No method could be applied.**", "")
         return
-    yield f"## {_said(best.method)}"
+    yield f"## By {_said(best.method)}"
     yield from ("", f"Used: {best.used}." if best.used else "", "")
     yield from ("| parameter | value | 95 % interval | unit |", "|---|---|---|---|")
-    for name, each in {**best.estimates, **best.derived}.items():
+    for name, each in best.estimates.items():
         yield f"| {name} | {_value(each)} | {_interval(each)} | {UNITS.get(name, '')} |"
     yield ""
+    follows = [f"{name} = {each.value:.4g}{FOLLOWING[name]}" for name, each in best.derived.items()]
+    if follows:
+        yield from (f"So {' and '.join(follows)}.", "")
     if report.joint is not None and report.joint.fit.rms:
         fit = report.joint.fit
         noise = ", ".join(f"{reading.sigma:.3g}" for reading in report.joint.readings)
@@ -59,16 +67,17 @@ def _best(report: IdentificationReport) -> Iterator[str]:
 
 
 def _methods(report: IdentificationReport) -> Iterator[str]:
-    yield from ("## All methods", "")
-    yield "| method | w0 (rad/s) | c/m (1/s) | Tr (rad/s\N{SUPERSCRIPT TWO}) |"
-    yield "|---|---|---|---|"
-    for name, found in report.methods.items():
-        if not found.applicable:
-            yield f"| {_said(name)} | not applicable | | |"
+    """Return a table a parameter: one of all would be too wide for a column of the window."""
+    for parameter in COMPARED:
+        known = {n: m for n, m in report.methods.items() if parameter in m.estimates}
+        if not known:
             continue
-        cells = [_with_interval(found, one) for one in COMPARED]
-        yield f"| {_said(name)} | {' | '.join(cells)} |"
-    yield ""
+        yield from (f"## {parameter} ({UNITS[parameter]}) by each method", "")
+        yield from ("| method | value | 95 % interval |", "|---|---|---|")
+        for name, found in known.items():
+            each = found.estimates[parameter]
+            yield f"| {_said(name)} | {_value(each)} | {_interval(each)} |"
+        yield ""
 
 
 def _warnings(report: IdentificationReport) -> Iterator[str]:
@@ -89,13 +98,6 @@ def _said(method: str) -> str:
     return method.replace("_", " ")
 
 
-def _with_interval(found: Identification, name: str) -> str:
-    if name not in found.estimates:
-        return ""
-    each = found.estimates[name]
-    return f"{_value(each)} {_interval(each)}".strip()
-
-
 def _width(each: Estimate) -> float:
     """Return half the width of the interval, or the standard error, or 0 where nothing is known."""
     if each.ci95 is not None:
@@ -107,10 +109,10 @@ def _written(value: float, width: float) -> str:
     """Return a number with two digits of its uncertainty."""
     if not (math.isfinite(value) and math.isfinite(width)):
         return f"{value:g}"
-    if not width or not value:
+    if not width:
         return f"{value:.{DIGITS}g}"
-    digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(width)) + 2
-    return f"{value:.{min(max(digits, 2), 12)}g}"
+    places = max(1 - math.floor(math.log10(width)), 0)
+    return f"{value:.{places}f}" if places <= PLACES else f"{value:.3g}"
 
 
 def _value(each: Estimate) -> str:

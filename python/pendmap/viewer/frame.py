@@ -52,9 +52,12 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     return identified(content.hexdigest())
 
 
-def identified(name: str) -> rr.RecordingStream:
-    """Return an empty recording that goes by this name, without the time of day in it."""
-    stream = rr.RecordingStream("pendmap", recording_id=name, send_properties=False)
+def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
+    """Return an empty recording that goes by this name, without the time of day in it.
+
+    The viewer has one layout an application at a time.
+    """
+    stream = rr.RecordingStream(application, recording_id=name, send_properties=False)
     stream.set_log_time_enabled(False)
     return stream
 
@@ -163,7 +166,8 @@ class Frame:
             origin=f"/{root}",
             name=name,
             visual_bounds=rrb.VisualBounds2D(
-                x_range=[-190.0, SIDE + 190.0], y_range=[-60.0, self.height + 150.0 + below]
+                x_range=[-190.0, SIDE + 190.0],
+                y_range=[-100.0 if self.units.si else -60.0, self.height + 150.0 + below],
             ),
             time_ranges=time_ranges,
         )
@@ -189,7 +193,8 @@ class Frame:
             lines.append([[-12, at], [0, at]])
             places.append([-55, at - 22])
             labels.append(label)
-        places += [[w / 2, h + 75], [-135, h / 2 - 22]]
+        # With its unit the velocity's name is too long to stand beside the ticks.
+        places += [[w / 2, h + 75], [60, -80] if self.units.si else [-135, h / 2 - 22]]
         labels += [
             plane.shifted(names.ANGLE, across),
             plane.shifted(names.speed(self.units), up),
