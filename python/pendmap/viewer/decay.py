@@ -172,7 +172,9 @@ def _residual(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
     if not np.isfinite(one.residual).any():
         return
     known = np.isfinite(one.residual)
-    look = RESIDUAL if one.sparse else replace(RESIDUAL, size=1.0)
+    rms = MILLI * math.sqrt(float(np.mean(one.residual[known] ** 2)))
+    name = f"{RESIDUAL.name}, {rms:.3g} mrad rms"
+    look = replace(RESIDUAL, name=name, size=RESIDUAL.size if one.sparse else 1.0)
     _series(stream, f"{path}/residual", one.time[known], MILLI * one.residual[known], look)
     ends = one.time[[0, -1]]
     for name, sign, said in (("above", 1, "+"), ("below", -1, MINUS)) if one.sigma else ():

@@ -11,7 +11,7 @@ from pendmap.words import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from pendmap.identification import Estimate, IdentificationReport
+    from pendmap.identification import Estimate, Identification, IdentificationReport
 
 __all__ = ["page"]
 
@@ -41,10 +41,16 @@ def page(report: IdentificationReport) -> str:
     return "\n".join([*_best(report), *_methods(report), *_warnings(report)])
 
 
-def _best(report: IdentificationReport) -> Iterator[str]:
+def _applied(report: IdentificationReport) -> Identification | None:
     try:
-        best = report.best
+        return report.best
     except InputError:
+        return None
+
+
+def _best(report: IdentificationReport) -> Iterator[str]:
+    best = _applied(report)
+    if best is None:
         yield from ("**No method could be applied.**", "")
         return
     yield f"## By {_said(best.method)}"
@@ -56,6 +62,8 @@ def _best(report: IdentificationReport) -> Iterator[str]:
     follows = [f"{name} = {each.value:.4g}{FOLLOWING[name]}" for name, each in best.derived.items()]
     if follows:
         yield from (f"So {' and '.join(follows)}.", "")
+    yield from (f"- {text}" for text in best.warnings)
+    yield ""
     if report.joint is not None and report.joint.fit.rms:
         fit = report.joint.fit
         noise = ", ".join(f"{reading.sigma:.3g}" for reading in report.joint.readings)
@@ -82,9 +90,10 @@ def _methods(report: IdentificationReport) -> Iterator[str]:
 
 def _warnings(report: IdentificationReport) -> Iterator[str]:
     runs = report.joint.runs if report.joint is not None else (report.run,)
-    found = [(name, text) for name, each in report.methods.items() for text in each.warnings]
+    said_of = {n: each for n, each in report.methods.items() if each is not _applied(report)}
+    found = [(name, text) for name, each in said_of.items() for text in each.warnings]
     if found:
-        yield from ("## Warnings", "")
+        yield from ("## Warnings of the other methods", "")
         yield from (f"- {_said(name)}: {text}" for name, text in found)
         yield ""
     said = [(run.name, finding.text) for run in runs for finding in run.findings]
@@ -120,7 +129,7 @@ def _value(each: Estimate) -> str:
 
 
 def _interval(each: Estimate) -> str:
-    if each.ci95 is None:
+    if each.ci95 is None or not _width(each):  # peaks without errors leave intervals without width
         return ""
     low, high = (_written(end, _width(each)) for end in each.ci95)
     return f"[{low}, {high}]"

@@ -34,7 +34,8 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
     ``/summary``; all on the timeline ``sim_time``, the record's own seconds. Of a run longer than
     20,000 samples every k-th is drawn, unless that leaves fewer than 24 of each swing. Where the
     whole record was not fitted, the best method's model is simulated from the first peak; where no
-    method could be applied, the record is shown alone.
+    method could be applied, the record is shown alone. The record's pendulum stands still where
+    nothing was read: in a gap, or between peaks alone.
 
     Parameters
     ----------
