@@ -66,6 +66,8 @@ def strips(
         colors=[look.colour], radii=rr.Radius.ui_points(look.size), draw_order=look.order
     )
     stream.log(path, style, static=True)
+    if not time.size:
+        return
     count, length, _ = lines.shape
     flat = pa.array(lines.astype(np.float32).reshape(-1))
     places = pa.FixedSizeListArray.from_arrays(flat, type=_POINT)

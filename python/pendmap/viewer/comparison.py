@@ -90,10 +90,15 @@ def comparisons(report: IdentificationReport) -> list[Comparison]:
         counted = run.trusted & np.isfinite(theta)
         # The fit gives the angle itself: the sensor's errors are added, as they are nearby where a
         # sample does not count.
-        error = np.interp(run.time, run.time[counted], (run.theta - residual - theta)[counted])
+        offset = (run.theta - residual - theta)[counted]
+        error = np.interp(run.time, run.time[counted], offset) if offset.size else 0.0
         known = np.where(counted, residual, math.nan)
         own = run is report.run
-        peaks = report.peaks if own else find_peaks(run.time, run.theta, trusted=run.trusted)
+        peaks = (
+            report.peaks
+            if own
+            else find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
+        )
         columns = (theta + error, speed, known)
         made.append(_drawn(run, columns, peaks, report.model.w0, reading.sigma))
     return made

@@ -105,6 +105,8 @@ def views(root: str, one: Comparison, w0: float) -> rrb.Container:
 
 def _whole(one: Comparison) -> rrb.TimeAxis:
     """Return an axis that holds the whole record."""
+    if not one.time.size:
+        return rrb.TimeAxis()
     low, high = float(one.time[0]), float(one.time[-1])
     pad = max(0.02 * (high - low), 1e-3)
     ends = (rr.TimeRangeBoundary.absolute(seconds=at) for at in (low - pad, high + pad))

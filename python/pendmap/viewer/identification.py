@@ -27,15 +27,16 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
     """Write the recording of an identification, with the layout in which the viewer shows it.
 
     For each run that was fitted, ``k`` from 1: ``/run_k/angle/{record,model,peaks,left_out}``,
-    ``/run_k/residual/{residual,above,below}`` (mrad, and
-    two standard deviations of the noise), the two
-    pendulums on one pivot in ``/run_k/pendulum/data/{record,model}/{arm,bob}``, and
+    ``/run_k/residual/{residual,above,below}`` (mrad; two standard deviations of the noise about 0),
+    two pendulums on one pivot in ``/run_k/pendulum/data/{record,model}/{arm,bob}``, and
     ``/run_k/phase/data/{curve,record,record_now,model_now}``; the tables of what was found in
-    ``/summary``; all on the timeline ``sim_time``, the record's own seconds. Of a run longer than
-    20,000 samples every k-th is drawn, unless that leaves fewer than 24 of each swing. Where the
-    whole record was not fitted, the best method's model is simulated from the first peak; where no
-    method could be applied, the record is shown alone. The record's pendulum stands still where
-    nothing was read: in a gap, or between peaks alone.
+    ``/summary``; all on the timeline ``sim_time``, the record's own seconds. The model's angle is
+    what the sensor would read of it, its zero error included.
+
+    Of a run longer than 20,000 samples every k-th is drawn, unless that leaves fewer than 24 of
+    each swing. Where the trajectory was not fitted, the best method's model is simulated from the
+    first peak; where no method could be applied, the record is shown alone. The record's pendulum
+    stands still where nothing was read: in a gap, or between peaks alone.
 
     Parameters
     ----------
