@@ -11,6 +11,7 @@ import pytest
 
 import decays
 import pendmap
+import recorded
 from pendmap import InputError, viewer
 from pendmap.identification import identify_experiment
 from pendmap.viewer import comparison, decay, window
@@ -222,6 +223,17 @@ def test_a_record_of_peaks_alone(tmp_path: Path) -> None:
     assert np.max(np.diff(time)) < 2 * np.pi / 6.2 / comparison.PER_SWING
     assert np.allclose(scalars(back, "/run_1/angle/model"), made.angle(time), atol=0.2)
     assert len(scalars(back, "/run_1/residual/residual")) == len(made.peak) - 1
+
+
+def test_a_record_that_begins_with_rotations(tmp_path: Path) -> None:
+    time, theta, velocity = recorded.motion(1.2, 16.0, 40.0, 50.0)
+    report = identified(write(tmp_path / "a.csv", time, theta), "energy_balance")
+    (one,) = comparison.comparisons(report)
+    near = np.interp(one.peaks.time, time, theta)
+    assert np.allclose(one.peaks.amplitude, near, atol=0.03), "turns are counted as the record has"
+    assert np.nanmax(np.abs(one.residual)) < 0.05
+    low, high = decay._frame(one, 6.2).y  # noqa: SLF001 (a frame is drawn, not logged)
+    assert low < velocity.min() < velocity.max() < high
 
 
 def test_where_no_method_can_be_applied_the_record_is_shown(tmp_path: Path) -> None:

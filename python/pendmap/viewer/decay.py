@@ -55,6 +55,9 @@ LEGEND: Final = rrb.Corner2D.RightTop
 CLOSE: Final = 4.0
 """Swings that the close view shows on either side of the cursor."""
 
+SMALL, MARGIN = 2.0, 1.15
+"""Swings under the first, rad, get a phase plane that is wider than they are by the second."""
+
 REACH: Final = 1.15
 """Half the width of the view of the pendulums, in lengths of the arm."""
 
@@ -120,13 +123,15 @@ def _scale(one: Comparison) -> rrb.ScalarAxis:
 
 
 def _frame(one: Comparison, w0: float) -> frame.Frame:
-    speeds = one.model_speed if one.model.size else one.speed
-    speeds = speeds[np.isfinite(speeds)]
-    return frame.Frame(
-        (-math.pi, math.pi),
-        plane.padded(speeds if speeds.size else np.zeros(1)),
-        Units(w0, si=True),
-    )
+    """Return a frame that holds record and model: the whole circle, or small swings enlarged."""
+    known = np.isfinite(one.record) & ~one.left_out
+    theta = np.concatenate([one.record[known], one.model[np.isfinite(one.model)]])
+    speed = np.concatenate([one.speed[known], one.model_speed])
+    widest = float(np.max(np.abs(plane.wrapped(theta)), initial=0.0))
+    reach = math.pi if not 0 < widest < SMALL else MARGIN * widest
+    speeds = speed[np.isfinite(speed)]
+    speeds = plane.padded(speeds if speeds.size else np.zeros(1))
+    return frame.Frame((-reach, reach), speeds, Units(w0, si=True))
 
 
 def log(stream: rr.RecordingStream, root: str, one: Comparison, w0: float) -> None:

@@ -55,7 +55,7 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
 def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
     """Return an empty recording that goes by this name, without the time of day in it.
 
-    The viewer has one layout an application at a time.
+    The viewer shows all recordings of an application in the layout of the one opened first.
     """
     stream = rr.RecordingStream(application, recording_id=name, send_properties=False)
     stream.set_log_time_enabled(False)

@@ -65,7 +65,9 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
         )
     w0 = _w0(report)
     with whole_file(path, (".rrd",)) as part, frame.strict():
-        recording = frame.identified(_content(report, shown), "pendmap identification")
+        content = _content(report, shown)
+        # A layout holds for all recordings of an application, and this one has axes of its own.
+        recording = frame.identified(content, f"pendmap identification {content[:6]}")
         try:
             with recording:
                 recording.save(part, default_blueprint=_blueprint(shown, w0))
