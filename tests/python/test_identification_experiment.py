@@ -8,7 +8,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
+import pendmap
 from decays import decay, record
+from driven_decays import motion
 from pendmap import InputError
 from pendmap.identification import find_peaks, identify, identify_experiment
 from pendmap.records import Experiment, Run
@@ -76,3 +78,19 @@ def test_peaks_alone_are_enough_for_methods_of_peaks() -> None:
     found = report.methods["combined_repaired"]
     assert found["Tr"] == pytest.approx(0.03, rel=0.02)
     assert report.table.errors["combined_repaired"].peak_rms < 1
+
+
+def test_a_decay_that_begins_with_rotations(tmp_path: Path) -> None:
+    time = np.arange(0, 60, 0.01)
+    theta = motion(time, (0.3, 30.0), w0=6.2, c_over_m=0.08, friction=0.1)
+    noise = np.random.default_rng(5).normal(0, 2e-3, time.size)
+    table = np.stack([time, theta + noise], axis=1)
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t_s,theta_rad", comments="")
+    report = identify_experiment(
+        pendmap.read_experiment(tmp_path / "a.csv"), methods=["trajectory"]
+    )
+    assert report.best.method == "trajectory", report.best.warnings
+    for name, true in {"w0": 6.2, "c_over_m": 0.08, "Tr": 0.1}.items():
+        found = report.best.estimates[name]
+        assert found.stderr is not None
+        assert abs(found.value - true) < 5 * found.stderr

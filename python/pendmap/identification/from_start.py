@@ -87,8 +87,7 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     if isinstance(start, Rig) or not poor:
         return found
     try:
-        other = starting_values(time, theta, sigma=readings[0].sigma)
-        again = fitted({"w0": other.w0, "c_over_m": other.c_over_m, "Tr": other.Tr})
+        again = fitted(_by_peaks(time, theta, readings[0].sigma))
     except InputError:
         return found
     return again if (again.converged, -again.chi2) > (found.converged, -found.chi2) else found
@@ -116,8 +115,18 @@ def _start_of(
         return start
     known: dict[str, Any] = dict(start or {})
     if "w0" not in known:
-        rough = rough_start(time, theta, sigma)
-        if rough is None:
-            raise TooShortError("the record holds fewer than two half swings: there is no start")
-        known = rough | known
+        known = (rough_start(time, theta, sigma) or _by_peaks(time, theta, sigma)) | known
     return Rig(**known)
+
+
+def _by_peaks(
+    time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
+) -> dict[str, float]:
+    """Return a start from the methods of peaks, which know rotations too."""
+    try:
+        start = starting_values(time, theta, sigma=sigma)
+    except InputError:
+        start = None
+    if start is None or start.source == "guess":
+        raise TooShortError("the record holds fewer than two half swings: there is no start")
+    return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}

@@ -7,6 +7,7 @@ from release to rest, stops included, and all its numbers are adapted to all rea
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -120,7 +121,13 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str
     """
     renamed = {f"{OFFSET}.d": "offset"}
     names = tuple(renamed.get(name, name) for name in fit.names)
-    estimates = dict(zip(names, fit.estimates.values(), strict=True))
+    # Where the model does not fit, the noise is not what the errors come from.
+    wider = math.sqrt(fit.widening)
+    found = [
+        dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
+        for e in fit.estimates.values()
+    ]
+    estimates = dict(zip(names, found, strict=True))
     count, whole = len(fit.windows), len(readings)
     motions = "one motion" if whole == 1 else f"{whole} motions"
     how = f"as {motions}" if count == whole else f"in {count} windows"
@@ -133,7 +140,7 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str
         estimates=estimates,
         used=f"{fit.samples} readings of {total}, {span}, {how}; noise {noise} rad",
         warnings=tuple(_warnings(fit, estimates, readings)),
-        covariance=(names, fit.covariance),
+        covariance=(names, fit.widening * fit.covariance),
         misfit=fit.chi2 / max(fit.degrees, 1),
         model=fit.model,
     )
@@ -205,7 +212,7 @@ def _warnings(
     if fit.widening > 1:
         found.append(
             f"the model does not fit: residuals are {math.sqrt(ratio):.2g} times the noise, and "
-            "the intervals are widened by that factor; an effect is missing in the model"
+            "the errors are widened by that factor; an effect is missing in the model"
         )
     elif ratio < TOO_GOOD and not any(reading.coarse for reading in readings):
         found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
