@@ -80,8 +80,8 @@ pub struct Stepping<'a, R, K> {
     pub equation: &'a Equation<R>,
     /// The times.
     pub clock: K,
-    /// The sense of the motion, held over the step.
-    pub sense: R,
+    /// The sense of the motion and the side of a corner, held over the step.
+    pub signs: [R; 2],
     /// [`STEP`], [`END`] or [`WHOLE`].
     pub part: Range<usize>,
     /// The state at the begin, and then at the end.
@@ -113,7 +113,7 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
     // written out by a macro, since looked up it takes as long as the formulas.
     #[inline(always)]
     fn run(self) {
-        let Self { equation, clock, sense, part, state, ends, stages } = self;
+        let Self { equation, clock, signs, part, state, ends, stages } = self;
         let h = clock.length();
         let Running { theta: theta0, velocity: velocity0 } = *state;
         let Stages { velocities, accelerations } = stages;
@@ -147,7 +147,7 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
                 _ => {}
             }
             let forcing = clock.forcing(equation, i);
-            let at = equation.point(&forcing, theta, velocity, sense);
+            let at = equation.point_held(&forcing, theta, velocity, signs);
             let acceleration = equation.acceleration(&forcing, &at);
             if i == STAGES {
                 ends[1] = acceleration;

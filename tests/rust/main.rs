@@ -15,6 +15,7 @@
 mod attractors;
 mod bifurcations;
 mod chaos;
+mod corners;
 mod edges;
 mod effects;
 mod effects_in_lanes;

@@ -141,6 +141,8 @@ pub struct Point<R> {
     pub velocity: R,
     /// 1 or -1: the sense of the motion, held over a step even where the velocity passes zero.
     pub sense: R,
+    /// 1 or -1: the sign of the effect's [`Law::switch`], held over a step even where it passes zero.
+    pub side: R,
     /// `sin theta`.
     pub sine: R,
     /// `1 + a(t)`: gravity and the pivot's vertical acceleration over gravity.
@@ -217,6 +219,14 @@ pub trait Law {
     #[inline(always)]
     fn friction<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         at.constant(0.0)
+    }
+
+    /// A smooth function of state and time at whose zeros a formula of the effect has a corner; none
+    /// where there is no corner. The formulas take its sign from [`Point::side`] and are analytic while
+    /// that is held; they are continuous across it. One effect of a model may have a corner.
+    #[inline(always)]
+    fn switch<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
+        None
     }
 
     /// Changes the pivot's motion.
