@@ -68,9 +68,7 @@ pub struct Running<R> {
 
 /// All of a step but the acceleration at its end.
 pub const STEP: Range<usize> = 0..STAGES;
-/// The acceleration at the end alone, of a step that was taken.
-pub const END: Range<usize> = STAGES..STAGES + 1;
-/// Both.
+/// That, too.
 pub const WHOLE: Range<usize> = 0..STAGES + 1;
 
 /// One step, or a part of it.
@@ -82,7 +80,7 @@ pub struct Stepping<'a, R, K> {
     pub clock: K,
     /// The sense of the motion and the side of a corner, held over the step.
     pub signs: [R; 2],
-    /// [`STEP`], [`END`] or [`WHOLE`].
+    /// [`STEP`] or [`WHOLE`].
     pub part: Range<usize>,
     /// The state at the begin, and then at the end.
     pub state: &'a mut Running<R>,

@@ -175,9 +175,15 @@ impl Ticket {
         matches!(ticket.ended(whole), Progress::Asks).then_some(ticket)
     }
 
-    /// Takes the end of the integration that it asked for.
+    /// Takes the end of the integration that it asked for; `holds` is the equation where friction can
+    /// hold the trajectory.
     #[must_use]
-    pub fn take(&mut self, reached: &Reached, equation: &Equation<f64>, period: f64) -> Progress {
+    pub fn take(
+        &mut self,
+        reached: &Reached,
+        holds: Option<&Equation<f64>>,
+        period: f64,
+    ) -> Progress {
         self.rounds += 1;
         if self.rounds > MOST_ROUNDS || !reached.velocity.is_finite() {
             return Progress::Arrived { theta: f64::NAN, velocity: f64::NAN };
@@ -187,11 +193,11 @@ impl Ticket {
             Stage::Whole => self.ended(reached),
             Stage::Dip => self.dipped(reached),
             Stage::Root { low, high, tries } => {
-                self.narrowed(reached, [low, high], tries, equation, period)
+                self.narrowed(reached, [low, high], tries, holds, period)
             }
             Stage::Hollow { stop, tries } => match (self.hollow(reached, stop, tries), stop) {
                 (Some(progress), _) => progress,
-                (None, Some([theta, tau])) => self.stopped(theta, tau, equation, period),
+                (None, Some([theta, tau])) => self.stopped(theta, tau, holds, period),
                 (None, None) => self.arrived(),
             },
             Stage::Corner { low, high, tries } => self.cornered(reached, [low, high], tries),
@@ -264,7 +270,7 @@ impl Ticket {
         reached: &Reached,
         [mut low, mut high]: [f64; 2],
         tries: u32,
-        equation: &Equation<f64>,
+        holds: Option<&Equation<f64>>,
         period: f64,
     ) -> Progress {
         let t = self.length;
@@ -292,7 +298,7 @@ impl Ticket {
             let theta = reached.theta + step * (reached.velocity + 0.5 * step * gain);
             let tau = self.begin + t + step;
             let cornered = self.look_for_corner(reached, t, Some([theta, tau]));
-            return cornered.unwrap_or_else(|| self.stopped(theta, tau, equation, period));
+            return cornered.unwrap_or_else(|| self.stopped(theta, tau, holds, period));
         }
         let mut next = t + step;
         if !(next > low && next < high) || tries >= MOST_NEWTON {
@@ -417,10 +423,21 @@ impl Ticket {
     }
 
     /// The velocity is zero at `tau`: what comes next.
-    fn stopped(&mut self, theta: f64, tau: f64, equation: &Equation<f64>, period: f64) -> Progress {
+    fn stopped(
+        &mut self,
+        theta: f64,
+        tau: f64,
+        holds: Option<&Equation<f64>>,
+        period: f64,
+    ) -> Progress {
         let released = self.velocity == 0.0 && tau - self.begin < LEAST_SLIP * period;
         let at = if released { tau + LEAST_SLIP * period } else { tau };
-        let (begin, sense) = match release(equation, at, theta, at + period) {
+        // Where nothing can hold it the motion turns.
+        let next = match holds {
+            Some(equation) => release(equation, at, theta, at + period),
+            None => Release::Now(-self.sense),
+        };
+        let (begin, sense) = match next {
             Release::Now(sense) => (at, sense),
             Release::At(time, sense) => (time, sense),
             Release::Later | Release::Never => (f64::INFINITY, 1.0),
