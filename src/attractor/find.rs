@@ -97,7 +97,7 @@ impl Catalogue {
         while elapsed < bound && !alive.is_empty() && !cancel.load(Ordering::Relaxed) {
             let length = round.min(bound - elapsed);
             alive = self.run(strobe, &alive, length, elapsed, cancel);
-            alive.retain(|state| !(state[1].abs() > fastest));
+            alive.retain(|state| state[1].abs() <= fastest);
             elapsed += length;
             round *= 2;
             if self.find_cycles(strobe, &map, &alive, cancel) {

@@ -227,6 +227,7 @@ pub trait Law {
     /// where there is no corner. The formulas take its sign from [`Point::side`] and are analytic while
     /// that is held; they are continuous across it. One effect of a model may have a corner.
     #[inline(always)]
+    #[must_use]
     fn switch<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
         None
     }
