@@ -208,8 +208,8 @@ fn steps_for_a_tolerance_are_those_of_other_effects() {
 
 #[test]
 fn a_load_that_only_just_touches_zero_is_not_missed() {
-    // Without friction of its own strength the motion is the smooth one, so that starts can be
-    // found whose load touches zero; with it, lanes must do there what the reference does.
+    // Between a start with two corners more in a period and one without them lies one whose load
+    // touches zero: on both sides, ever nearer, lanes must do what the reference does.
     let pendulum = loaded(driven(0.1, 0.6, 2.0), 0.02, 0.2);
     let flow = Flow::new(&pendulum);
     let strobe = Strobe::new(&pendulum, 60, path());
