@@ -104,7 +104,8 @@ impl fmt::Display for Error {
                 "tol is {tol:e}: the smallest error that steps can reach here is {reached:.1e}"
             ),
             Self::Diverges => f.write_str(
-                "the motion leaves the range of numbers: an effect of this model feeds it energy",
+                "the motion leaves the range of numbers: it begins too fast, or a torque or effect of \
+                 this model feeds it energy",
             ),
             Self::Interrupted => f.write_str("interrupted"),
             Self::Threads(why) => write!(f, "threads: {why}"),

@@ -114,7 +114,7 @@ pub fn sets(
     let Some(walks) = walk(strobe, states, watch, cancel) else { return Vec::new() };
     let mut groups: Vec<(Vec<usize>, Region)> = Vec::new();
     for (i, walk) in walks.iter().enumerate() {
-        if walk.closes() {
+        if walk.closes() || 2 * walk.outside > watch {
             continue;
         }
         let mut joined = (vec![i], walk.region.clone());
@@ -147,6 +147,9 @@ struct Walk {
     region: Region,
     points: Vec<State>,
     turns: f64,
+    /// Periods that ended faster than the region reaches: a motion that is so for most of the time gains
+    /// speed for ever, and rounding makes its exponent.
+    outside: usize,
     /// Exponent per period over the run.
     exponent: f64,
 }
@@ -178,7 +181,13 @@ fn walk(
     let mut growth = vec![0.0; count];
     let mut walks: Vec<Walk> = states
         .iter()
-        .map(|_| Walk { region: Region::new(speed), points: Vec::new(), turns: 0.0, exponent: 0.0 })
+        .map(|_| Walk {
+            region: Region::new(speed),
+            points: Vec::new(),
+            turns: 0.0,
+            outside: 0,
+            exponent: 0.0,
+        })
         .collect();
     let align = periods / 2;
     for period in 0..periods {
@@ -201,6 +210,7 @@ fn walk(
         for (i, walk) in walks.iter_mut().enumerate() {
             let state = [theta[i], velocity[i]];
             walk.region.mark(state);
+            walk.outside += usize::from(walk.region.cell(state).is_none());
             if walk.points.len() < KEPT {
                 walk.points.push(state);
             }

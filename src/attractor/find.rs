@@ -10,7 +10,8 @@ use super::rest;
 use super::trap::{self, Band, Ellipse, ellipses};
 use crate::integrate::accuracy::{distance, wrapped};
 use crate::integrate::{State, Strobe};
-use crate::model::Pendulum;
+use crate::model::effects::Action;
+use crate::model::{Effect, Pendulum};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
@@ -30,6 +31,8 @@ pub const WATCH: u32 = 4;
 /// Damping must shrink a motion by this power of e, were it not driven, before what is left can be
 /// called chaos.
 const LEAST_DECAY: f64 = 20.0;
+/// So many times faster than the drive and gravity no resonance with either can hold a rotation.
+const ESCAPE: f64 = 10.0;
 /// Of the trajectories left over, so many are watched.
 const WATCHED: usize = 256;
 
@@ -89,10 +92,12 @@ impl Catalogue {
         let known = self.attractors.len();
         let map = PoincareMap::new(&strobe.pendulum);
         let mut alive: Vec<State> = starts.to_vec();
+        let fastest = escape_speed(&strobe.pendulum);
         let (mut elapsed, mut round) = (0, FIRST_ROUND);
         while elapsed < bound && !alive.is_empty() && !cancel.load(Ordering::Relaxed) {
             let length = round.min(bound - elapsed);
             alive = self.run(strobe, &alive, length, elapsed, cancel);
+            alive.retain(|state| state[1].abs() <= fastest);
             elapsed += length;
             round *= 2;
             if self.find_cycles(strobe, &map, &alive, cancel) {
@@ -293,6 +298,22 @@ impl ChaoticSet {
             && self.sense == other.sense
             && (self.kind == Kind::QuasiperiodicRotation || self.region.meets(&other.region))
     }
+}
+
+/// The speed at which nothing holds a rotation back any more: where the torque is greater than all
+/// friction and nothing grows with the velocity, faster motions gain speed for ever. Infinite
+/// otherwise.
+fn escape_speed(pendulum: &Pendulum) -> f64 {
+    let constant = |e: &Effect| {
+        !e.is(&[Action::Velocity, Action::Kinked, Action::SlidingFriction, Action::LoadedFriction])
+    };
+    let held = pendulum.gamma > 0.0
+        || !pendulum.effects.iter().all(constant)
+        || pendulum.torque.abs() <= pendulum.equation().hold(0.0);
+    if held {
+        return f64::INFINITY;
+    }
+    ESCAPE * (pendulum.motion().omega + pendulum.greatest_pull().sqrt())
 }
 
 /// The next stroboscopic points of each trajectory, its own first.

@@ -2,7 +2,7 @@
 //!
 //! Smooth motions run a bundle at a time through the whole period. With friction, or another law that
 //! changes with the sign of the velocity, all bundles take each step with the sign held; lanes whose
-//! velocity passed zero go into a queue that runs in lanes itself, each with its own phase and step
+//! velocity passed zero, or that met a corner ([`super::corner`]), go into a queue that runs in lanes itself, each with its own phase and step
 //! ([`super::ticket`]). Lanes that are held fast wait for their release.
 
 use std::f64::consts::{FRAC_1_PI, PI};
@@ -17,6 +17,10 @@ use crate::model::pendulum::Route;
 
 /// Most trajectories of a block with events: enough for the queue of a step to fill its lanes.
 const WITH_EVENTS: usize = 6144;
+
+/// States, accelerations or times of a bundle, and from the seventh on what [`super::ticket::Switching`] holds: 0
+/// where there is no corner.
+pub(super) type Scratch = [[f64; MAX_WIDTH]; 11];
 
 /// A lane that is held fast.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +46,7 @@ pub struct Block {
     pub(super) held: Vec<Held>,
     pub(super) queue: Vec<Ticket>,
     /// What goes between lanes and queue.
-    pub(super) scratch: Box<[[f64; MAX_WIDTH]; 6]>,
+    pub(super) scratch: Box<Scratch>,
 }
 
 impl Block {
@@ -57,7 +61,7 @@ impl Block {
             held_at: vec![f64::NAN; width],
             held: Vec::new(),
             queue: Vec::new(),
-            scratch: Box::new([[0.0; MAX_WIDTH]; 6]),
+            scratch: Box::new([[0.0; MAX_WIDTH]; 11]),
         }
     }
 

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::tangent::{Number, Tangent};
+use crate::model::equation::Forcing;
 use crate::model::recorded::Recorded;
 use crate::model::rest::Load;
 use crate::model::{Equation, Pendulum};
@@ -106,9 +107,10 @@ impl<N: Number> Course<N> {
         self
     }
 
-    /// The acceleration at time `tau`, moving in the sense `sense` (1 or -1).
+    /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
+    /// says (1 or -1).
     #[inline]
-    pub fn acceleration(&self, tau: f64, theta: N, velocity: N, sense: f64) -> N {
+    pub fn acceleration(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
         let mut forcing = self.equation.forcing(N::constant(tau));
         if let Some(recorded) = &self.recorded {
             let [up, side] = recorded.acceleration(tau);
@@ -116,8 +118,21 @@ impl<N: Number> Course<N> {
             forcing.vertical = gravity.scale_add(up, forcing.vertical);
             forcing.lateral = gravity.scale_add(side, forcing.lateral);
         }
-        let at = self.equation.point(&forcing, theta, velocity, N::constant(sense));
+        let at = self.equation.point_held(&forcing, theta, velocity, signs.map(N::constant));
         self.equation.acceleration(&forcing, &at)
+    }
+
+    /// The switching function of an effect with a corner; 1 where there is none.
+    #[must_use]
+    pub fn switch(&self, tau: f64, [theta, velocity]: [f64; 2]) -> f64 {
+        let at = self.plain.point_held(&self.plain_forcing(tau), theta, velocity, [1.0; 2]);
+        self.plain.switch(&at).unwrap_or(1.0)
+    }
+
+    /// Whether an effect has a corner.
+    #[must_use]
+    pub fn has_corner(&self) -> bool {
+        self.plain.has_corner()
     }
 
     /// Whether the equation changes where the velocity passes zero, or turns are wanted anyhow.
@@ -146,14 +161,22 @@ impl<N: Number> Course<N> {
     }
 }
 
-impl<N> Load for Course<N> {
-    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
+impl<N> Course<N> {
+    /// What the pivot does at time `tau`.
+    fn plain_forcing(&self, tau: f64) -> Forcing<f64> {
         let mut forcing = self.plain.forcing(tau);
         if let Some(recorded) = &self.recorded {
             let [up, side] = recorded.acceleration(tau);
             forcing.vertical += self.plain.gravity() * up;
             forcing.lateral += self.plain.gravity() * side;
         }
+        forcing
+    }
+}
+
+impl<N> Load for Course<N> {
+    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
+        let forcing = self.plain_forcing(tau);
         let at = self.plain.point(&forcing, theta, 0.0, 1.0);
         [self.plain.load(&forcing, &at), self.plain.friction(&at).max(0.0)]
     }

@@ -7,16 +7,16 @@ use super::course::Course;
 use super::dop853::{A, ALL_STAGES, C, D, E3, E5, STAGES};
 use super::tangent::Number;
 
-/// A step from one time to another with the sense of the motion held, so that the equation is
-/// analytic even where the velocity passes zero.
+/// A step from one time to another with the sense of the motion and the side of a corner held, so that
+/// the equation is analytic even where the velocity or the switching function passes zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Leap<N> {
     /// Where it starts.
     pub tau: f64,
     /// How long it is.
     pub length: f64,
-    /// The sense held: 1 or -1.
-    pub sense: f64,
+    /// The sense and the side held: 1 or -1.
+    pub signs: [f64; 2],
     /// Angle and velocity at its start.
     pub start: [N; 2],
     /// Angle and velocity at its end.
@@ -33,14 +33,14 @@ impl<N: Number> Leap<N> {
         tau: f64,
         start: [N; 2],
         first: N,
-        sense: f64,
+        signs: [f64; 2],
         length: f64,
     ) -> Self {
         let zero = N::constant(0.0);
         let mut leap = Self {
             tau,
             length,
-            sense,
+            signs,
             start,
             end: start,
             velocity: [zero; ALL_STAGES],
@@ -71,7 +71,7 @@ impl<N: Number> Leap<N> {
         let velocity = gained.scale_add(self.length, self.start[1]);
         let tau = self.tau + C[i] * self.length;
         self.velocity[i] = velocity;
-        self.acceleration[i] = course.acceleration(tau, theta, velocity, self.sense);
+        self.acceleration[i] = course.acceleration(tau, theta, velocity, self.signs);
         [theta, velocity]
     }
 
@@ -113,7 +113,7 @@ impl<N: Number> Leap<N> {
         let greatest =
             self.acceleration[..=STAGES].iter().fold(0_f64, |most, a| most.max(a.value().abs()));
         // From either end the velocity falls no faster than that.
-        let ends = self.sense * (self.start[1].value() + self.end[1].value());
+        let ends = self.signs[0] * (self.start[1].value() + self.end[1].value());
         ends > 1.2 * self.length * greatest
     }
 

@@ -6,6 +6,7 @@
 //! after and before it, at a stick they vanish, at a release nothing jumps (saltation; di Bernardo,
 //! Budd, Champneys & Kowalczyk (2008), Piecewise-smooth Dynamical Systems, section 2.5).
 
+use super::corner;
 use super::course::Course;
 use super::dense::Leap;
 use super::event::{Event, EventKind};
@@ -40,8 +41,8 @@ pub enum Piece<N> {
 
 #[derive(Clone, Copy, Debug)]
 enum Mode<N> {
-    /// In this sense, with this acceleration now.
-    Moving(f64, N),
+    /// In this sense and on this side of a corner, with this acceleration now.
+    Moving([f64; 2], N),
     /// Until this release.
     Stuck(Release),
     /// Out of the range of numbers.
@@ -64,6 +65,8 @@ pub struct Flight<'a, N> {
     pub steps: usize,
     until: f64,
     mode: Mode<N>,
+    /// Whether the last piece ended at a corner.
+    since_corner: bool,
     step: f64,
     crowd: (f64, u32),
     pause: f64,
@@ -85,6 +88,7 @@ impl<'a, N: Number> Flight<'a, N> {
             steps: 0,
             until,
             mode,
+            since_corner: false,
             step,
             crowd,
             pause: PAUSE,
@@ -98,7 +102,7 @@ impl<'a, N: Number> Flight<'a, N> {
                 wait => flight.settle(wait),
             }
         } else {
-            let pull = course.acceleration(tau, state[0], state[1], 1.0);
+            let pull = course.acceleration(tau, state[0], state[1], flight.signs(1.0));
             flight.set_out(1_f64.copysign(pull.value()));
         }
         flight
@@ -125,7 +129,7 @@ impl<'a, N: Number> Flight<'a, N> {
         match self.mode {
             Mode::Lost => None,
             Mode::Stuck(wait) => Some(self.rest(wait)),
-            Mode::Moving(sense, first) => self.leap(sense, first),
+            Mode::Moving(signs, first) => self.leap(signs, first),
         }
     }
 
@@ -146,8 +150,8 @@ impl<'a, N: Number> Flight<'a, N> {
     pub fn scale_derivatives(&mut self, factor: f64) {
         let scaled = |x: N| x.reset(x.value(), factor);
         self.state = self.state.map(scaled);
-        if let Mode::Moving(sense, first) = self.mode {
-            self.mode = Mode::Moving(sense, scaled(first));
+        if let Mode::Moving(signs, first) = self.mode {
+            self.mode = Mode::Moving(signs, scaled(first));
         }
     }
 
@@ -164,7 +168,7 @@ impl<'a, N: Number> Flight<'a, N> {
         Piece::Rest(from, self.tau)
     }
 
-    fn leap(&mut self, sense: f64, first: N) -> Option<Piece<N>> {
+    fn leap(&mut self, signs: [f64; 2], first: N) -> Option<Piece<N>> {
         let (course, shortest) = (self.course, SHORTEST * self.tau.abs().max(1.0));
         let mut growth = CHANGE[1];
         loop {
@@ -175,7 +179,7 @@ impl<'a, N: Number> Flight<'a, N> {
                 self.lose();
                 return None;
             }
-            let mut leap = Leap::new(course, self.tau, self.state, first, sense, length);
+            let mut leap = Leap::new(course, self.tau, self.state, first, signs, length);
             self.steps += 1;
             let error = leap.error(course.tolerance());
             if error.is_nan() {
@@ -196,13 +200,26 @@ impl<'a, N: Number> Flight<'a, N> {
             }
             // A step that the end cut short says little about the next one.
             self.step = if length < self.step { self.step.max(next) } else { next };
-            if let Turning::At(turned) = turning {
+            let turned = match turning {
+                Turning::At(turned) => Some(turned),
+                _ => None,
+            };
+            if course.has_corner() {
+                let mut whole = turned.as_deref().copied().unwrap_or(leap);
+                if let Some(cornered) = corner::first(course, &mut whole, self.since_corner) {
+                    self.arrive(&cornered);
+                    self.cross(signs);
+                    return Some(Piece::Leap(Box::new(cornered)));
+                }
+                self.since_corner = false;
+            }
+            if let Some(turned) = turned {
                 self.arrive(&turned);
-                self.turn(sense, turned.last().value());
+                self.turn(signs[0], turned.last().value());
                 return Some(Piece::Leap(turned));
             }
             self.arrive(&leap);
-            self.mode = Mode::Moving(sense, leap.last());
+            self.mode = Mode::Moving(signs, leap.last());
             return Some(Piece::Leap(Box::new(leap)));
         }
     }
@@ -237,7 +254,8 @@ impl<'a, N: Number> Flight<'a, N> {
             return;
         }
         self.note(EventKind::Turn);
-        let after = self.course.acceleration(self.tau, self.state[0], self.state[1], next).value();
+        let signs = self.signs(next);
+        let after = self.course.acceleration(self.tau, self.state[0], self.state[1], signs).value();
         let ratio = if self.course.jumps() { after / before } else { 1.0 };
         self.ratio *= ratio;
         self.state[1] = self.state[1].reset(0.0, ratio);
@@ -259,8 +277,27 @@ impl<'a, N: Number> Flight<'a, N> {
     }
 
     fn set_out(&mut self, sense: f64) {
-        let first = self.course.acceleration(self.tau, self.state[0], self.state[1], sense);
-        self.mode = Mode::Moving(sense, first);
+        self.since_corner = false;
+        self.go_on(self.signs(sense));
+    }
+
+    /// To the other side of a corner: nothing jumps, but derivatives of the acceleration.
+    fn cross(&mut self, [sense, side]: [f64; 2]) {
+        self.since_corner = true;
+        self.go_on([sense, -side]);
+    }
+
+    fn go_on(&mut self, signs: [f64; 2]) {
+        let first = self.course.acceleration(self.tau, self.state[0], self.state[1], signs);
+        self.mode = Mode::Moving(signs, first);
+    }
+
+    /// The sense, and the side of a corner here.
+    fn signs(&self, sense: f64) -> [f64; 2] {
+        if !self.course.has_corner() {
+            return [sense, 1.0];
+        }
+        [sense, 1_f64.copysign(self.course.switch(self.tau, self.state.map(N::value)))]
     }
 
     fn settle(&mut self, wait: Release) {

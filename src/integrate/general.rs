@@ -68,9 +68,7 @@ pub struct Running<R> {
 
 /// All of a step but the acceleration at its end.
 pub const STEP: Range<usize> = 0..STAGES;
-/// The acceleration at the end alone, of a step that was taken.
-pub const END: Range<usize> = STAGES..STAGES + 1;
-/// Both.
+/// That, too.
 pub const WHOLE: Range<usize> = 0..STAGES + 1;
 
 /// One step, or a part of it.
@@ -80,9 +78,9 @@ pub struct Stepping<'a, R, K> {
     pub equation: &'a Equation<R>,
     /// The times.
     pub clock: K,
-    /// The sense of the motion, held over the step.
-    pub sense: R,
-    /// [`STEP`], [`END`] or [`WHOLE`].
+    /// The sense of the motion and the side of a corner, held over the step.
+    pub signs: [R; 2],
+    /// [`STEP`] or [`WHOLE`].
     pub part: Range<usize>,
     /// The state at the begin, and then at the end.
     pub state: &'a mut Running<R>,
@@ -113,7 +111,7 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
     // written out by a macro, since looked up it takes as long as the formulas.
     #[inline(always)]
     fn run(self) {
-        let Self { equation, clock, sense, part, state, ends, stages } = self;
+        let Self { equation, clock, signs, part, state, ends, stages } = self;
         let h = clock.length();
         let Running { theta: theta0, velocity: velocity0 } = *state;
         let Stages { velocities, accelerations } = stages;
@@ -147,7 +145,7 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
                 _ => {}
             }
             let forcing = clock.forcing(equation, i);
-            let at = equation.point(&forcing, theta, velocity, sense);
+            let at = equation.point_held(&forcing, theta, velocity, signs);
             let acceleration = equation.acceleration(&forcing, &at);
             if i == STAGES {
                 ends[1] = acceleration;

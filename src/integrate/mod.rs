@@ -6,6 +6,7 @@
 //! - [`tangent`]: numbers with derivatives, for the variational equations
 //! - [`general`]: one step where torques depend on the velocity
 //! - [`block`], [`ticket`]: a block of trajectories, one forcing period; turns, sticks, releases in it
+//! - [`corner`]: where an effect's formula changes besides the velocity's zeros
 //! - [`course`], [`dense`], [`turning`], [`event`], [`flight`]: one trajectory of any
 //!   model, adaptive, with exact turns, sticks and releases
 //! - [`sample`], [`sensitivity`]: the same at chosen times, with derivatives by parameters and start
@@ -17,6 +18,7 @@
 
 pub mod accuracy;
 pub mod block;
+pub mod corner;
 pub mod course;
 pub mod dense;
 pub mod dop853;

@@ -1,16 +1,17 @@
 //! What runs a block: steps of the routes through the kernel, and the queue of those lanes whose
-//! velocity passes zero.
+//! velocity passes zero or that meet a corner.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
-use super::block::{Block, Held};
-use super::general::{Clock, END, Own, Running, STEP, Shared, Stages, Stepping, WHOLE};
+use super::block::{Block, Held, Scratch};
+use super::corner::{self, Corner};
+use super::general::{Clock, Own, Running, STEP, Shared, Stages, Stepping, WHOLE};
 use super::step::{Moving, Rubbing};
 use super::stroboscopic::Strobe;
-use super::ticket::{Progress, Reached, Ticket};
+use super::ticket::{Progress, Reached, Switching, Ticket};
+use crate::lanes::Lane;
 use crate::lanes::sine::{Coarse, Degree, Fine};
-use crate::lanes::{Lane, MAX_WIDTH};
 use crate::model::Equation;
 use crate::model::pendulum::Route;
 use crate::model::rest::{Release, release};
@@ -25,6 +26,7 @@ pub(super) struct Runner<'a, L: Lane, Q: Lane> {
     tokens: (L::Token, Q::Token),
     equation: Equation<Q>,
     single: Equation<f64>,
+    corner: Option<Corner<Q>>,
     length: f64,
 }
 
@@ -33,7 +35,8 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
     pub(super) fn new(strobe: &'a Strobe, tokens: (L::Token, Q::Token)) -> Self {
         let single = strobe.equation.clone();
         let equation = single.map(Q::splat(tokens.1, 0.0));
-        Self { strobe, tokens, equation, single, length: strobe.pendulum.period() }
+        let corner = Corner::new(&single, Q::splat(tokens.1, 0.0));
+        Self { strobe, tokens, equation, single, corner, length: strobe.pendulum.period() }
     }
 
     #[inline(always)]
@@ -172,7 +175,15 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let token = self.tokens.1;
         let scale = self.strobe.schedule.kick;
         let one = Q::splat(token, 1.0);
-        let clock = Shared { forcing: &table.steps()[k], length: Q::splat(token, table.length) };
+        let length = Q::splat(token, table.length);
+        let clock = Shared { forcing: &table.steps()[k], length };
+        let corner = match &self.corner {
+            Some(corner) => {
+                let [begin, end] = time.map(|time| corner.forcing(Q::splat(token, time)));
+                Some((corner, begin, end))
+            }
+            None => None,
+        };
         let mut at = 0;
         while at < block.kick.len() {
             let half_turns = Q::load(token, &block.half_turns[at..]);
@@ -180,9 +191,17 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
             let sense = one.with_sign_of(kick);
             let mut lanes =
                 Running { theta: half_turns.scale(PI), velocity: kick.scale(1.0 / scale) };
+            let begin = lanes;
             let before = lanes.velocity * sense;
             let mut ends = [sense; 2];
-            self.carry(STEP, clock, sense, &mut lanes, &mut ends, stages);
+            let mut side = one;
+            let mut first = None;
+            if let Some((corner, begin, _)) = &corner {
+                let switch = corner.at(begin, lanes.theta, lanes.velocity);
+                side = switch.value.sign();
+                first = Some(switch);
+            }
+            self.carry(STEP, clock, [sense, side], &mut lanes, &mut ends, stages);
             let after = Moving {
                 half_turns: lanes.theta.scale(FRAC_1_PI),
                 kick: lanes.velocity.scale(scale),
@@ -190,15 +209,24 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
             after.half_turns.store(&mut block.half_turns[at..]);
             after.kick.store(&mut block.kick[at..]);
             if self.strobe.events {
-                // The end's acceleration costs a stage: it is asked for only where the begin's is against
-                // the motion and strong enough to stop it within the step.
+                // A velocity that passes zero twice begins against the motion, strongly enough to stop
+                // within the step.
                 let b0 = ends[0] * sense;
                 let reach = b0.scale_add(REACH * table.length, before);
                 let passed = (lanes.velocity * sense).signs();
                 let moving = !(before - before.like(f64::MIN_POSITIVE)).signs();
-                let flags = moving & (passed | (b0.signs() & reach.signs()));
+                let mut flags = moving & (passed | (b0.signs() & reach.signs()));
+                if flags != 0 || first.is_some() {
+                    ends[1] = last_acceleration(begin, lanes, ends[0], table.length);
+                }
+                if let (Some((corner, _, end)), Some(first)) = (&corner, first) {
+                    let last = corner.at(end, lanes.theta, lanes.velocity);
+                    let values = [first.value, last.value];
+                    let rates = [first.rate(ends[0]), last.rate(ends[1])];
+                    flags |= moving & corner::passages(side, values, rates, length);
+                    keep(&mut block.scratch, side, values, rates);
+                }
                 if flags != 0 {
-                    self.carry(END, clock, sense, &mut lanes, &mut ends, stages);
                     let gain = scale * table.length;
                     let ends = [ends[0].scale(gain), ends[1].scale(gain)];
                     let before = Moving { half_turns, kick };
@@ -215,13 +243,13 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         &self,
         part: Range<usize>,
         clock: K,
-        sense: Q,
+        signs: [Q; 2],
         state: &mut Running<Q>,
         ends: &mut [Q; 2],
         stages: &mut Stages<Q>,
     ) {
         let equation = &self.equation;
-        Q::apart(self.tokens.1, Stepping { equation, clock, sense, part, state, ends, stages });
+        Q::apart(self.tokens.1, Stepping { equation, clock, signs, part, state, ends, stages });
     }
 
     #[inline(always)]
@@ -253,13 +281,15 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         while flags != 0 {
             let bit = flags.trailing_zeros() as usize;
             flags &= flags - 1;
-            let [x0, k0, x1, k1, first, last] = block.scratch.each_ref().map(|values| values[bit]);
+            let [x0, k0, x1, k1, first, last, ..] =
+                block.scratch.each_ref().map(|values| values[bit]);
             let sense = 1_f64.copysign(k0);
             let state = [x0 * PI, k0 * scale];
             let whole = Reached {
                 theta: x1 * PI,
                 velocity: k1 * scale,
                 acceleration: [first * gain, last * gain],
+                switching: Switching::of(&block.scratch, bit),
             };
             block.queue.extend(Ticket::known(at + bit, state, sense, time, &whole));
         }
@@ -283,7 +313,21 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 let clock =
                     Own { begin: Q::load(token, &asked[3]), length: Q::load(token, &asked[4]) };
                 let mut ends = [sense; 2];
-                self.carry(WHOLE, clock, sense, &mut lanes, &mut ends, stages);
+                let mut side = sense;
+                let mut early = None;
+                if let Some(corner) = &self.corner {
+                    let begin = corner.forcing(clock.begin);
+                    let switch = corner.at(&begin, lanes.theta, lanes.velocity);
+                    side = switch.side(Q::load(token, &asked[6]));
+                    early = Some(switch);
+                }
+                self.carry(WHOLE, clock, [sense, side], &mut lanes, &mut ends, stages);
+                if let (Some(corner), Some(early)) = (&self.corner, early) {
+                    let end = corner.forcing(clock.begin + clock.length);
+                    let last = corner.at(&end, lanes.theta, lanes.velocity);
+                    let rates = [early.rate(ends[0]), last.rate(ends[1])];
+                    keep(asked, side, [early.value, last.value], rates);
+                }
                 lanes.theta.store(&mut asked[0]);
                 lanes.velocity.store(&mut asked[1]);
                 ends[0].store(&mut asked[2]);
@@ -297,16 +341,18 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
 
     #[inline(never)]
     fn answer(&self, block: &mut Block, first: usize, count: usize) {
+        let holds = self.strobe.friction.then_some(&self.single);
         for i in 0..count {
             let ends = &block.scratch;
             let reached = Reached {
                 theta: ends[0][i],
                 velocity: ends[1][i],
                 acceleration: [ends[2][i], ends[3][i]],
+                switching: Switching::of(ends, i),
             };
             let ticket = &mut block.queue[first + i];
             let lane = ticket.lane;
-            match ticket.take(&reached, &self.single, self.length) {
+            match ticket.take(&reached, holds, self.length) {
                 Progress::Asks => continue,
                 Progress::Arrived { theta, velocity } => {
                     block.half_turns[lane] = theta * FRAC_1_PI;
@@ -326,14 +372,36 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
 }
 
 #[inline(never)]
-fn gather(tickets: &[Ticket], asked: &mut [[f64; MAX_WIDTH]; 6]) {
+fn gather(tickets: &[Ticket], asked: &mut Scratch) {
     for (i, ticket) in tickets.iter().enumerate() {
         asked[0][i] = ticket.theta;
         asked[1][i] = ticket.velocity;
         asked[2][i] = ticket.sense;
         asked[3][i] = ticket.begin;
         asked[4][i] = ticket.length;
+        asked[6][i] = ticket.side;
     }
+}
+
+/// The acceleration at the end of a step, by the cubic that the velocity is with these angles,
+/// velocities and first acceleration: near enough to begin a search for zeros, where a stage would
+/// cost a thirteenth of the step.
+#[inline(always)]
+fn last_acceleration<L: Lane>(begin: Running<L>, end: Running<L>, first: L, length: f64) -> L {
+    let mean = (end.theta - begin.theta).scale(12.0 / length);
+    let both = end.velocity.scale_add(6.0, begin.velocity.scale(6.0));
+    (both - mean).scale_add(1.0 / length, first)
+}
+
+/// Writes the side of a corner, and values and rates of its function at both ends, where
+/// [`Switching::of`] reads them.
+#[inline(always)]
+fn keep<L: Lane>(scratch: &mut Scratch, side: L, values: [L; 2], rates: [L; 2]) {
+    side.store(&mut scratch[6]);
+    values[0].store(&mut scratch[7]);
+    rates[0].store(&mut scratch[8]);
+    values[1].store(&mut scratch[9]);
+    rates[1].store(&mut scratch[10]);
 }
 
 /// The lanes whose velocity, `u` before and `v` after a step in the sense of the motion, has passed

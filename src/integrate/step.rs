@@ -143,7 +143,7 @@ impl<R: Real> Moving<R> {
                 j += 1;
             }
             let forcing = loads.forcing[i].like(half_turns);
-            let point = equation.point(&forcing, at.scale(PI), standing, sense);
+            let point = equation.point_held(&forcing, at.scale(PI), standing, [sense; 2]);
             let load = conservative_load::<Fine, R>(loads.modulation[i], loads.torque[i], at);
             let rest = equation.extra(&forcing, &point) - equation.friction(&point) * sense;
             k[i] = rest.scale_add(loads.factor[i], load);

@@ -162,13 +162,8 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     }
 
     #[inline(always)]
-    fn magnitude(mut self) -> Self {
-        let sign = self.value.like(1.0).with_sign_of(self.value);
-        for slope in &mut self.slope {
-            *slope = *slope * sign;
-        }
-        self.value = self.value.magnitude();
-        self
+    fn sign(self) -> Self {
+        Self { value: self.value.sign(), slope: [self.value.like(0.0); N] }
     }
 
     #[inline(always)]

@@ -2,8 +2,12 @@
 //!
 //! A [`Ticket`] asks for integrations from where its trajectory last was on an analytic piece of the
 //! motion, over lengths of its own; [`super::block`] runs those of many tickets in lanes. From their
-//! ends it finds the first zero of the velocity, to rounding, and what comes after it.
+//! ends it finds the first zero of the velocity, to rounding, and what comes after it; and the first
+//! zero of the switching function of a corner, where only the formula changes. The velocity's zero is
+//! found first, and then whether a corner comes before it.
 
+use super::block::Scratch;
+use super::corner;
 use crate::model::Equation;
 use crate::model::rest::{Release, release};
 
@@ -28,6 +32,12 @@ const LEAST_GUESS: f64 = 1e-6;
 /// may be shorter than rounding can tell.
 const LEAST_SLIP: f64 = 1e-7;
 
+/// Integrations after which corners are no longer looked for: where many crowd they are as good as
+/// none, since the equation is continuous.
+const MOST_CORNERED: u32 = 100;
+/// Integrations that a hollow of the switching function may take.
+const MOST_HOLLOWS: u32 = 6;
+
 /// What a ticket waits for.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
@@ -37,6 +47,30 @@ enum Stage {
     Dip,
     /// A zero of the velocity between the two times.
     Root { low: f64, high: f64, tries: u32 },
+    /// The switching function's least value; where it is positive the piece ends where `stop` says,
+    /// with angle and time of a velocity zero, or as a whole.
+    Hollow { stop: Option<[f64; 2]>, tries: u32 },
+    /// A zero of the switching function between the two times.
+    Corner { low: f64, high: f64, tries: u32 },
+}
+
+/// The switching function of a corner over an integration; all 0 where there is none.
+#[derive(Clone, Copy, Debug)]
+pub struct Switching {
+    /// The side held.
+    side: f64,
+    /// Value and rate at the begin.
+    begin: [f64; 2],
+    /// The same at the end.
+    end: [f64; 2],
+}
+
+impl Switching {
+    /// That of a lane of a bundle.
+    pub(super) fn of(scratch: &Scratch, lane: usize) -> Self {
+        let [side, a, b, c, d] = [6, 7, 8, 9, 10].map(|row: usize| scratch[row][lane]);
+        Self { side, begin: [a, b], end: [c, d] }
+    }
 }
 
 /// The end of an integration, as the lanes return it.
@@ -48,6 +82,8 @@ pub struct Reached {
     pub velocity: f64,
     /// Acceleration at the begin and at the end.
     pub acceleration: [f64; 2],
+    /// The switching function.
+    pub switching: Switching,
 }
 
 /// How a ticket stands after an integration.
@@ -88,6 +124,10 @@ pub struct Ticket {
     pub begin: f64,
     /// The length asked for.
     pub length: f64,
+    /// The side of a corner on the piece; 0 where the first integration tells.
+    pub side: f64,
+    /// Whether the piece begins at a corner.
+    crossed: bool,
     end: f64,
     stage: Stage,
     /// What the whole piece gave.
@@ -110,6 +150,8 @@ impl Ticket {
             sense,
             begin,
             length: end - begin,
+            side: 0.0,
+            crossed: false,
             end,
             stage: Stage::Whole,
             whole: None,
@@ -129,22 +171,36 @@ impl Ticket {
         whole: &Reached,
     ) -> Option<Self> {
         let mut ticket = Self::new(lane, state, sense, begin, end);
+        ticket.side = whole.switching.side;
         matches!(ticket.ended(whole), Progress::Asks).then_some(ticket)
     }
 
-    /// Takes the end of the integration that it asked for.
+    /// Takes the end of the integration that it asked for; `holds` is the equation where friction can
+    /// hold the trajectory.
     #[must_use]
-    pub fn take(&mut self, reached: &Reached, equation: &Equation<f64>, period: f64) -> Progress {
+    pub fn take(
+        &mut self,
+        reached: &Reached,
+        holds: Option<&Equation<f64>>,
+        period: f64,
+    ) -> Progress {
         self.rounds += 1;
         if self.rounds > MOST_ROUNDS || !reached.velocity.is_finite() {
             return Progress::Arrived { theta: f64::NAN, velocity: f64::NAN };
         }
+        self.side = reached.switching.side;
         match self.stage {
             Stage::Whole => self.ended(reached),
             Stage::Dip => self.dipped(reached),
             Stage::Root { low, high, tries } => {
-                self.narrowed(reached, [low, high], tries, equation, period)
+                self.narrowed(reached, [low, high], tries, holds, period)
             }
+            Stage::Hollow { stop, tries } => match (self.hollow(reached, stop, tries), stop) {
+                (Some(progress), _) => progress,
+                (None, Some([theta, tau])) => self.stopped(theta, tau, holds, period),
+                (None, None) => self.arrived(),
+            },
+            Stage::Corner { low, high, tries } => self.cornered(reached, [low, high], tries),
         }
     }
 
@@ -160,6 +216,7 @@ impl Ticket {
         self.whole = Some(*whole);
         let [u0, u1, b0, b1] = self.ends(whole);
         let h = self.length;
+        self.piece = h;
         if u1 < 0.0 {
             self.seek(h);
             return Progress::Asks;
@@ -173,7 +230,15 @@ impl Ticket {
                 return Progress::Asks;
             }
         }
-        Progress::Arrived { theta: whole.theta, velocity: whole.velocity }
+        self.look_for_corner(whole, h, None).unwrap_or_else(|| self.arrived())
+    }
+
+    /// The piece as a whole is right.
+    fn arrived(&self) -> Progress {
+        match self.whole {
+            Some(whole) => Progress::Arrived { theta: whole.theta, velocity: whole.velocity },
+            None => Progress::Arrived { theta: f64::NAN, velocity: f64::NAN },
+        }
     }
 
     /// The least velocity is on the other side of zero, or above it: then the piece goes on.
@@ -184,16 +249,17 @@ impl Ticket {
             self.seek(high);
             return Progress::Asks;
         }
-        match self.whole {
-            Some(whole) => Progress::Arrived { theta: whole.theta, velocity: whole.velocity },
-            None => Progress::Arrived { theta: f64::NAN, velocity: f64::NAN },
-        }
+        let cornered = match self.whole {
+            Some(whole) => self.look_for_corner(&whole, self.piece, None),
+            None => None,
+        };
+        cornered.unwrap_or_else(|| self.arrived())
     }
 
     /// Asks for the state at the first zero of the cubic over a piece of length `h`.
     fn seek(&mut self, h: f64) {
         self.piece = h;
-        self.close = h * (CLOSE * (4.0 * h).powi(4)).clamp(CLOSEST[0], CLOSEST[1]);
+        self.close = closeness(h);
         let guess = self.whole.map_or(0.5, |w| Cubic::new(self.ends(&w), h).zero());
         self.length = guess.clamp(LEAST_GUESS, 1.0) * h;
         self.stage = Stage::Root { low: 0.0, high: h, tries: 0 };
@@ -204,7 +270,7 @@ impl Ticket {
         reached: &Reached,
         [mut low, mut high]: [f64; 2],
         tries: u32,
-        equation: &Equation<f64>,
+        holds: Option<&Equation<f64>>,
         period: f64,
     ) -> Progress {
         let t = self.length;
@@ -230,7 +296,9 @@ impl Ticket {
             };
             let gain = last + step * jerk / 3.0;
             let theta = reached.theta + step * (reached.velocity + 0.5 * step * gain);
-            return self.stopped(theta, self.begin + t + step, equation, period);
+            let tau = self.begin + t + step;
+            let cornered = self.look_for_corner(reached, t, Some([theta, tau]));
+            return cornered.unwrap_or_else(|| self.stopped(theta, tau, holds, period));
         }
         let mut next = t + step;
         if !(next > low && next < high) || tries >= MOST_NEWTON {
@@ -253,11 +321,123 @@ impl Ticket {
         }
     }
 
+    /// Values and rates of the switching function at both ends, on the side of the piece.
+    fn switching(&self, reached: &Reached) -> [f64; 4] {
+        let Switching { side, begin, end } = reached.switching;
+        let [s0, r0] = begin.map(|x| side * x);
+        let [s1, r1] = end.map(|x| side * x);
+        if self.crossed { [0.0, s1, r0.max(0.0), r1] } else { [s0, s1, r0, r1] }
+    }
+
+    /// Asks on if the switching function passes zero in the first `h` of the piece, or may do so.
+    fn look_for_corner(
+        &mut self,
+        reached: &Reached,
+        h: f64,
+        stop: Option<[f64; 2]>,
+    ) -> Option<Progress> {
+        if reached.switching.side == 0.0 || self.rounds > MOST_CORNERED {
+            return None;
+        }
+        let ends = self.switching(reached);
+        let [s0, s1, r0, r1] = ends;
+        if s1 < 0.0 {
+            self.whole = Some(*reached);
+            self.seek_corner(h);
+        } else if s0 + corner::REACH * h * r0 < 0.0 || s1 - corner::REACH * h * r1 < 0.0 {
+            self.length = Cubic::new(ends, h).lowest() * h;
+            self.stage = Stage::Hollow { stop, tries: 0 };
+        } else {
+            return None;
+        }
+        Some(Progress::Asks)
+    }
+
+    /// The switching function's least value is on the other side, or further on, or nothing.
+    fn hollow(
+        &mut self,
+        reached: &Reached,
+        stop: Option<[f64; 2]>,
+        tries: u32,
+    ) -> Option<Progress> {
+        let t = self.length;
+        let [_, s, r0, r] = self.switching(reached);
+        if s < 0.0 {
+            self.whole = Some(*reached);
+            self.seek_corner(t);
+            return Some(Progress::Asks);
+        }
+        let bend = (r - r0) / t;
+        let step = -r / bend;
+        let inside = t + step > 0.0 && t + step < self.piece;
+        if !(bend > 0.0 && inside && s + 0.5 * r * step < 0.0) || tries >= MOST_HOLLOWS {
+            return None;
+        }
+        self.length = t + step;
+        self.stage = Stage::Hollow { stop, tries: tries + 1 };
+        Some(Progress::Asks)
+    }
+
+    /// Asks for the state at the first zero of the switching function over a piece of length `h`.
+    fn seek_corner(&mut self, h: f64) {
+        self.piece = h;
+        self.close = closeness(h);
+        let guess = self.whole.map_or(0.5, |w| Cubic::new(self.switching(&w), h).zero());
+        self.length = guess.clamp(LEAST_GUESS, 1.0) * h;
+        self.stage = Stage::Corner { low: 0.0, high: h, tries: 0 };
+    }
+
+    fn cornered(
+        &mut self,
+        reached: &Reached,
+        [mut low, mut high]: [f64; 2],
+        tries: u32,
+    ) -> Progress {
+        let t = self.length;
+        let [_, s, _, r] = self.switching(reached);
+        if s >= 0.0 {
+            low = t;
+        } else {
+            high = t;
+        }
+        // After a corner the begin is a zero itself, and is divided out.
+        let slope = if self.crossed { r - s / t } else { r };
+        let step = if s == 0.0 { 0.0 } else { -s / slope };
+        if step.abs() <= self.close || high <= self.close {
+            let begin = self.begin + t;
+            if begin >= self.end {
+                return Progress::Arrived { theta: reached.theta, velocity: reached.velocity };
+            }
+            let state = [reached.theta, reached.velocity];
+            let next = Self::new(self.lane, state, self.sense, begin, self.end);
+            *self = Self { rounds: self.rounds, side: -self.side, crossed: true, ..next };
+            return Progress::Asks;
+        }
+        let mut next = t + step;
+        if !(next > low && next < high) || tries >= MOST_NEWTON {
+            next = 0.5 * (low + high);
+        }
+        self.length = next;
+        self.stage = Stage::Corner { low, high, tries: (tries + 1) % (2 * MOST_NEWTON) };
+        Progress::Asks
+    }
+
     /// The velocity is zero at `tau`: what comes next.
-    fn stopped(&mut self, theta: f64, tau: f64, equation: &Equation<f64>, period: f64) -> Progress {
+    fn stopped(
+        &mut self,
+        theta: f64,
+        tau: f64,
+        holds: Option<&Equation<f64>>,
+        period: f64,
+    ) -> Progress {
         let released = self.velocity == 0.0 && tau - self.begin < LEAST_SLIP * period;
         let at = if released { tau + LEAST_SLIP * period } else { tau };
-        let (begin, sense) = match release(equation, at, theta, at + period) {
+        // Where nothing can hold it the motion turns.
+        let next = match holds {
+            Some(equation) => release(equation, at, theta, at + period),
+            None => Release::Now(-self.sense),
+        };
+        let (begin, sense) = match next {
             Release::Now(sense) => (at, sense),
             Release::At(time, sense) => (time, sense),
             Release::Later | Release::Never => (f64::INFINITY, 1.0),
@@ -275,7 +455,13 @@ impl Ticket {
     }
 }
 
-/// The velocity over a piece as a cubic of the time in pieces, from both ends.
+/// The Newton step at which a zero within a piece of length `h` is found.
+fn closeness(h: f64) -> f64 {
+    h * (CLOSE * (4.0 * h).powi(4)).clamp(CLOSEST[0], CLOSEST[1])
+}
+
+/// The velocity over a piece, or a switching function, as a cubic of the time in pieces, from both
+/// ends.
 struct Cubic([f64; 4]);
 
 impl Cubic {

@@ -54,10 +54,10 @@ pub fn first<N: Number>(course: &Course<N>, leap: &mut Leap<N>) -> Turning<N> {
     if leap.surely_keeps_sense() {
         return Turning::None;
     }
-    let curve = forward(&leap.curve(course), leap.sense);
+    let curve = forward(&leap.curve(course), leap.signs[0]);
     let Some(part) = first_below_zero(&curve) else { return Turning::None };
     let shortened =
-        |length: f64| Leap::new(course, leap.tau, leap.start, leap.first(), leap.sense, length);
+        |length: f64| Leap::new(course, leap.tau, leap.start, leap.first(), leap.signs, length);
     let mut length = part * leap.length;
     let mut best = shortened(length);
     for _ in 0..MOST_STEPS {

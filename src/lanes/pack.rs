@@ -147,11 +147,8 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
     }
 
     #[inline(always)]
-    fn magnitude(mut self) -> Self {
-        for a in &mut self.0 {
-            a.value = a.isa.abs_f64s(a.value);
-        }
-        self
+    fn sign(self) -> Self {
+        self.like(1.0).with_sign_of(self)
     }
 
     #[inline(always)]

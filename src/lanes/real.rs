@@ -48,9 +48,9 @@ pub trait Real:
     /// `ln self` of a positive normal number.
     #[must_use]
     fn logarithm(self) -> Self;
-    /// `|self|`.
+    /// 1 or -1, the sign of `self`; no derivative.
     #[must_use]
-    fn magnitude(self) -> Self;
+    fn sign(self) -> Self;
 }
 
 /// Work of several places that is compiled once, apart from all of them.
@@ -148,8 +148,8 @@ macro_rules! scalar_lane {
                 elementary::logarithm(self)
             }
             #[inline(always)]
-            fn magnitude(self) -> Self {
-                $make($get(self).abs())
+            fn sign(self) -> Self {
+                $make(1_f64.copysign($get(self)))
             }
             #[inline(always)]
             fn like(self, value: f64) -> Self {

@@ -38,6 +38,8 @@ pub struct Equation<R> {
     torques: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// Effects with a friction.
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
+    /// The effect with a corner.
+    corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
     plain: bool,
     /// Whether what friction holds changes with the drive, and with the time in the laboratory.
@@ -98,8 +100,22 @@ impl<R: Real> Equation<R> {
         let (mut torques, mut frictions) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
+        let mut corner = None;
+        let probe = Point {
+            theta: zero,
+            velocity: zero,
+            sense: zero,
+            side: zero,
+            sine: zero,
+            vertical: zero,
+            per_gravity: zero,
+            lab: zero,
+        };
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
+            if effect.kind.switch(&parameters, &probe).is_some() {
+                corner = Some((effect.kind, parameters));
+            }
             match effect.kind.definition().action {
                 Action::Position | Action::Velocity | Action::Kinked => {
                     torques.push((effect.kind, parameters));
@@ -130,6 +146,7 @@ impl<R: Real> Equation<R> {
             ages,
             torques,
             frictions,
+            corner,
             sideways,
             plain,
             holds,
@@ -175,9 +192,40 @@ impl<R: Real> Equation<R> {
     /// Where the formulas are evaluated; `sense` is 1 or -1.
     #[inline(always)]
     pub fn point(&self, forcing: &Forcing<R>, theta: R, velocity: R, sense: R) -> Point<R> {
+        let mut at = self.point_held(forcing, theta, velocity, [sense, sense.like(1.0)]);
+        if let Some(switch) = self.switch(&at) {
+            at.side = switch.sign();
+        }
+        at
+    }
+
+    /// The same with both the sense and the side of a corner given, as a step holds them.
+    #[inline(always)]
+    pub fn point_held(
+        &self,
+        forcing: &Forcing<R>,
+        theta: R,
+        velocity: R,
+        [sense, side]: [R; 2],
+    ) -> Point<R> {
         let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
         let Forcing { vertical, per_gravity, lab, .. } = *forcing;
-        Point { theta, velocity, sense, sine, vertical, per_gravity, lab }
+        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab }
+    }
+
+    /// The function at whose zeros an effect has a corner; none where no effect has.
+    #[inline(always)]
+    pub fn switch(&self, at: &Point<R>) -> Option<R> {
+        match &self.corner {
+            Some((kind, parameters)) => kind.switch(parameters, at),
+            None => None,
+        }
+    }
+
+    /// Whether an effect has a corner.
+    #[must_use]
+    pub fn has_corner(&self) -> bool {
+        self.corner.is_some()
     }
 
     /// All torques per inertia but friction.
@@ -277,6 +325,9 @@ impl Equation<f64> {
             ages: self.ages,
             torques: Vec::new(),
             frictions: Vec::new(),
+            corner: self
+                .corner
+                .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),
             sideways: self.sideways,
             plain: self.plain,
             holds: self.holds,

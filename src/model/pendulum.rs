@@ -222,7 +222,7 @@ impl Pendulum {
     pub fn route(&self) -> Route {
         let has = |actions: &[Action]| self.effects.iter().any(|e| e.is(actions));
         let sliding = [Action::SlidingFriction, Action::LoadedFriction];
-        if has(&[Action::Velocity, Action::Kinked]) || has(&sliding) {
+        if has(&[Action::Velocity, Action::Kinked]) || has(&sliding) || self.has_corner() {
             Route::General
         } else if self.has_friction() {
             Route::Friction
@@ -237,10 +237,17 @@ impl Pendulum {
         self.theta_r > 0.0 || self.effects.iter().any(Effect::rubs)
     }
 
-    /// Whether its equation changes where the velocity passes zero.
+    /// Whether its equation changes where the velocity passes zero, or at a corner.
     #[must_use]
     pub fn has_events(&self) -> bool {
-        self.has_friction() || self.effects.iter().any(|e| e.is(&[Action::Kinked]))
+        let kinked = |e: &Effect| e.is(&[Action::Kinked]);
+        self.has_friction() || self.effects.iter().any(kinked) || self.has_corner()
+    }
+
+    /// Whether an effect has a corner besides the velocity's zeros.
+    #[must_use]
+    pub fn has_corner(&self) -> bool {
+        self.equation().has_corner()
     }
 
     /// Whether something of angle and time acts besides gravity, the constant torque and Coulomb

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix2;
 
 use crate::integrate::State;
+use crate::integrate::flow::{Arrival, Flow};
 use crate::integrate::general::{Own, Running, STEP as ALL_STAGES, Stages, Stepping};
 use crate::integrate::tangent::Tangent;
 use crate::lanes::Work;
@@ -43,13 +44,18 @@ struct Turn {
     slope: f64,
 }
 
-/// A state a step of `length` later, turning in the sense `sense`, and the derivative.
+/// A state a step of `length` later, turning in the sense `sense`, and the derivative; by `flow` where
+/// there is one.
 fn carry(
-    equation: &Equation<Number>,
+    (equation, flow): (&Equation<Number>, Option<&Flow>),
     sense: f64,
     start: State,
     length: f64,
 ) -> (State, Matrix2<f64>) {
+    if let Some(flow) = flow {
+        let Arrival { state, derivative: [[a, b], [c, d]], .. } = flow.carry(start, 0.0, length);
+        return (state, Matrix2::new(a, b, c, d));
+    }
     let number = |value: f64, slope: [f64; 2]| Number { value, slope };
     let mut state =
         Running { theta: number(start[0], [1.0, 0.0]), velocity: number(start[1], [0.0, 1.0]) };
@@ -57,7 +63,9 @@ fn carry(
     let sense = number(sense, [0.0; 2]);
     let (state, ends) = (&mut state, &mut [sense; 2]);
     let stages = &mut Stages::new(sense);
-    Stepping { equation, clock, sense, part: ALL_STAGES, state, ends, stages }.run();
+    // Both signs are the sense: what has a corner does not come here.
+    let signs = [sense; 2];
+    Stepping { equation, clock, signs, part: ALL_STAGES, state, ends, stages }.run();
     let Running { theta, velocity } = *state;
     let [a, b, c, d] = [theta.slope[0], theta.slope[1], velocity.slope[0], velocity.slope[1]];
     ([theta.value, velocity.value], Matrix2::new(a, b, c, d))
@@ -70,10 +78,12 @@ fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Opt
     // A tenth of a rad at the most, however fast.
     let length = STEP.min(0.1 / velocity.abs());
     let equation = pendulum.equation().map(Number { value: 0.0, slope: [0.0; 2] });
+    let flow = pendulum.has_corner().then(|| Flow::new(pendulum));
+    let by_step = (&equation, flow.as_ref());
     let (mut state, mut derivative, mut time) = ([0.0, velocity], Matrix2::identity(), 0.0);
     for _ in 0..MOST_STEPS {
         visit(state);
-        let (next, by) = carry(&equation, sense, state, length);
+        let (next, by) = carry(by_step, sense, state, length);
         if next[1] * sense <= 0.0 {
             return None;
         }
@@ -82,7 +92,7 @@ fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Opt
             let mut rest = length * (goal - state[0]) / (next[0] - state[0]);
             let (mut end, mut by) = (next, by);
             for _ in 0..20 {
-                (end, by) = carry(&equation, sense, state, rest);
+                (end, by) = carry(by_step, sense, state, rest);
                 let miss = end[0] - goal;
                 rest -= miss / end[1];
                 if miss.abs() < 1e-15 * TAU {

@@ -5,12 +5,14 @@ use std::sync::atomic::AtomicBool;
 
 use pendmap::attractor::Kind;
 use pendmap::attractor::capture::{Fate, outcomes};
-use pendmap::integrate::State;
+use pendmap::attractor::chaos::sets;
 use pendmap::integrate::trajectory::{Request, simulate};
+use pendmap::integrate::{State, Strobe};
 use pendmap::maps::basins::{BasinMap, Plane};
 use pendmap::maps::label::NEVER;
+use pendmap::model::Pendulum;
 
-use crate::support::{basins_on_plane, chaos_among_others, driven, plane};
+use crate::support::{basins_on_plane, chaos_among_others, driven, path, plane};
 use crate::truths::{model, number, table, truths};
 
 /// The three points of figure 2 and one more with a reference exponent: p, omega and the map.
@@ -20,6 +22,26 @@ fn planes() -> &'static [(f64, f64, BasinMap); 4] {
         [(1.03, 0.87), (1.7, 0.87), (1.5, 1.8), (2.0, 2.0)]
             .map(|(p, omega)| (p, omega, basins_on_plane(&driven(0.1, p, omega), 40)))
     })
+}
+
+/// A torque greater than the friction, and nothing that grows with the velocity.
+fn runaway() -> Pendulum {
+    Pendulum::new(0.0, 0.5, 2.0, 0.0, 1.3).and_then(|p| p.with_friction(0.1)).expect("in range")
+}
+
+#[test]
+fn a_rotation_that_gains_speed_for_ever_is_no_chaos() {
+    let map = basins_on_plane(&runaway(), 8);
+    assert!(map.attractors.is_empty(), "{:?}", map.attractors[0].name);
+    assert!((map.share(0) - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn what_leaves_its_region_is_no_set() {
+    // Where nothing else would have left it out.
+    let strobe = Strobe::new(&runaway(), 60, path());
+    let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
+    assert!(sets(&strobe, &states, &[false; 6], 200, &AtomicBool::new(false)).is_empty());
 }
 
 /// The one chaotic attractor of a plane that has nothing else.

@@ -16,6 +16,7 @@
 mod attractors;
 mod bifurcations;
 mod chaos;
+mod corners;
 mod edges;
 mod effects;
 mod effects_in_lanes;

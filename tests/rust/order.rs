@@ -95,8 +95,8 @@ fn equal_steps(count: usize) -> [f64; 2] {
     let (mut state, mut between) = (start, 0_f64);
     for k in 0..count {
         let tau = k as f64 * length;
-        let first = course.acceleration(tau, state[0], state[1], 1.0);
-        let mut leap = Leap::new(&course, tau, state, first, 1.0, length);
+        let first = course.acceleration(tau, state[0], state[1], [1.0; 2]);
+        let mut leap = Leap::new(&course, tau, state, first, [1.0; 2], length);
         let middle = tau + 0.37 * length;
         between = between.max(distance(leap.curve(&course).at(middle), exact(middle)));
         state = leap.end;

@@ -141,6 +141,8 @@ pub struct Point<R> {
     pub velocity: R,
     /// 1 or -1: the sense of the motion, held over a step even where the velocity passes zero.
     pub sense: R,
+    /// 1 or -1: the sign of the effect's [`Law::switch`], held over a step even where it passes zero.
+    pub side: R,
     /// `sin theta`.
     pub sine: R,
     /// Gravity times `1 + a(t)`, with the pivot's vertical acceleration over gravity `a`.
@@ -178,7 +180,9 @@ impl<R: Real> Point<R> {
     #[inline(always)]
     #[must_use]
     pub fn hidden(&self) -> Self {
-        Self { theta: black_box(self.theta), velocity: black_box(self.velocity), ..*self }
+        // Adding -0 changes no number; what a formula does not use costs nothing.
+        let nothing = self.theta.like(black_box(-0.0));
+        Self { theta: self.theta + nothing, velocity: self.velocity + nothing, ..*self }
     }
 
     /// A constant.
@@ -219,6 +223,15 @@ pub trait Law {
     #[inline(always)]
     fn friction<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         at.constant(0.0)
+    }
+
+    /// A smooth function of state and time at whose zeros a formula of the effect has a corner; none
+    /// where there is no corner. The formulas take its sign from [`Point::side`] and are analytic while
+    /// that is held; they are continuous across it. One effect of a model may have a corner.
+    #[inline(always)]
+    #[must_use]
+    fn switch<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
+        None
     }
 
     /// Changes the pivot's motion.

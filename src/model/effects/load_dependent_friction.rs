@@ -2,7 +2,7 @@
 //!
 //! That is the rod's force over the weight, `|(1 + a) cos th + v^2|` (in SI `v^2/w0^2`), without what
 //! a sideways drive adds. Hanging at rest it is 1, which Coulomb friction has already. Where it
-//! passes zero the friction has a corner that no step is fitted to.
+//! passes zero the friction has a corner: steps end there.
 
 use super::law::{
     Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
@@ -31,7 +31,17 @@ impl Law for LoadDependentFriction {
 
     #[inline(always)]
     fn friction<R: Real>([k, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
-        let load = at.vertical * at.cosine() + at.velocity * at.velocity;
-        *k * (load.magnitude() * at.per_gravity - at.constant(1.0))
+        *k * (load(at) * at.side * at.per_gravity - at.constant(1.0))
     }
+
+    #[inline(always)]
+    fn switch<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> Option<R> {
+        Some(load(at))
+    }
+}
+
+/// What the rod carries over the weight.
+#[inline(always)]
+fn load<R: Real>(at: &Point<R>) -> R {
+    at.vertical * at.cosine() + at.velocity * at.velocity
 }

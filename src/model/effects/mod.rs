@@ -60,6 +60,18 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::switch`].
+            #[inline(always)]
+            pub fn switch<R: Real>(
+                self,
+                parameters: &[R; MOST_PARAMETERS],
+                at: &Point<R>,
+            ) -> Option<R> {
+                match self {
+                    $(Self::$law => $module::$law::switch(parameters, at),)*
+                }
+            }
+
             /// [`Law::drive`].
             pub fn drive<R: Real>(self, parameters: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
                 match self {

@@ -42,10 +42,13 @@ impl Law for PowerLawDrag {
         mappable: Mappable::Yes,
     };
 
+    fn ready<R: Real>([q, n, rest]: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
+        [-q, (n - n.like(1.0)).scale(0.5), rest]
+    }
+
     #[inline(always)]
-    fn torque<R: Real>([q, n, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+    fn torque<R: Real>([minus_q, power, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         let square = at.velocity * at.velocity + at.constant(FLOOR);
-        let power = (*n - at.constant(1.0)).scale(0.5);
-        -(*q * at.velocity * (power * square.logarithm()).exponential())
+        *minus_q * at.velocity * (*power * square.logarithm()).exponential()
     }
 }
