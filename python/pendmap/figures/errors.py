@@ -1,0 +1,63 @@
+"""The error of each simulated period and peak, for every model (figure 7)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.figures import blocks, style
+from pendmap.figures.decays import handles_of
+from pendmap.model.units import Units
+from pendmap.pictures import names
+from pendmap.pictures.methods import drawn, look
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.figure import Figure
+
+    from pendmap.figures.blocks import Box
+    from pendmap.identification import IdentificationReport
+
+__all__ = ["BLOCK"]
+
+PEAK: Final = "measured peak |\N{GREEK SMALL LETTER THETA}| (rad)"
+_SI: Final = Units(si=True)
+
+
+def _height(report: IdentificationReport) -> float:
+    return 3.6 if report.table.errors else 0.9
+
+
+def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str]) -> None:
+    errors = {name: report.table.errors[name] for name in drawn(report.table.errors)}
+    if not errors:
+        room = blocks.named(figure, box, BLOCK.title)
+        blocks.say(figure, room, "No method can be applied, or there are fewer than three peaks.")
+        return
+    room = blocks.named(figure, box, BLOCK.title, *handles_of(list(errors)))
+    left, right = (cell.panel(figure) for cell in room.columns(2, 0.85))
+    for name, each in errors.items():
+        one = look(name)
+        line = {"color": one.colour, "ls": one.dash, "lw": 1.1}
+        left.plot(each.period_time, each.period_error, **line)
+        right.plot(each.peak[1:], each.peak_error[1:], **line)
+    some = next(iter(errors.values()))
+    blocks.signed_log_axis(left, [e.period_error for e in errors.values()], "error (%)")
+    blocks.signed_log_axis(right, [e.peak_error[1:] for e in errors.values()], "error (%)")
+    left.set_title(next(letters) + "of each period")
+    right.set_title(next(letters) + "of each peak; time runs to the left")
+    if some.period_time.size:
+        ends = (float(some.period_time[0]), float(some.period_time[-1]))
+        pad = 0.02 * (ends[1] - ends[0]) or 0.5
+        left.set_xlim(ends[0] - pad, ends[1] + pad)
+        style.scale(left, "x", left.get_xlim(), names.clock(_SI))
+    sizes = some.peak[1:]
+    ends = (max(float(np.min(sizes)), 1e-9) / 1.15, float(np.max(sizes)) * 1.15)
+    blocks.log_axis(right, "x", ends, PEAK)
+
+
+BLOCK: Final = blocks.Block(
+    "errors", "What simulated periods and peaks miss of the measured ones", _height, _draw
+)

@@ -1,0 +1,86 @@
+"""Table 1 of a record as words: what each method finds, and what its simulation misses."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.pictures.methods import look
+
+if TYPE_CHECKING:
+    from pendmap.identification import Estimate, IdentificationReport
+
+__all__ = ["QUANTITIES", "columns", "estimate", "refused", "rows"]
+
+QUANTITIES: Final = (("w0", "w0 (rad/s)"), ("c_over_m", "c/m (1/s)"), ("Tr", "Tr (rad/s\u00b2)"))
+"""What methods find: the name in a report, and that of the column."""
+_DIGITS: Final = 2
+_MANY: Final = 100.0
+
+
+def columns(report: IdentificationReport) -> list[str]:
+    """Return the names of the columns."""
+    errors = [
+        f"period {row.measured:.3g} s" if row.what == "period" else f"peak {row.measured:.3g} rad"
+        for row in report.table.rows
+    ]
+    return ["method", *(said for _, said in QUANTITIES), *errors, "periods, rms", "peaks, rms"]
+
+
+def rows(report: IdentificationReport) -> list[list[str]]:
+    """Return a row for each method that can be applied; errors in percent, absolute."""
+    made = []
+    for name, found in report.methods.items():
+        if not found.applicable:
+            continue
+        cells = [look(name).label]
+        cells += [
+            estimate(found.estimates[key]) if key in found.estimates else "\N{EN DASH}"
+            for key, _ in QUANTITIES
+        ]
+        cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
+        errors = report.table.errors.get(name)
+        cells += ["\N{EN DASH}"] * 2 if errors is None else [
+            _percent(_rms(errors.period_error)), _percent(_rms(errors.peak_error)),
+        ]  # fmt: skip
+        made.append(cells)
+    return made
+
+
+def refused(report: IdentificationReport) -> list[tuple[str, str]]:
+    """Return the methods that cannot be applied, and why."""
+    made = []
+    for name, found in report.methods.items():
+        if not found.applicable:
+            why = found.warnings[-1] if found.warnings else "not applicable"
+            made.append((look(name).label, why))
+    return made
+
+
+def estimate(found: Estimate) -> str:
+    """Return a number with its standard error, as many digits as the error leaves."""
+    value, error = found.value, found.stderr
+    minus = "\N{MINUS SIGN}"
+    if error is None or not math.isfinite(error) or error <= 0:
+        return f"{value:.5g}".replace("-", minus)
+    places = max(_DIGITS - 1 - math.floor(math.log10(error)), 0)
+    text = f"{value:.{places}f} \N{PLUS-MINUS SIGN} {error:.{places}f}"
+    if len(text) > 24:  # noqa: PLR2004 (an error that says nothing)
+        text = f"{value:.6g} \N{PLUS-MINUS SIGN} {error:.2g}"
+    return text.replace("-", minus)
+
+
+def _rms(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else math.nan
+
+
+def _percent(value: float) -> str:
+    """Return three digits, or that the simulation rests by then."""
+    if math.isnan(value):
+        return "rests"
+    return f"{value:.0f}" if value >= _MANY else f"{value:.3g}" if value >= 1e-3 else (  # noqa: PLR2004
+        "0" if value == 0 else f"{value:.0e}"
+    )  # fmt: skip
