@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,7 +22,18 @@ if TYPE_CHECKING:
 
     from pendmap.identification import IdentificationReport
 
-__all__ = ["Block", "Box", "log_axis", "named", "say", "signed_log_axis", "wide_axis"]
+__all__ = [
+    "NOISE",
+    "NOISE_SAID",
+    "Block",
+    "Box",
+    "log_axis",
+    "middle_axis",
+    "named",
+    "say",
+    "signed_log_axis",
+    "wide_axis",
+]
 
 HEADING: Final = 0.30
 """Inches of a heading."""
@@ -31,8 +43,15 @@ TITLE: Final = 0.27
 """Inches that a panel's title takes above it."""
 BELOW: Final = 0.46
 """Inches that ticks and the name of an axis take beneath a panel."""
-MOST_POWERS: Final = 6
-"""Powers of ten that are labelled on one side of an axis."""
+MOSTLY: Final = 95
+"""Percent of the curve nearest to 0 that its straight part holds."""
+NARROW: Final = 5.0
+"""Times its straight part that an axis reaches at most without powers of ten."""
+LINE: Final = 0.16
+"""Inches between labels above one another."""
+NOISE: Final = "#d9d9d9"
+"""What the noise of the readings explains."""
+NOISE_SAID: Final = "95 % of the readings' noise"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,8 +166,18 @@ def wide_axis(axes: Axes, which: str, values: NDArray[np.float64], name: str) ->
     style.scale(axes, which, (low - pad, high + pad), name)
 
 
+def middle_axis(axes: Axes, reach: float, name: str) -> None:
+    """Give a low panel three labels: 0 and a round number on both sides."""
+    axes.set_ylim(-reach, reach)
+    tick = float(f"{0.7 * reach:.1g}")
+    tick = tick if tick < reach else tick / 2
+    minus = "\N{MINUS SIGN}"
+    axes.yaxis.set_ticks([-tick, 0.0, tick], [f"{minus}{tick:g}", "0", f"{tick:g}"])
+    axes.set_ylabel(name, labelpad=2)
+
+
 def log_axis(axes: Axes, which: str, ends: tuple[float, float], name: str) -> None:
-    """Give a side powers of ten between its ends, and more ticks where these are close."""
+    """Give a side a logarithmic scale, with as many labels as have room."""
     set_scale, set_ends, axis = (
         (axes.set_xscale, axes.set_xlim, axes.xaxis)
         if which == "x"
@@ -156,15 +185,37 @@ def log_axis(axes: Axes, which: str, ends: tuple[float, float], name: str) -> No
     )
     set_scale("log")
     set_ends(*ends)
-    first, last = math.ceil(math.log10(ends[0])), math.floor(math.log10(ends[1]))
-    if last - first >= 2:  # noqa: PLR2004 (fewer powers than three say little)
-        every = (last - first) // MOST_POWERS + 1
-        ticks = [10.0**k for k in range(first, last + 1, every)]
-    else:
-        ticks = style.log_ticks(*ends)
+    box = axes.get_window_extent()
+    room = (box.width if which == "x" else box.height) / axes.figure.dpi
+    decade = room / math.log10(ends[1] / ends[0])
+    ticks = next(
+        (some for some in _candidates(*ends) if _fits(some, decade, across=which == "x")), []
+    )
     axis.set_ticks(ticks, [_power(tick) for tick in ticks])
     axis.set_minor_formatter(NullFormatter())
     axes.set_xlabel(name) if which == "x" else axes.set_ylabel(name, labelpad=2)
+
+
+def _candidates(low: float, high: float) -> Iterator[list[float]]:
+    """Sets of round numbers between two ends, the fullest that is wanted first."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    narrow = high < 20 * low
+    for steps in ((1, 2, 3, 5), (1, 2, 5), (1, 3), (1,)) if narrow else ((1, 3), (1,)):
+        ticks = [m * 10.0**k for k in powers for m in steps]
+        yield [tick for tick in ticks if low <= tick <= high]
+    for every in range(2, len(powers) + 1):
+        yield [10.0**k for k in powers if k % every == 0 and low <= 10.0**k <= high]
+
+
+def _fits(ticks: Sequence[float], decade: float, *, across: bool) -> bool:
+    """Whether labels have room, where a power of ten takes ``decade`` inches."""
+    for one, other in itertools.pairwise(ticks):
+        wide = LINE
+        if across:
+            wide = (style.inches(f"{one:g}") + style.inches(f"{other:g}")) / 2 + 0.1
+        if math.log10(other / one) * decade < wide:
+            return False
+    return True
 
 
 def signed_log_axis(
@@ -172,37 +223,42 @@ def signed_log_axis(
 ) -> None:
     """Give the height powers of ten on both sides of 0, straight around it.
 
-    The straight part holds what is smaller than most of the smallest curve.
+    The straight part holds nearly all of the curve that stays nearest to 0: its noise makes no
+    towers there, and what is a thousand times farther off is seen too.
     """
-    sizes = [np.abs(each[np.isfinite(each) & (each != 0)]) for each in values]
-    sizes = [each for each in sizes if each.size]
-    if not sizes:
+    known = [each[np.isfinite(each)] for each in values]
+    known = [each for each in known if np.any(each != 0)]
+    if not known:
         axes.set_ylim(-1, 1)
         style.scale(axes, "y", (-1, 1), name)
         return
-    inner = min(float(np.percentile(each, 50)) for each in sizes)
-    outer = max(float(each.max()) for each in sizes)
-    first = math.floor(math.log10(max(inner, least)))
-    last = max(math.ceil(math.log10(outer * 1.2)), first + 1)
-    axes.set_yscale("symlog", linthresh=10.0**first, linscale=0.7)
-    below = any(np.any(each < 0) for each in values)
-    above = any(np.any(each > 0) for each in values)
-    high = outer * 1.6
-    low_end = max((float(-np.nanmin(each)) for each in values if each.size), default=0.0)
-    high_end = max((float(np.nanmax(each)) for each in values if each.size), default=0.0)
-    down = -max(1.6 * low_end, 10.0**first) if below else -0.3 * 10.0**first
-    up = min(high, max(1.6 * high_end, 10.0**first)) if above else 0.3 * 10.0**first
-    axes.set_ylim(down, up)
+    inner = min(float(np.percentile(np.abs(each), MOSTLY)) for each in known)
+    inner = 10.0 ** math.ceil(math.log10(max(inner, least)) - 0.3)
+    low = min(float(each.min()) for each in known)
+    high = max(float(each.max()) for each in known)
+    axes.axhline(0.0, color=style.QUIET, lw=0.6, zorder=0)
+    if max(-low, high) <= NARROW * inner:
+        wide_axis(axes, "y", np.array([low, high, 0.0]), name)
+        return
+    ends = (min(1.5 * low, -1.2 * inner), max(1.5 * high, 1.2 * inner))
+    axes.set_yscale("symlog", linthresh=inner, linscale=1.0)
+    axes.set_ylim(*ends)
+    outer = max(-ends[0], ends[1])
+    powers = np.arange(round(math.log10(inner)), math.floor(math.log10(outer)) + 1)
+    to_inches = axes.transData
     room = axes.get_window_extent().height / axes.figure.dpi
-    powers = range(first, last + 1)
-    sides = below + above
-    every = max(1, math.ceil(len(powers) * sides * 0.26 / max(room, 0.3)))
-    chosen = [10.0**k for k in powers if (k - first) % every == 0]
-    ticks = [*(-tick for tick in reversed(chosen)), 0.0, *chosen]
-    ticks = [tick for tick in ticks if down <= tick <= up]
+    every = 1
+    while True:
+        sizes = [10.0**k for k in powers[::-1][::every][::-1]]
+        ticks = [*(-size for size in reversed(sizes)), 0.0, *sizes]
+        ticks = [tick for tick in ticks if ends[0] <= tick <= ends[1]]
+        places = to_inches.transform([(axes.get_xlim()[0], tick) for tick in ticks])[:, 1]
+        apart = float(np.diff(places).min()) / axes.figure.dpi if len(ticks) > 1 else room
+        if apart >= LINE or every > powers.size:
+            break
+        every += 1
     axes.yaxis.set_ticks(ticks, [_power(tick) for tick in ticks])
     axes.yaxis.set_minor_locator(NullLocator())
-    axes.axhline(0.0, color=style.QUIET, lw=0.6, zorder=0)
     axes.set_ylabel(name, labelpad=2)
 
 

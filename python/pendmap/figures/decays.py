@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from pendmap.figures import blocks, style
 from pendmap.figures.half_cycles import course_of, first_and_last
@@ -21,6 +22,7 @@ from pendmap.trajectory import simulate
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -32,11 +34,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["BLOCK", "handles_of"]
+__all__ = ["BLOCK", "Z95", "handles_of"]
 
 PEAK: Final = "peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 NEAR: Final = 5
 """Half cycles of the near views."""
+Z95: Final = 1.959963984540054
 SAMPLES: Final = 64
 """Samples of a simulation in a swing."""
 MOST: Final = 6_000
@@ -86,17 +89,17 @@ def _decays(report: IdentificationReport) -> dict[str, Decay]:
     return made
 
 
-def handles_of(methods: list[str]) -> tuple[list[Line2D], list[str]]:
+def handles_of(methods: list[str]) -> tuple[list[Artist], list[str]]:
     """Return the lines of methods for a legend, and what they are called."""
     looks = [look(name) for name in methods]
-    handles = [Line2D([], [], color=one.colour, ls=one.dash, lw=1.6) for one in looks]
+    handles: list[Artist] = [Line2D([], [], color=one.colour, ls=one.dash, lw=1.6) for one in looks]
     return handles, [one.label for one in looks]
 
 
 def _height(report: IdentificationReport) -> float:
     if len(report.peaks.turned) < 3:  # noqa: PLR2004
         return 0.9
-    return 6.0 + (0.0 if report.joint is None else 1.3)
+    return 6.3 + (0.0 if report.joint is None else 1.3)
 
 
 def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str]) -> None:
@@ -107,8 +110,11 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
     decays = _decays(report)
     handles, texts = handles_of(list(decays))
     dot = Line2D([], [], color=MEASURED, ls="none", marker=".", ms=5)
-    room = blocks.named(figure, box, BLOCK.title, [dot, *handles], ["measured", *texts])
-    shares, gap = [1.7, 1.05, 1.5], blocks.BELOW + blocks.TITLE + 0.03
+    handles, texts = [dot, *handles], ["measured", *texts]
+    if np.any(report.peaks.turned.stderr_amplitude > 0):
+        handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
+    room = blocks.named(figure, box, BLOCK.title, handles, texts)
+    shares, gap = [1.7, 1.35, 1.5], blocks.BELOW + blocks.TITLE + 0.03
     gaps = [blocks.TITLE + 0.1, gap]
     if report.joint is not None:
         shares, gaps = [*shares, 0.75], [*gaps, gap]
@@ -168,8 +174,12 @@ def _differences(axes: Axes, turned: Peaks, decays: dict[str, Decay]) -> None:
         curves.append(away[1:])
         one = look(name)
         axes.plot(turned.time[1:], away[1:], color=one.colour, ls=one.dash, lw=1.2)
+    error = Z95 * turned.stderr_amplitude
+    axes.fill_between(turned.time, -error, error, color=blocks.NOISE, lw=0, zorder=0)
     least = float(np.median(turned.stderr_amplitude))
-    blocks.signed_log_axis(axes, curves, "rad", least=least if 0 < least < math.inf else 1e-12)
+    blocks.signed_log_axis(
+        axes, curves, "difference (rad)", least=least if 0 < least < math.inf else 1e-12
+    )
 
 
 def _near(
@@ -214,8 +224,7 @@ def _residuals(axes: Axes, report: IdentificationReport) -> None:
         axes.axhline(side, color=MEASURED, lw=0.8, ls="--")
     known = np.abs(away[np.isfinite(away)])
     top = max(1.4 * float(np.percentile(known, 99.5)), 1.6 * noise) if known.size else noise
-    axes.set_ylim(-top, top)
-    style.scale(axes, "y", (-top, top), "mrad")
+    blocks.middle_axis(axes, top, "mrad")
 
 
 BLOCK: Final = blocks.Block("decay", "The decay by each model", _height, _draw)

@@ -17,8 +17,10 @@ from matplotlib.patches import Patch
 from pendmap.figures import blocks, style
 from pendmap.identification.combined import CUT
 from pendmap.identification.decrement import triplets
+from pendmap.identification.result import Estimate
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.pictures.methods import EVEN, MEASURED, ODD, look
+from pendmap.pictures.table1 import estimate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +38,6 @@ __all__ = ["BLOCK", "Triplets", "triplets_of"]
 
 DELTA: Final = "\N{GREEK SMALL LETTER DELTA}"
 SIZE: Final = "middle peak |\N{GREEK SMALL LETTER THETA}| (rad)"
-BAND: Final = "#d9d9d9"
 Z95: Final = 1.959963984540054
 REACH: Final = 3.0
 """How far the signed panels reach, over the distance of nine tenths of the triplets from 0."""
@@ -70,40 +71,46 @@ def triplets_of(peaks: Peaks, zero: float = 0.0) -> Triplets:
     drops ``p`` and ``q`` and the standard errors ``s_k`` of the peaks.
     """
     turned = peaks.turned
-    size = np.abs(turned.amplitude - zero * 1.0)
+    size = np.abs(turned.amplitude - zero)
     if size.size < 3:  # noqa: PLR2004
         none = np.empty(0)
         return Triplets(none, none, none, np.empty(0, bool))
     delta, _ = triplets(size)
     row = turned.index[2:] - turned.index[:-2] == 2  # noqa: PLR2004
-    error = turned.stderr_amplitude
+    stderr = _stderr(size, turned.stderr_amplitude)
+    falling = (size[:-2] > size[1:-1]) & (size[1:-1] > size[2:])
+    delta = np.where(falling, delta, np.nan)
+    odd = turned.index[:-2] % 2 == 1
+    return Triplets(size[1:-1][row], delta[row], stderr[row], odd[row])
+
+
+def _stderr(size: Floats, error: Floats) -> Floats:
+    """Standard errors of the triplets of absolute peaks with these standard errors."""
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = 1 / (size[:-2] - size[1:-1]), 1 / (size[1:-1] - size[2:])
         parts = (error[:-2] * first, error[1:-1] * (first + second), error[2:] * second)
-    stderr = np.sqrt(sum(part**2 for part in parts)) / math.pi
-    delta = np.where((first > 0) & (second > 0), delta, np.nan)
-    odd = turned.index[:-2] % 2 == 1
-    return Triplets(size[1:-1][row], delta[row], stderr[row], odd[row])
+    return np.asarray(np.sqrt(sum(part**2 for part in parts)) / math.pi)
 
 
 def _height(report: IdentificationReport) -> float:
     return 5.0 if triplets_of(report.peaks).size.size else 0.9
 
 
-def _zero(report: IdentificationReport) -> tuple[float, float | None, str] | None:
-    """Return the zero error, its standard error and the method that found it."""
-    for name, found in report.methods.items():
+def _zero(report: IdentificationReport) -> Estimate | None:
+    """Return the zero error by the first method that knows it."""
+    for found in report.methods.values():
         if found.applicable and "offset" in found.estimates:
-            zero = found.estimates["offset"]
-            return zero.value, zero.stderr, look(name).label
+            return found.estimates["offset"]
     return None
 
 
 def _source(report: IdentificationReport) -> Identification | None:
-    """Return the first method that has a natural frequency and damping."""
-    for found in report.methods.values():
-        if found.applicable and {"w0", "c_over_m"} <= set(found.estimates):
-            return found
+    """Return the first method that knows frequency, damping and zero, or else the first two."""
+    able = [found for found in report.methods.values() if found.applicable]
+    for wanted in ({"w0", "c_over_m", "offset"}, {"w0", "c_over_m"}):
+        for found in able:
+            if wanted <= set(found.estimates):
+                return found
     return None
 
 
@@ -125,40 +132,40 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
         handles.append(Line2D([], [], color=MEASURED, lw=1.0, ls="--"))
         texts.append(f"its {DELTA} = {_delta(source):.3g}")
         if np.any(raw.stderr > 0):
-            handles.append(Patch(color=BAND, lw=0))  # type: ignore[arg-type]
-            texts.append("95 % of the readings' noise")
+            handles.append(Patch(color=blocks.NOISE, lw=0))  # type: ignore[arg-type]
+            texts.append(blocks.NOISE_SAID)
     room = blocks.named(figure, box, BLOCK.title, handles, texts)
-    columns = [("as recorded", raw, 0.0 if zero is None else zero[0])]
+    columns = [("as recorded", raw, 0.0 if zero is None else zero.value)]
     if zero is not None:
-        columns.append((_removed(*zero[:2]), triplets_of(report.peaks, zero[0]), 0.0))
+        columns.append(("zero error removed", triplets_of(report.peaks, zero.value), 0.0))
     cells = room.columns(len(columns), 0.85)
     grid = [cell.rows([1.0, 1.0], [0.14 + blocks.TITLE]) for cell in cells]
     ends = (max(float(raw.size.min()) / 1.25, 1e-9), float(raw.size.max()) * 1.15)
     known = np.concatenate([c[1].delta[np.isfinite(c[1].delta)] for c in columns])
     level = abs(_delta(source)) if source is not None else 0.0
-    for (said, some, shift), (top, low) in zip(columns, grid, strict=True):
+    for k, ((said, some, shift), (top, low)) in enumerate(zip(columns, grid, strict=True)):
         lost = int(np.isnan(some.delta).sum())
         count = f": {lost} of {some.delta.size} have none" if lost else ""
         axes = [top.panel(figure), low.panel(figure)]
-        axes[0].set_title(f"{next(letters)}|{DELTA}|, {said}")
-        axes[1].set_title(f"{next(letters)}{DELTA}{count}")
+        axes[0].set_title(f"{next(letters)}|{DELTA}|, {said}{count}")
+        removed = f", {_removed(zero)} removed" if zero is not None and k else ""
+        axes[1].set_title(f"{next(letters)}{DELTA}{removed}")
         for panel in axes:
             blocks.log_axis(panel, "x", ends, SIZE)
         _log_height(axes[0], known, level)
         _signed_height(axes[1], known, level)
         if source is not None:
             for panel, absolute in zip(axes, (True, False), strict=True):
-                _model(panel, report, source, some, shift, absolute=absolute)
+                _model(panel, report.peaks, source, shift, absolute=absolute)
         for panel, absolute in zip(axes, (True, False), strict=True):
             _points(panel, some, absolute=absolute)
         axes[0].set_xticklabels([])
         axes[0].set_xlabel("")
 
 
-def _removed(value: float, stderr: float | None) -> str:
-    error = "" if stderr is None else f" \N{PLUS-MINUS SIGN} {1e3 * stderr:.1g}"
-    number = f"{1e3 * value:.3g}".replace("-", "\N{MINUS SIGN}")
-    return f"zero error of {number}{error} mrad removed"
+def _removed(zero: Estimate) -> str:
+    error = None if zero.stderr is None else 1e3 * zero.stderr
+    return f"{estimate(Estimate(1e3 * zero.value, error))} mrad"
 
 
 def _delta(found: Identification) -> float:
@@ -205,48 +212,34 @@ def _points(axes: Axes, some: Triplets, *, absolute: bool) -> None:
             )  # fmt: skip
 
 
-def _model(  # noqa: PLR0913 (where, which model, what with)
-    axes: Axes,
-    report: IdentificationReport,
-    source: Identification,
-    some: Triplets,
-    shift: float,
-    *,
-    absolute: bool,
+def _model(
+    axes: Axes, peaks: Peaks, source: Identification, shift: float, *, absolute: bool
 ) -> None:
     """Draw the triplets of the simulated peaks, with their zero error, and the noise about them."""
     level = _delta(source)
     axes.axhline(abs(level) if absolute else level, color=MEASURED, lw=1.0, ls="--", zorder=2)
-    start = first_state(report.peaks)
+    axes.axvline(CUT, color=style.QUIET, lw=0.7, ls=":", zorder=1)
+    turned, start = peaks.turned, first_state(peaks)
     own = source["offset"] if "offset" in source.estimates else 0.0
     begun = dataclasses.replace(start, theta=start.theta - own)
-    last = float(report.peaks.turned.time[-1])
-    _, angles = simulated_peaks(source.rig, begun, last)
+    _, angles = simulated_peaks(source.rig, begun, float(turned.time[-1]))
     size = np.abs(angles + shift)
     if size.size < 3:  # noqa: PLR2004
         return
+    rising = np.argsort(np.abs(turned.amplitude))
+    error = np.interp(size, np.abs(turned.amplitude)[rising], turned.stderr_amplitude[rising])
     delta, _ = triplets(size)
-    first = int(report.peaks.turned.index[0])
-    odd = (np.arange(delta.size) + first) % 2 == 1
-    known = np.isfinite(delta)
+    wide = Z95 * _stderr(size, error)
+    odd = (np.arange(delta.size) + int(turned.index[0])) % 2 == 1
+    seen = np.isfinite(delta) & (size[1:-1] >= axes.get_xlim()[0])
+    floor = axes.get_ylim()[0]
     for parity, colour in ((False, EVEN), (True, ODD)):
-        which = known & (odd == parity) & (size[1:-1] >= axes.get_xlim()[0])
-        x, y = size[1:-1][which], delta[which]
-        axes.plot(x, np.abs(y) if absolute else y, color=colour, lw=1.0, zorder=2.5)
-        near = (some.odd == parity) & np.isfinite(some.stderr) & (some.stderr > 0)
-        if near.sum() < 2 or x.size < 2:  # noqa: PLR2004
-            continue
-        order, rising = np.argsort(some.size[near]), np.argsort(x)
-        at = some.size[near][order]
-        middle = np.interp(at, x[rising], y[rising])
-        wide = Z95 * some.stderr[near][order]
-        if absolute:
-            floor = axes.get_ylim()[0]
-            low, high = np.maximum(np.abs(middle) - wide, floor), np.abs(middle) + wide
-        else:
-            low, high = middle - wide, middle + wide
-        axes.fill_between(at, low, high, color=BAND, alpha=0.6, lw=0, zorder=1)
-    axes.axvline(CUT, color=style.QUIET, lw=0.7, ls=":", zorder=1)
+        which = seen & (odd == parity)
+        x = size[1:-1][which]
+        y = np.abs(delta[which]) if absolute else delta[which]
+        axes.plot(x, y, color=colour, lw=1.0, zorder=2.5)
+        low, high = np.maximum(y - wide[which], floor), y + wide[which]
+        axes.fill_between(x, low, high, color=blocks.NOISE, alpha=0.7, lw=0, zorder=1)
 
 
 BLOCK: Final = blocks.Block(

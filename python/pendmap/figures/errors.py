@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from matplotlib.patches import Patch
 
 from pendmap.figures import blocks, style
-from pendmap.figures.decays import handles_of
+from pendmap.figures.decays import Z95, handles_of
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.pictures.methods import drawn, look
@@ -15,10 +16,11 @@ from pendmap.pictures.methods import drawn, look
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from pendmap.figures.blocks import Box
-    from pendmap.identification import IdentificationReport
+    from pendmap.identification import IdentificationReport, PeakErrors, Peaks
 
 __all__ = ["BLOCK"]
 
@@ -36,14 +38,20 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
         room = blocks.named(figure, box, BLOCK.title)
         blocks.say(figure, room, "No method can be applied, or there are fewer than three peaks.")
         return
-    room = blocks.named(figure, box, BLOCK.title, *handles_of(list(errors)))
+    handles, texts = handles_of(list(errors))
+    if np.any(report.peaks.turned.stderr_amplitude > 0):
+        handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
+    room = blocks.named(figure, box, BLOCK.title, handles, texts)
     left, right = (cell.panel(figure) for cell in room.columns(2, 0.85))
     for name, each in errors.items():
         one = look(name)
-        line = {"color": one.colour, "ls": one.dash, "lw": 1.1}
-        left.plot(each.period_time, each.period_error, **line)
-        right.plot(each.peak[1:], each.peak_error[1:], **line)
+        for axes, x, y in (
+            (left, each.period_time, each.period_error),
+            (right, each.peak[1:], each.peak_error[1:]),
+        ):
+            axes.plot(x, y, color=one.colour, ls=one.dash, lw=1.1)
     some = next(iter(errors.values()))
+    _noise(left, right, report.peaks.turned, some)
     blocks.signed_log_axis(left, [e.period_error for e in errors.values()], "error (%)")
     blocks.signed_log_axis(right, [e.peak_error[1:] for e in errors.values()], "error (%)")
     left.set_title(next(letters) + "of each period")
@@ -56,6 +64,17 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
     sizes = some.peak[1:]
     ends = (max(float(np.min(sizes)), 1e-9) / 1.15, float(np.max(sizes)) * 1.15)
     blocks.log_axis(right, "x", ends, PEAK)
+
+
+def _noise(left: Axes, right: Axes, turned: Peaks, some: PeakErrors) -> None:
+    """Shade what the standard errors of the measured peaks make of both errors, percent."""
+    at = np.searchsorted(turned.time, some.period_time)
+    variance = turned.stderr_time**2
+    error = Z95 * 100 * np.sqrt(variance[at] + variance[at + 2]) / some.period
+    left.fill_between(some.period_time, -error, error, color=blocks.NOISE, lw=0, zorder=0)
+    order = np.argsort(some.peak)
+    error = Z95 * 100 * (turned.stderr_amplitude / some.peak)[order]
+    right.fill_between(some.peak[order], -error, error, color=blocks.NOISE, lw=0, zorder=0)
 
 
 BLOCK: Final = blocks.Block(

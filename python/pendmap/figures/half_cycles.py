@@ -111,7 +111,9 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
     top, low = room.rows(rows, [blocks.BELOW + blocks.TITLE + 0.05])
     _whole(top.panel(figure), course, peaks, next(letters), thin=not run.peaks_only)
     spans = first_and_last(peaks)
-    words = ("the first half cycles", "the last half cycles") if len(spans) > 1 else ("all of them",)
+    words = (
+        ("the first half cycles", "the last half cycles") if len(spans) > 1 else ("all of them",)
+    )
     for cell, span, said in zip(low.columns(len(spans), 0.85), spans, words, strict=True):
         _near(figure, cell, report, course, span, next(letters) + said)
 
@@ -166,8 +168,11 @@ def _time(axes: Axes, time: Floats) -> None:
 
 def _coloured(axes: Axes, time: Floats, values: Floats, half: NDArray[np.int64], lw: float) -> None:
     """Draw a curve, each half cycle in the colour of its parity, the rest grey."""
-    for which, colour in ((half < 0, UNUSED), ((half >= 0) & (half % 2 == 0), EVEN), (
-        (half >= 0) & (half % 2 == 1), ODD)):
+    for which, colour in (
+        (half < 0, UNUSED),
+        ((half >= 0) & (half % 2 == 0), EVEN),
+        ((half >= 0) & (half % 2 == 1), ODD),
+    ):
         # One sample more at the end, so that the pieces meet.
         shown = which | np.concatenate([[False], which[:-1]])
         axes.plot(time, np.where(shown, values, np.nan), color=colour, lw=lw)
@@ -177,9 +182,15 @@ def _peaks(axes: Axes, peaks: Peaks, size: float, *, by_parity: bool = False) ->
     for odd, colour in ((False, EVEN), (True, ODD)):
         which = peaks.odd == odd
         axes.plot(
-            peaks.time[which], peaks.amplitude[which], "o", mfc="white", ms=size, mew=0.6 if
-            size < 3 else 0.9, mec=colour if by_parity else MEASURED, zorder=4,
-        )  # fmt: skip
+            peaks.time[which],
+            peaks.amplitude[which],
+            "o",
+            mfc="white",
+            mec=colour if by_parity else MEASURED,
+            ms=size,
+            mew=0.4 + 0.11 * size,
+            zorder=4,
+        )
 
 
 def _angle(

@@ -37,6 +37,8 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
         max(style.inches(text, FONT) for text in (*name.split("\n"), *(row[k] for row in rows)))
         for k, name in enumerate(split)
     ]
+    refused = table1.refused(report)
+    widths[0] = max([widths[0], *(style.inches(name, FONT) for name, _ in refused)])
     spare = box.width - 0.3 - sum(widths) - APART * (len(widths) - 1)
     # What does not fit by its own size is written smaller.
     shrink = min(1.0, (box.width - 0.3 - APART * (len(widths) - 1)) / sum(widths))
@@ -61,7 +63,7 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
     for line, row in enumerate(rows):
         for k, text in enumerate(row):
             write(k, LINE * (line + 3) - 0.04, text, style.INK)
-    for line, (name, why) in enumerate(table1.refused(report), len(rows)):
+    for line, (name, why) in enumerate(refused, len(rows)):
         down = LINE * (line + 3) - 0.04
         write(0, down, name, style.QUIET)
         x = places[0][0] + widths[0] * shrink + gap
@@ -81,7 +83,7 @@ def _folded(text: str) -> str:
 
 BLOCK: Final = blocks.Block(
     "table",
-    "Damping by each method, and what its simulation misses (percent, absolute)",
+    "Damping by each method, and what its simulation misses (%)",
     _height,
     _draw,
 )
