@@ -25,6 +25,7 @@ _COMMANDS = {
     "basins": "Map the basins of attraction.",
     "look": "Say what a record holds: channels, rate, noise, releases, what is odd about it.",
     "rig": "Write an experiment of a virtual rig, its truth beside it.",
+    "paper": "Draw a figure of the paper, by its number.",
     "plot": "Draw a result again, without computing.",
     "view": "Open a recording in the Rerun viewer.",
 }
