@@ -26,7 +26,7 @@ FIGURES: Final = {
     "5": "The decrement of each three peaks",
     "6": "The decay by each model",
     "7": "The errors of each model",
-    TABLE: "The errors of each model in numbers",
+    TABLE: "Damping by each method, and what its simulation misses (%)",
 }
 """What can be drawn, by the names a user types."""
 _LATER: Final = ("1", "2", "8", "9")
@@ -123,6 +123,8 @@ def table_text(found: IdentificationReport) -> str:
     head, rows = table1.columns(found), table1.rows(found)
     lines = ["Errors of each simulation from the first peak on, percent, and what it simulates"]
     lines += _aligned([head, *rows])
+    if any(table1.RESTS in row for row in rows):
+        lines.append(f"{table1.RESTS}: the simulation stands still by then")
     lines += [f"{name}: {why}" for name, why in table1.refused(found)]
     lines += ["", "The paper's own table, percent"]
     printed = [[name.replace("_", " "), *(f"{x:g}" for x in row)] for name, row in PRINTED.items()]

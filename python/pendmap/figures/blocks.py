@@ -12,6 +12,7 @@ from matplotlib.ticker import NullFormatter, NullLocator
 
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
+from pendmap.pictures import names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +28,7 @@ __all__ = [
     "NOISE_SAID",
     "Block",
     "Box",
+    "angle_axis",
     "log_axis",
     "middle_axis",
     "named",
@@ -45,6 +47,10 @@ BELOW: Final = 0.46
 """Inches that ticks and the name of an axis take beneath a panel."""
 MOSTLY: Final = 95
 """Percent of the curve nearest to 0 that its straight part holds."""
+WIDE: Final = 2.0
+"""Range of angles from which on multiples of pi are its labels, rad."""
+LABEL: Final = 0.42
+"""Inches that a label beside a panel may have."""
 NARROW: Final = 5.0
 """Times its straight part that an axis reaches at most without powers of ten."""
 LINE: Final = 0.16
@@ -105,13 +111,14 @@ class Block:
     height : callable
         Inches that it wants, of a report.
     draw : callable
-        Draws a report into a rectangle of a figure; takes letters for its panels.
+        Draws a report into a rectangle of a figure; takes letters for its panels, and the title
+        or nothing.
     """
 
     name: str
     title: str
     height: Callable[[IdentificationReport], float]
-    draw: Callable[[Figure, Box, IdentificationReport, Iterator[str]], None]
+    draw: Callable[[Figure, Box, IdentificationReport, Iterator[str], str], None]
 
 
 def named(
@@ -127,7 +134,7 @@ def named(
         (box.left + 0.1) / whole[0], (top - 0.13) / whole[1], title, fontsize=10.5, weight="bold",
         va="center",
     )  # fmt: skip
-    used = HEADING
+    used = HEADING if title else 0.08
     if texts:
         # A row each for as many columns as fit.
         widest = max(style.inches(text, style.RC["legend.fontsize"]) for text in texts) + 0.55
@@ -137,7 +144,7 @@ def named(
             list(handles),
             list(texts),
             loc="upper left",
-            bbox_to_anchor=((box.left + 0.1) / whole[0], (top - HEADING) / whole[1]),
+            bbox_to_anchor=((box.left + 0.1) / whole[0], (top - used) / whole[1]),
             ncols=-(-len(texts) // rows),
             borderpad=0.0,
             borderaxespad=0.0,
@@ -164,6 +171,19 @@ def wide_axis(axes: Axes, which: str, values: NDArray[np.float64], name: str) ->
     pad = 0.06 * (high - low) or max(abs(low), 1.0) * 0.05
     (axes.set_xlim if which == "x" else axes.set_ylim)(low - pad, high + pad)
     style.scale(axes, which, (low - pad, high + pad), name)
+
+
+def angle_axis(axes: Axes, values: NDArray[np.float64]) -> None:
+    """Give the height the range of angles (rad): multiples of pi, numbers, or milliradians."""
+    wide_axis(axes, "y", values, names.ANGLE)
+    low, high = axes.get_ylim()
+    if high - low > WIDE:
+        style.scale(axes, "y", (low, high), names.ANGLE, angle=True)
+    elif style.widest(low, high) > LABEL:
+        style.scale(axes, "y", (1e3 * low, 1e3 * high), names.ANGLE.replace("rad", "mrad"))
+        texts = [text.get_text() for text in axes.get_yticklabels()]
+        axes.set_yticks(axes.get_yticks() / 1e3, texts)
+        axes.set_ylim(low, high)
 
 
 def middle_axis(axes: Axes, reach: float, name: str) -> None:

@@ -102,9 +102,11 @@ def _height(report: IdentificationReport) -> float:
     return 6.3 + (0.0 if report.joint is None else 1.3)
 
 
-def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str]) -> None:
+def _draw(
+    figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
+) -> None:
     if len(report.peaks.turned) < 3:  # noqa: PLR2004
-        room = blocks.named(figure, box, BLOCK.title)
+        room = blocks.named(figure, box, title)
         blocks.say(figure, room, "Fewer than three peaks.")
         return
     decays = _decays(report)
@@ -113,7 +115,7 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
     handles, texts = [dot, *handles], ["measured", *texts]
     if np.any(report.peaks.turned.stderr_amplitude > 0):
         handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
-    room = blocks.named(figure, box, BLOCK.title, handles, texts)
+    room = blocks.named(figure, box, title, handles, texts)
     shares, gap = [1.7, 1.35, 1.5], blocks.BELOW + blocks.TITLE + 0.03
     gaps = [blocks.TITLE + 0.1, gap]
     if report.joint is not None:
@@ -193,7 +195,7 @@ def _near(
     inside = (course.time >= span[0]) & (course.time <= span[1])
     every = 1 if only else max(1, int(inside.sum()) // DOTS)
     time, theta = course.time[inside][::every], course.theta[inside][::every]
-    axes.plot(time, theta, ".", color=MEASURED, ms=5.0 if only else 3.0, mew=0, zorder=5)
+    axes.plot(time, theta, ".", color=MEASURED, ms=8.0 if only else 3.0, mew=0, zorder=5)
     values = [theta]
     for name, made in decays.items():
         one = look(name)
@@ -203,9 +205,7 @@ def _near(
     everything = np.concatenate(values)
     # A model that decays too slowly would make the measured swing a line.
     bound = 3.0 * float(np.abs(theta).max()) if theta.size else math.inf
-    blocks.wide_axis(axes, "y", np.clip(everything, -bound, bound), names.ANGLE)
-    low, high = axes.get_ylim()
-    style.scale(axes, "y", (low, high), names.ANGLE, angle=high - low > 2)  # noqa: PLR2004
+    blocks.angle_axis(axes, np.clip(everything, -bound, bound))
     axes.set_xlim(*span)
     style.scale(axes, "x", span, names.clock(_SI))
 

@@ -114,10 +114,12 @@ def _source(report: IdentificationReport) -> Identification | None:
     return None
 
 
-def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str]) -> None:
+def _draw(
+    figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
+) -> None:
     raw, zero, source = triplets_of(report.peaks), _zero(report), _source(report)
     if not raw.size.size:
-        room = blocks.named(figure, box, BLOCK.title)
+        room = blocks.named(figure, box, title)
         blocks.say(figure, room, "Fewer than three peaks in a row.")
         return
     odd, even = (
@@ -131,10 +133,12 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
         texts.append(f"{name}, simulated")
         handles.append(Line2D([], [], color=MEASURED, lw=1.0, ls="--"))
         texts.append(f"its {DELTA} = {_delta(source):.3g}")
+        handles.append(Line2D([], [], color=style.QUIET, lw=1.0, ls=":"))
+        texts.append("12\N{DEGREE SIGN}")
         if np.any(raw.stderr > 0):
             handles.append(Patch(color=blocks.NOISE, lw=0))  # type: ignore[arg-type]
             texts.append(blocks.NOISE_SAID)
-    room = blocks.named(figure, box, BLOCK.title, handles, texts)
+    room = blocks.named(figure, box, title, handles, texts)
     columns = [("as recorded", raw, 0.0 if zero is None else zero.value)]
     if zero is not None:
         columns.append(("zero error removed", triplets_of(report.peaks, zero.value), 0.0))
@@ -243,6 +247,6 @@ def _model(
 
 
 BLOCK: Final = blocks.Block(
-    "decrement", f"The decrement {DELTA} of each three peaks (dotted: 12\N{DEGREE SIGN})", _height,
+    "decrement", f"The decrement {DELTA} of each three peaks", _height,
     _draw,
 )  # fmt: skip

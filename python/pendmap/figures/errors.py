@@ -32,16 +32,18 @@ def _height(report: IdentificationReport) -> float:
     return 3.6 if report.table.errors else 0.9
 
 
-def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str]) -> None:
+def _draw(
+    figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
+) -> None:
     errors = {name: report.table.errors[name] for name in drawn(report.table.errors)}
     if not errors:
-        room = blocks.named(figure, box, BLOCK.title)
+        room = blocks.named(figure, box, title)
         blocks.say(figure, room, "No method can be applied, or there are fewer than three peaks.")
         return
     handles, texts = handles_of(list(errors))
     if np.any(report.peaks.turned.stderr_amplitude > 0):
         handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
-    room = blocks.named(figure, box, BLOCK.title, handles, texts)
+    room = blocks.named(figure, box, title, handles, texts)
     left, right = (cell.panel(figure) for cell in room.columns(2, 0.85))
     for name, each in errors.items():
         one = look(name)

@@ -94,7 +94,9 @@ def _height(report: IdentificationReport) -> float:
     return 2.4 if len(report.peaks) < 3 else 4.6 if report.run.peaks_only else 5.6  # noqa: PLR2004
 
 
-def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str]) -> None:
+def _draw(
+    figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
+) -> None:
     run, peaks = report.run, report.peaks
     odd, even = (Line2D([], [], color=colour, lw=2.0) for colour in (ODD, EVEN))
     turn = Line2D([], [], color=MEASURED, ls="none", marker="o", mfc="white", ms=4.5)
@@ -102,7 +104,7 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
     handles, texts = [even, odd, turn], ["even half cycles", "odd half cycles", "peaks"]
     if peaks.crossing_time.size:
         handles, texts = [*handles, zero], [*texts, "crossings of zero"]
-    room = blocks.named(figure, box, BLOCK.title, handles, texts)
+    room = blocks.named(figure, box, title, handles, texts)
     course = course_of(run, peaks)
     if len(peaks) < 3:  # noqa: PLR2004 (a half cycle on either side)
         _whole(room.panel(figure), course, peaks, next(letters), thin=True)
@@ -152,9 +154,7 @@ def _whole(axes: Axes, course: Course, peaks: Peaks, title: str, *, thin: bool) 
         _coloured(axes, course.time, course.theta, course.half, 0.6)
     _peaks(axes, peaks, 1.6 if thin else 3.0, by_parity=not thin)
     every = np.concatenate([course.theta, course.other_theta])
-    blocks.wide_axis(axes, "y", every, names.ANGLE)
-    low, high = axes.get_ylim()
-    style.scale(axes, "y", (low, high), names.ANGLE, angle=high - low > 2)  # noqa: PLR2004
+    blocks.angle_axis(axes, every)
     _time(axes, np.concatenate([course.time, course.other_time]))
     more = "; grey: not for fitting" if course.other_time.size else ""
     axes.set_title(f"{title}the whole record, {len(peaks)} peaks{more}")
@@ -212,10 +212,7 @@ def _angle(
     axes.plot(
         peaks.crossing_time[cross], np.zeros(int(cross.sum())), "|", color=MEASURED, ms=8, mew=1.2
     )
-    values = np.concatenate([course.theta[near], some.amplitude])
-    blocks.wide_axis(axes, "y", values, names.ANGLE)
-    low, high = axes.get_ylim()
-    style.scale(axes, "y", (low, high), names.ANGLE, angle=high - low > 2)  # noqa: PLR2004
+    blocks.angle_axis(axes, np.concatenate([course.theta[near], some.amplitude]))
 
 
 def _velocity(

@@ -68,6 +68,7 @@ def figure(  # noqa: PLR0913 (all of these may be chosen)
     )  # fmt: skip
     letters = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
     wide = width / len(columns)
+    bare = title is not None and len(chosen) == 1
     for k, column in enumerate(columns):
         # A table's rows stay as high as they are; the panels share what is left.
         fixed = sum(b.height(report) for b in column if b is results_table.BLOCK)
@@ -76,7 +77,13 @@ def figure(  # noqa: PLR0913 (all of these may be chosen)
         top = room
         for block in column:
             high = block.height(report) * (1.0 if block is results_table.BLOCK else stretch)
-            block.draw(made, blocks.Box(k * wide, top - high, wide, high), report, letters)
+            block.draw(
+                made,
+                blocks.Box(k * wide, top - high, wide, high),
+                report,
+                letters,
+                "" if bare else block.title,
+            )
             top -= high + BETWEEN
     return made
 

@@ -146,7 +146,7 @@ def _forces(axes: Axes, font: float) -> None:
         _FORCE,
     )
     axes.text(
-        1.14, 0.38, "drag and dry friction\nc d\u03b8/dt + m Tr sign(d\u03b8/dt)", color=_FORCE,
+        1.14, 0.38, "drag and dry friction\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)", color=_FORCE,
         fontsize=0.82 * font, va="center", linespacing=1.4,
     )  # fmt: skip
 

@@ -25,12 +25,14 @@ FONT: Final = 8.0
 
 def _height(report: IdentificationReport) -> float:
     lines = len(table1.rows(report)) + len(table1.refused(report))
-    return blocks.HEADING + LINE * (lines + 2) + 0.25
+    return blocks.HEADING + LINE * (lines + 3) + 0.25
 
 
-def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str]) -> None:
+def _draw(
+    figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
+) -> None:
     del letters
-    blocks.named(figure, box, BLOCK.title)
+    blocks.named(figure, box, title)
     head, rows = table1.columns(report), table1.rows(report)
     split = [_folded(text) for text in head]
     widths = [
@@ -44,7 +46,7 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
     shrink = min(1.0, (box.width - 0.3 - APART * (len(widths) - 1)) / sum(widths))
     gap = APART + max(spare, 0.0) / (len(widths) - 1)
     whole = figure.get_size_inches()
-    top = box.bottom + box.height - blocks.HEADING - 0.05
+    top = box.bottom + box.height - (blocks.HEADING if title else 0.0) - 0.05
     left, places = box.left + 0.1, []
     for k, width in enumerate(widths):
         # The first column begins, numbers end, at the same place.
@@ -73,6 +75,9 @@ def _draw(figure: Figure, box: Box, report: IdentificationReport, letters: Itera
             x / whole[0], (top - down) / whole[1], why, fontsize=size, va="bottom",
             color=style.QUIET,
         )  # fmt: skip
+    if any(table1.RESTS in row for row in rows):
+        last = LINE * (len(rows) + len(refused) + 3) - 0.04
+        write(0, last, f"{table1.RESTS}: the simulation stands still by then", style.QUIET)
 
 
 def _folded(text: str) -> str:

@@ -12,10 +12,12 @@ from pendmap.pictures.methods import look
 if TYPE_CHECKING:
     from pendmap.identification import Estimate, IdentificationReport, Row
 
-__all__ = ["QUANTITIES", "columns", "estimate", "refused", "rows"]
+__all__ = ["QUANTITIES", "RESTS", "columns", "estimate", "refused", "rows"]
 
 QUANTITIES: Final = (("w0", "w0 (rad/s)"), ("c_over_m", "c/m (1/s)"), ("Tr", "Tr (rad/s\u00b2)"))
 """What methods find: the name in a report, and that of the column."""
+RESTS: Final = "rests"
+"""What stands for an error where a simulation has come to rest before."""
 _DIGITS: Final = 2
 _MANY: Final = 100.0
 
@@ -85,7 +87,7 @@ def _rms(values: np.ndarray) -> float:
 def _percent(value: float) -> str:
     """Return three digits, or that the simulation rests by then."""
     if math.isnan(value):
-        return "rests"
+        return RESTS
     return f"{value:.0f}" if value >= _MANY else f"{value:.3g}" if value >= 1e-3 else (  # noqa: PLR2004
         "0" if value == 0 else f"{value:.0e}"
     )  # fmt: skip
