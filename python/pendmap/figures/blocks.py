@@ -173,14 +173,14 @@ def wide_axis(axes: Axes, which: str, values: NDArray[np.float64], name: str) ->
     style.scale(axes, which, (low - pad, high + pad), name)
 
 
-def angle_axis(axes: Axes, values: NDArray[np.float64]) -> None:
-    """Give the height the range of angles (rad): multiples of pi, numbers, or milliradians."""
-    wide_axis(axes, "y", values, names.ANGLE)
+def angle_axis(axes: Axes, values: NDArray[np.float64], name: str = names.ANGLE) -> None:
+    """Give the height a range in rad: multiples of pi, numbers, or where these are long, mrad."""
+    wide_axis(axes, "y", values, name)
     low, high = axes.get_ylim()
-    if high - low > WIDE:
-        style.scale(axes, "y", (low, high), names.ANGLE, angle=True)
+    if high - low > WIDE and name == names.ANGLE:
+        style.scale(axes, "y", (low, high), name, angle=True)
     elif style.widest(low, high) > LABEL:
-        style.scale(axes, "y", (1e3 * low, 1e3 * high), names.ANGLE.replace("rad", "mrad"))
+        style.scale(axes, "y", (1e3 * low, 1e3 * high), name.replace("(rad", "(mrad"))
         texts = [text.get_text() for text in axes.get_yticklabels()]
         axes.set_yticks(axes.get_yticks() / 1e3, texts)
         axes.set_ylim(low, high)
@@ -192,7 +192,9 @@ def middle_axis(axes: Axes, reach: float, name: str) -> None:
     tick = float(f"{0.7 * reach:.1g}")
     tick = tick if tick < reach else tick / 2
     minus = "\N{MINUS SIGN}"
-    axes.yaxis.set_ticks([-tick, 0.0, tick], [f"{minus}{tick:g}", "0", f"{tick:g}"])
+    apart = axes.get_window_extent().height / axes.figure.dpi * tick / (2 * reach)
+    zero = "0" if apart >= LINE else ""
+    axes.yaxis.set_ticks([-tick, 0.0, tick], [f"{minus}{tick:g}", zero, f"{tick:g}"])
     axes.set_ylabel(name, labelpad=2)
 
 

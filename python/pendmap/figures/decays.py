@@ -172,15 +172,15 @@ def _differences(axes: Axes, turned: Peaks, decays: dict[str, Decay]) -> None:
         simulated = np.full(int(number[-1]) + 1, math.nan)
         count = min(simulated.size, made.peak.size)
         simulated[:count] = np.abs(made.peak[:count])
-        away = simulated[number] - np.abs(turned.amplitude)
+        away = 1e3 * (simulated[number] - np.abs(turned.amplitude))
         curves.append(away[1:])
         one = look(name)
         axes.plot(turned.time[1:], away[1:], color=one.colour, ls=one.dash, lw=1.2)
-    error = Z95 * turned.stderr_amplitude
+    error = 1e3 * Z95 * turned.stderr_amplitude
     axes.fill_between(turned.time, -error, error, color=blocks.NOISE, lw=0, zorder=0)
-    least = float(np.median(turned.stderr_amplitude))
+    least = 1e3 * float(np.median(turned.stderr_amplitude))
     blocks.signed_log_axis(
-        axes, curves, "difference (rad)", least=least if 0 < least < math.inf else 1e-12
+        axes, curves, "difference (mrad)", least=least if 0 < least < math.inf else 1e-12
     )
 
 

@@ -231,7 +231,7 @@ def _velocity(
         speed = _slopes(course, time, SPAN * float(np.median(steps)))
     _coloured(axes, time, speed, half, 1.1)
     axes.axhline(0.0, color=style.QUIET, lw=0.6, zorder=0)
-    blocks.wide_axis(axes, "y", speed, names.speed(_SI))
+    blocks.angle_axis(axes, speed, names.speed(_SI))
 
 
 def _slopes(course: Course, at: Floats, reach: float) -> Floats:
