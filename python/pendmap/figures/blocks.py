@@ -12,7 +12,7 @@ from matplotlib.ticker import NullFormatter, NullLocator
 
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
-from pendmap.pictures import names
+from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -53,6 +53,8 @@ LABEL: Final = 0.42
 """Inches that a label beside a panel may have."""
 NARROW: Final = 5.0
 """Times its straight part that an axis reaches at most without powers of ten."""
+CLOSE: Final = 5.0
+"""Ratio of its ends under which a logarithmic axis has equally spaced labels."""
 LINE: Final = 0.16
 """Inches between labels above one another."""
 NOISE: Final = "#d9d9d9"
@@ -221,6 +223,10 @@ def log_axis(axes: Axes, which: str, ends: tuple[float, float], name: str) -> No
 def _candidates(low: float, high: float) -> Iterator[list[float]]:
     """Sets of round numbers between two ends, the fullest that is wanted first."""
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    if high < CLOSE * low:
+        ticks = [at for at, _ in plane.plain_ticks(low, high) if low <= at <= high]
+        yield ticks
+        yield ticks[::2]
     narrow = high < 20 * low
     for steps in ((1, 2, 3, 5), (1, 2, 5), (1, 3), (1,)) if narrow else ((1, 3), (1,)):
         ticks = [m * 10.0**k for k in powers for m in steps]

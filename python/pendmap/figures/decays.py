@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["BLOCK", "Z95", "handles_of"]
+__all__ = ["BLOCK", "NOTHING", "Z95", "handles_of"]
 
 PEAK: Final = "peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 NEAR: Final = 5
@@ -46,6 +46,8 @@ MOST: Final = 6_000
 """Residuals that are drawn."""
 DOTS: Final = 150
 """Readings of a near view that are drawn."""
+
+NOTHING: Final = "No method can be applied, or there are fewer than three peaks."
 
 _SI: Final = Units(si=True)
 
@@ -79,9 +81,16 @@ def _simulated(rig: Rig, peaks: Peaks, zero: float) -> Decay:
     )
 
 
+def _able(report: IdentificationReport) -> list[str]:
+    """Return the methods whose models are drawn; none where there is too little to compare."""
+    if len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
+        return []
+    return drawn(n for n, m in report.methods.items() if m.applicable and "w0" in m.estimates)
+
+
 def _decays(report: IdentificationReport) -> dict[str, Decay]:
     made = {}
-    for name in drawn(n for n, m in report.methods.items() if m.applicable and "w0" in m.estimates):
+    for name in _able(report):
         found = report.methods[name]
         rig = report.joint.fit.model if name == BEST and report.joint is not None else found.rig
         zero = found["offset"] if "offset" in found.estimates else 0.0
@@ -97,7 +106,7 @@ def handles_of(methods: list[str]) -> tuple[list[Artist], list[str]]:
 
 
 def _height(report: IdentificationReport) -> float:
-    if len(report.peaks.turned) < 3:  # noqa: PLR2004
+    if not _able(report):
         return 0.9
     return 6.3 + (0.0 if report.joint is None else 1.3)
 
@@ -105,11 +114,11 @@ def _height(report: IdentificationReport) -> float:
 def _draw(
     figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
 ) -> None:
-    if len(report.peaks.turned) < 3:  # noqa: PLR2004
-        room = blocks.named(figure, box, title)
-        blocks.say(figure, room, "Fewer than three peaks.")
-        return
     decays = _decays(report)
+    if not decays:
+        room = blocks.named(figure, box, title)
+        blocks.say(figure, room, NOTHING)
+        return
     handles, texts = handles_of(list(decays))
     dot = Line2D([], [], color=MEASURED, ls="none", marker=".", ms=5)
     handles, texts = [dot, *handles], ["measured", *texts]

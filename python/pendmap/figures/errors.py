@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from pendmap.figures import blocks, style
-from pendmap.figures.decays import Z95, handles_of
+from pendmap.figures.decays import NOTHING, Z95, handles_of
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.pictures.methods import drawn, look
@@ -38,7 +38,7 @@ def _draw(
     errors = {name: report.table.errors[name] for name in drawn(report.table.errors)}
     if not errors:
         room = blocks.named(figure, box, title)
-        blocks.say(figure, room, "No method can be applied, or there are fewer than three peaks.")
+        blocks.say(figure, room, NOTHING)
         return
     handles, texts = handles_of(list(errors))
     if np.any(report.peaks.turned.stderr_amplitude > 0):
