@@ -1,10 +1,12 @@
-//! The normal equations, with the initial states of the windows eliminated.
+//! The equations of all windows, with their initial states eliminated.
 //!
-//! Each window adds `J' J` to the parameters' part, and brings a part `D` (2 by 2) for its initial
-//! state and `C` that couples the two: the parameters alone obey
-//! `R = sum J' J - C' D^-1 C`, `g = sum J' r - C' D^-1 d` (the Schur complement).
+//! A window's derivatives by its initial state, by the parameters, and its residuals are columns
+//! `[S J r]` that an orthogonal transformation makes triangular (Householder). The first two rows
+//! then say what the initial state is, the others what the parameters alone obey: their `J~' J~` is
+//! `R = J' J - C' D^-1 C` of the normal equations (the Schur complement, `C = S' J`, `D = S' S`),
+//! without the loss of digits that the difference has where motions are chaotic.
 
-use nalgebra::{DMatrix, DVector, Matrix2, RowDVector, SymmetricEigen, Vector2};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
 use super::linear::{Linear, linearise};
@@ -12,69 +14,62 @@ use super::problem::{Columns, Problem, Shaped};
 use super::window::Window;
 use crate::integrate::State;
 
-/// Directions whose information is this part of the greatest are not determined.
+/// A direction whose information is this part of the greatest is not determined.
 const BLIND: f64 = 1e-13;
+/// The same of an initial state, in the triangle, whose squares are the information.
+const BLIND_STATE: f64 = 1e-11;
+/// Columns of the initial state.
+const STATE: usize = 2;
 
 /// What one window says.
 #[derive(Clone, Debug)]
 struct Block {
     /// The free parameters that it depends on.
     places: Vec<usize>,
-    /// `J' J`.
-    own: DMatrix<f64>,
-    /// `C`: a row for the angle and one for the velocity.
-    coupling: [RowDVector<f64>; 2],
-    /// `D`.
-    initial: Matrix2<f64>,
-    /// `J' r`.
-    pull: DVector<f64>,
-    /// `d`.
-    push: Vector2<f64>,
+    /// The triangle: columns for the initial state, the parameters and the residual.
+    triangle: DMatrix<f64>,
 }
 
 impl Block {
     fn new(linear: &Linear, places: Vec<usize>) -> Self {
         let (count, width) = (places.len(), linear.width);
-        let mut all = vec![0.0; width * width];
-        let mut right = vec![0.0; width];
-        for (row, residual) in linear.rows.chunks_exact(width).zip(&linear.residuals) {
-            for (i, a) in row.iter().enumerate() {
-                right[i] += a * residual;
-                for (sum, b) in all[i * width..].iter_mut().zip(&row[..=i]) {
-                    *sum += a * b;
-                }
+        let counted: Vec<usize> = (0..linear.residuals.len())
+            .filter(|k| linear.row(*k).iter().any(|x| *x != 0.0))
+            .collect();
+        let columns = width + 1;
+        let mut all = DMatrix::zeros(counted.len().max(columns), columns);
+        for (row, k) in counted.into_iter().enumerate() {
+            let slopes = linear.row(k);
+            for of in 0..STATE {
+                all[(row, of)] = slopes[count + of];
             }
+            for (place, slope) in slopes[..count].iter().enumerate() {
+                all[(row, STATE + place)] = *slope;
+            }
+            all[(row, width)] = linear.residuals[k];
         }
-        let at = |i: usize, j: usize| all[i.max(j) * width + i.min(j)];
-        Self {
-            places,
-            own: DMatrix::from_fn(count, count, at),
-            coupling: [0, 1].map(|k| RowDVector::from_fn(count, |_, j| at(count + k, j))),
-            initial: Matrix2::from_fn(|i, j| at(count + i, count + j)),
-            pull: DVector::from_column_slice(&right[..count]),
-            push: Vector2::new(right[count], right[count + 1]),
-        }
+        Self { places, triangle: all.qr().r() }
     }
 
-    /// `D^-1` with the diagonal raised by the part `damping`; 0 in a direction that the window
-    /// says nothing about, as while the pendulum is stuck.
-    fn inverse(&self, damping: f64) -> Matrix2<f64> {
-        let mut raised = self.initial;
-        raised[(0, 0)] *= 1.0 + damping;
-        raised[(1, 1)] *= 1.0 + damping;
-        let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(raised);
-        let limit = BLIND * eigenvalues.max();
-        let mut inverse = Matrix2::zeros();
-        for (value, direction) in eigenvalues.iter().zip(eigenvectors.column_iter()) {
-            if *value > limit {
-                inverse += direction * direction.transpose() / *value;
-            }
+    /// The triangle with every diagonal of the normal equations raised by the part `damping`.
+    fn damped(&self, damping: f64) -> DMatrix<f64> {
+        if damping == 0.0 {
+            return self.triangle.clone();
         }
-        inverse
+        let columns = self.triangle.ncols();
+        let mut all = self.triangle.clone().resize_vertically(2 * columns - 1, 0.0);
+        for k in 0..columns - 1 {
+            all[(columns + k, k)] = damping.sqrt() * self.triangle.column(k).norm();
+        }
+        all.qr().r()
     }
 
-    fn coupling(&self) -> DMatrix<f64> {
-        DMatrix::from_rows(&self.coupling)
+    /// Whether the triangle says nothing about each direction of the initial state, as while the
+    /// pendulum is stuck.
+    fn blind(triangle: &DMatrix<f64>) -> [bool; STATE] {
+        let sizes = [0, 1].map(|k| triangle.column(k).norm());
+        let limit = BLIND_STATE * sizes[0].max(sizes[1]);
+        [0, 1].map(|k| triangle[(k, k)].abs() <= limit)
     }
 }
 
@@ -150,18 +145,19 @@ impl Normal {
         let mut information = DMatrix::zeros(self.count, self.count);
         let mut pull = DVector::zeros(self.count);
         for block in &self.blocks {
-            let coupling = block.coupling();
-            let through = coupling.transpose() * block.inverse(damping);
-            let mut own = block.own.clone();
-            for i in 0..own.nrows() {
-                own[(i, i)] *= 1.0 + damping;
-            }
-            own -= &through * coupling;
-            let right = &block.pull - through * block.push;
-            for (i, a) in block.places.iter().enumerate() {
-                pull[*a] += right[i];
-                for (j, b) in block.places.iter().enumerate() {
-                    information[(*a, *b)] += own[(i, j)];
+            let triangle = block.damped(damping);
+            let count = block.places.len();
+            let blind = Block::blind(&triangle);
+            for (row, line) in triangle.row_iter().enumerate() {
+                if row < STATE && !blind[row] {
+                    continue;
+                }
+                for (i, a) in block.places.iter().enumerate() {
+                    let slope = line[STATE + i];
+                    pull[*a] += slope * line[STATE + count];
+                    for (j, b) in block.places.iter().enumerate() {
+                        information[(*a, *b)] += slope * line[STATE + j];
+                    }
                 }
             }
         }
@@ -180,19 +176,26 @@ impl Normal {
     #[must_use]
     pub fn completed(&self, values: &DVector<f64>, damping: f64) -> Step {
         let mut starts = Vec::with_capacity(self.blocks.len());
-        // 2 x' b - x' A x with the equations as they are without damping.
         let mut gain = 0.0;
         for block in &self.blocks {
-            let own =
-                DVector::from_iterator(block.places.len(), block.places.iter().map(|p| values[*p]));
-            let coupling = block.coupling();
-            let coupled = Vector2::new((coupling.row(0) * &own)[0], (coupling.row(1) * &own)[0]);
-            let start = block.inverse(damping) * (block.push - coupled);
-            gain += 2.0 * (own.dot(&block.pull) + start.dot(&block.push))
-                - own.dot(&(&block.own * &own))
-                - 2.0 * start.dot(&coupled)
-                - start.dot(&(block.initial * start));
-            starts.push([start[0], start[1]]);
+            let triangle = block.damped(damping);
+            let blind = Block::blind(&triangle);
+            let last = triangle.ncols() - 1;
+            // The whole step of this window, the initial state first.
+            let mut step = DVector::zeros(last);
+            for (k, place) in block.places.iter().enumerate() {
+                step[STATE + k] = values[*place];
+            }
+            for k in (0..STATE).rev() {
+                if !blind[k] {
+                    let known: f64 = (k + 1..last).map(|j| triangle[(k, j)] * step[j]).sum();
+                    step[k] = (triangle[(k, last)] - known) / triangle[(k, k)];
+                }
+            }
+            // |r|^2 - |r - A x|^2 with the equations as they are without damping.
+            let moved = block.triangle.columns(0, last) * &step;
+            gain += moved.dot(&(block.triangle.column(last) * 2.0 - &moved));
+            starts.push([step[0], step[1]]);
         }
         Step { values: values.iter().copied().collect(), starts, gain }
     }
@@ -218,6 +221,10 @@ impl Normal {
 #[must_use]
 pub fn pseudo_inverse(matrix: &DMatrix<f64>, held: &[usize]) -> DMatrix<f64> {
     let count = matrix.nrows();
+    if count == 0 {
+        // Nothing is free but the states: a model is compared with a record.
+        return matrix.clone();
+    }
     let scale: Vec<f64> = (0..count)
         .map(|i| {
             let size = matrix[(i, i)];

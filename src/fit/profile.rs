@@ -16,7 +16,7 @@ use super::problem::Problem;
 use crate::error::Error;
 
 /// Steps toward one end.
-const MOST_STEPS: usize = 12;
+const MOST_STEPS: usize = 25;
 /// How near the sum of squares comes to the level, over the level.
 const NEAR: f64 = 0.01;
 

@@ -7,6 +7,8 @@
 use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
 
+use rayon::prelude::*;
+
 use super::descent::{Limit, Point, descend};
 use super::normal::Normal;
 use super::problem::Problem;
@@ -94,6 +96,7 @@ fn widened(
     let rough = Limit { gain: 0.1, part: 1e-3, steps: settings.steps };
     let mut length = settings.shortest.min(most);
     let windows = cut(problem, length, |record, at| guess(&problem.records[record], at));
+    let windows = settled(problem, &problem.start(), windows, cancel)?;
     let mut point = Point::new(problem, problem.start(), windows)?;
     let (mut steps, mut stages) = (0, 0);
     loop {
@@ -101,7 +104,7 @@ fn widened(
         let mut outcome = descend(problem, &mut point, &[], limit, cancel)?;
         (steps, stages) = (steps + outcome.steps, stages + 1);
         for _ in 0..MOST_SPLITS {
-            let Some(split) = split(problem, &point) else { break };
+            let Some(split) = split(problem, &point, cancel)? else { break };
             point = split;
             outcome = descend(problem, &mut point, &[], limit, cancel)?;
             steps += outcome.steps;
@@ -136,7 +139,7 @@ fn states<'a>(problem: &'a Problem, point: &'a Point) -> impl FnMut(usize, usize
 }
 
 /// The point with the windows split whose residuals stand out; none where none does.
-fn split(problem: &Problem, point: &Point) -> Option<Point> {
+fn split(problem: &Problem, point: &Point, cancel: &AtomicBool) -> Result<Option<Point>, Error> {
     let Normal { residuals, .. } = &point.normal;
     let mean = |all: &Vec<f64>| {
         let counted = all.iter().filter(|r| **r != 0.0).count().max(1);
@@ -150,12 +153,34 @@ fn split(problem: &Problem, point: &Point) -> Option<Point> {
     for (window, mean) in point.windows.iter().zip(&means) {
         let parts = if *mean > limit { halves(problem, window) } else { None };
         match parts {
-            Some(parts) => windows.extend(parts),
+            Some(parts) => {
+                windows.extend(settled(problem, &point.values, parts.into(), cancel)?);
+            }
             None => windows.push(*window),
         }
     }
     if windows.len() == point.windows.len() {
-        return None;
+        return Ok(None);
     }
-    Point::new(problem, point.values.clone(), windows).ok()
+    Ok(Point::new(problem, point.values.clone(), windows).ok())
+}
+
+/// The windows with the initial states that fit best at fixed parameters, each by itself: a motion
+/// that goes over the top the wrong way would hold up all others.
+fn settled(
+    problem: &Problem,
+    values: &[f64],
+    windows: Vec<Window>,
+    cancel: &AtomicBool,
+) -> Result<Vec<Window>, Error> {
+    let held: Vec<usize> = (0..values.len()).collect();
+    let limit = Limit { gain: 0.1, part: 1e-3, steps: 10 };
+    let settle = |window: Window| {
+        let Ok(mut point) = Point::new(problem, values.to_vec(), vec![window]) else {
+            return Ok(window);
+        };
+        descend(problem, &mut point, &held, limit, cancel)?;
+        Ok(point.windows[0])
+    };
+    windows.into_par_iter().map(settle).collect()
 }

@@ -5,7 +5,8 @@ use crate::integrate::State;
 
 /// A window needs so many trusted samples to say anything about the parameters.
 const FEWEST: usize = 8;
-/// The initial state comes from a cubic through the readings within this time on either side.
+/// The initial state comes from a cubic through the readings within this time on either side; at an
+/// end of the record, where a cubic's slope is uncertain, from a parabola over twice the time.
 const REACH: f64 = 0.5;
 
 /// A stretch of a record, from sample `from` to before sample `to`.
@@ -69,17 +70,19 @@ pub fn halves(problem: &Problem, window: &Window) -> Option<[Window; 2]> {
     })
 }
 
-/// Angle and velocity at a sample from a cubic through the readings about it, by least squares.
+/// Angle and velocity at a sample from a polynomial through the readings about it, by least squares.
 #[must_use]
 pub fn guess(record: &Record, at: usize) -> State {
     let now = record.times[at];
-    let mut reach = REACH;
+    let ends = [record.times[0], record.times[record.times.len() - 1]];
+    let edge = now - ends[0] < 0.5 * REACH || ends[1] - now < 0.5 * REACH;
+    let (mut reach, degree) = if edge { (2.0 * REACH, 2) } else { (REACH, 3) };
     loop {
         let from = record.times.partition_point(|time| *time < now - reach);
         let to = record.times.partition_point(|time| *time <= now + reach);
         let whole = from == 0 && to == record.times.len();
         if trusted(record, from, to) >= FEWEST || whole {
-            return cubic(record, from, to, now);
+            return polynomial(record, from, to, now, degree);
         }
         reach *= 2.0;
     }
@@ -89,9 +92,9 @@ fn trusted(record: &Record, from: usize, to: usize) -> usize {
     record.weights[from..to].iter().filter(|weight| **weight > 0.0).count()
 }
 
-/// Value and slope at `now` of the cubic through the trusted readings; a line through few.
-fn cubic(record: &Record, from: usize, to: usize, now: f64) -> State {
-    let count = if trusted(record, from, to) >= FEWEST { 4 } else { 2 };
+/// Value and slope at `now` of the polynomial through the trusted readings; a line through few.
+fn polynomial(record: &Record, from: usize, to: usize, now: f64, degree: usize) -> State {
+    let count = if trusted(record, from, to) >= FEWEST { degree + 1 } else { 2 };
     let mut normal = nalgebra::DMatrix::<f64>::zeros(count, count);
     let mut right = nalgebra::DVector::<f64>::zeros(count);
     for k in (from..to).filter(|k| record.weights[*k] > 0.0) {

@@ -54,7 +54,7 @@ TRUE = {
 @pytest.mark.parametrize(("name", "made", "wanted"), ASSUMED)
 def test_a_method_finds_what_it_assumes(name: str, made: object, wanted: dict[str, float]) -> None:
     time, angle = record(made, seconds=30 if made is not WIDE else 85, noise_deg=1e-4)  # type: ignore[arg-type]
-    found = METHODS[name](time, angle)
+    found = METHODS[name].identify(time, angle)
     assert found.method == name
     assert found.applicable, found.warnings
     for key, close in wanted.items():
@@ -200,40 +200,10 @@ def test_a_record_that_begins_in_motion_is_compared_peak_by_peak(begin: int) -> 
     assert np.abs(errors.period_error[:100]).max() < 1
 
 
-def test_an_experiment_gives_its_longest_free_run() -> None:
-    @dataclasses.dataclass(frozen=True)
-    class Run:
-        kind: str
-        hold_out: bool
-        time: np.ndarray
-        theta: np.ndarray
-        trusted: np.ndarray
-
-    @dataclasses.dataclass(frozen=True)
-    class Experiment:
-        runs: tuple[Run, ...]
-
-    def run(seconds: float, kind: str = "free", *, hold_out: bool = False) -> Run:
-        time, angle = record(WIDE, seconds=seconds)
-        return Run(kind, hold_out, time, angle, np.ones(time.size, bool))
-
-    runs = run(10), run(84), run(85, hold_out=True), run(85, "forced")
-    found = identify(Experiment(runs), methods=["combined_repaired"])
-    time, angle = record(WIDE, seconds=84)
-    same = identify(time, angle, methods=["combined_repaired"])
-    assert found["combined_repaired"].estimates == same["combined_repaired"].estimates
-    with pytest.raises(InputError, match="no run is free"):
-        identify(Experiment(runs[2:]))
-    with pytest.raises(InputError, match="'best' is not known: allowed are combined"):
-        identify(time, angle, methods=["best"])
-    with pytest.raises(InputError, match="theta is missing"):
-        identify(time)
-
-
 @pytest.mark.parametrize("name", METHODS)
 def test_a_record_without_a_swing_is_not_applicable(name: str) -> None:
     time = np.arange(300) / 100
-    found = METHODS[name](time, 0.5 * np.exp(-time))
+    found = METHODS[name].identify(time, 0.5 * np.exp(-time))
     assert not found.applicable
     assert found.warnings
     with pytest.raises(InputError, match="swing"):

@@ -176,7 +176,7 @@ def test_a_recorded_pivot_drives(decay: np.ndarray) -> None:
 def test_a_coarse_sensor_is_no_more_trusted_than_its_count(decay: np.ndarray) -> None:
     count = math.tau / 500
     theta = np.round((decay + 0.3 * count) / count) * count
-    reading = reading_of(theta)
+    reading = reading_of(TIME, theta)
     assert reading.coarse
     assert reading.count == pytest.approx(count)
     assert reading.sigma == pytest.approx(count / math.sqrt(12), rel=0.3)
@@ -189,7 +189,7 @@ def test_a_coarse_sensor_is_no_more_trusted_than_its_count(decay: np.ndarray) ->
 
 @pytest.mark.parametrize("sigma", [1e-4, 1e-3, 1e-2])
 def test_the_noise_is_seen_without_a_model(decay: np.ndarray, sigma: float) -> None:
-    assert reading_of(noisy(decay, sigma, 6)).sigma == pytest.approx(sigma, rel=0.08)
+    assert reading_of(TIME, noisy(decay, sigma, 6)).sigma == pytest.approx(sigma, rel=0.08)
 
 
 def test_half_swings_give_a_start(decay: np.ndarray) -> None:

@@ -15,10 +15,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import decays
 import motions
+import pendmap
 import synthetic
 from pendmap import palette, viewer
-from pendmap.viewer import window
+from pendmap.identification import identify_experiment
+from pendmap.viewer import decay, window
 from recordings import ReadBack
 
 if TYPE_CHECKING:
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
+
+Colour = tuple[int, int, int]
 
 DRIVERS = list(Path("/usr/share/vulkan/icd.d").glob("*.json"))
 
@@ -65,14 +70,9 @@ def headless(folder: Path) -> Iterator[Any]:
         process.wait(timeout=20)
 
 
-@pytest.mark.viewer
-@pytest.mark.skipif(not DRIVERS, reason="no Vulkan driver")
-@pytest.mark.parametrize("which", PICTURES)
-def test_the_viewers_own_picture(tmp_path: Path, which: str) -> None:
-    make, cursor = PICTURES[which]
-    dataset = make()
-    file = viewer.record(dataset, tmp_path / "a.rrd")
-    with headless(tmp_path) as client:
+def shares_of_colours(file: Path, folder: Path, cursor: float | None) -> dict[Colour, float]:
+    """Let the viewer draw a recording, all of its views without complaint."""
+    with headless(folder) as client:
         client.open(str(file))
         if cursor is not None:
             client.set_time("sim_time", duration=cursor, play_state="paused")
@@ -82,7 +82,30 @@ def test_the_viewers_own_picture(tmp_path: Path, which: str) -> None:
     assert {view.origin for view in state.views} == set(ReadBack(file).views)
     assert [view.reports for view in state.views if view.reports] == []
     colours, counts = np.unique(np.asarray(picture).reshape(-1, 3), axis=0, return_counts=True)
-    shares = {tuple(c.tolist()): n / counts.sum() for c, n in zip(colours, counts, strict=True)}
+    return {tuple(c.tolist()): n / counts.sum() for c, n in zip(colours, counts, strict=True)}
+
+
+@pytest.mark.viewer
+@pytest.mark.skipif(not DRIVERS, reason="no Vulkan driver")
+def test_the_viewers_own_picture_of_an_identification(tmp_path: Path) -> None:
+    read = decays.record(decays.decay(release=2.0), seconds=20.0, rate=50.0)
+    content = "\n".join(["t_s,theta_rad", *(f"{t},{x}" for t, x in zip(*read, strict=True))])
+    record = tmp_path / "a.csv"
+    record.write_text(content + "\n")
+    report = identify_experiment(pendmap.read_experiment(record))
+    file = viewer.record_identification(report, tmp_path / "a.rrd")
+    shares = shares_of_colours(file, tmp_path, 5.0)
+    for series in (decay.RECORD, decay.MODEL, decay.PEAKS, decay.RESIDUAL):
+        assert shares.get(series.colour, 0.0) > 2e-4, series.name
+
+
+@pytest.mark.viewer
+@pytest.mark.skipif(not DRIVERS, reason="no Vulkan driver")
+@pytest.mark.parametrize("which", PICTURES)
+def test_the_viewers_own_picture(tmp_path: Path, which: str) -> None:
+    make, cursor = PICTURES[which]
+    file = viewer.record(make(), tmp_path / "a.rrd")
+    shares = shares_of_colours(file, tmp_path, cursor)
     if which == "labels":
         map_share = 0.25
         for name, share in (("oscillation 2:0", 0.83), ("rotation 1:+1", 0.08)):

@@ -1,202 +1,17 @@
-//! Fits: derivatives against finite differences, the eliminated equations against the whole ones,
-//! parameters found again.
+//! Fits: the eliminated equations against the whole ones, parameters found again, intervals.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector};
 use pendmap::fit::descent::{Limit, Point, descend};
-use pendmap::fit::linear::{Linear, linearise};
 use pendmap::fit::normal::Normal;
 use pendmap::fit::profile::intervals;
 use pendmap::fit::window::{Window, cut};
 use pendmap::fit::{Free, Problem, Record, Settings, Slot, fit};
-use pendmap::integrate::State;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::event::EventKind;
-use pendmap::integrate::sample::sample;
-use pendmap::model::recorded::{Quantity, Samples};
-use pendmap::model::{Effect, Kind, Observation, Pendulum, Recorded};
+use pendmap::model::Kind;
 
+use crate::fit_records::{TOLERANCE, everything, free, line, record, with};
 use crate::support::{driven, undriven};
-
-const TOLERANCE: f64 = 1e-13;
-
-fn every(interval: f64, until: f64) -> Vec<f64> {
-    (0..=(until / interval) as usize).map(|k| k as f64 * interval).collect()
-}
-
-fn with(pendulum: Pendulum, effects: &[(Kind, &[f64])]) -> Pendulum {
-    effects.iter().fold(pendulum, |pendulum, (kind, values)| {
-        pendulum.with_effect(Effect::new(*kind, values).expect("in range")).expect("once")
-    })
-}
-
-/// A record of `pendulum` without noise.
-fn record(pendulum: Pendulum, recorded: Option<Arc<Recorded>>, start: State, until: f64) -> Record {
-    let times = every(0.06, until);
-    let mut course = Course::new(&pendulum, true, 1e-14, |_, value| value);
-    if let Some(recorded) = &recorded {
-        course = course.driven_by(Arc::clone(recorded));
-    }
-    let states = sample(&course, 0.0, start, &times, |_, _| true).states;
-    let sensor = Observation::lift(&pendulum, |_, value| value);
-    let readings = states.iter().map(|state| sensor.read(state[0])).collect();
-    let weights = vec![1.0; times.len()];
-    Record { pendulum, recorded, times, readings, weights, longest: f64::INFINITY }
-}
-
-/// The same parameters free in all records.
-fn free(slots: &[Slot], records: usize, start: &[f64]) -> Vec<Free> {
-    let all = |slot: &Slot| (0..records).map(|record| (record, *slot)).collect();
-    slots.iter().zip(start).map(|(slot, start)| Free { places: all(slot), start: *start }).collect()
-}
-
-/// Gravity, then all parameters of the pendulum, and their values.
-fn everything(pendulum: &Pendulum) -> (Vec<Slot>, Vec<f64>) {
-    let parameters = pendulum.parameters();
-    let slots = (0..parameters.len()).map(Slot::Parameter);
-    let values = parameters.iter().map(|(_, value)| *value);
-    (
-        std::iter::once(Slot::Gravity).chain(slots).collect(),
-        std::iter::once(1.0).chain(values).collect(),
-    )
-}
-
-fn line(problem: &Problem, values: &[f64], window: &Window) -> Linear {
-    let shaped = problem.shaped(window.record, values).expect("in range");
-    linearise(problem, &shaped, &problem.columns(window.record), window)
-}
-
-/// The largest difference of the rows from finite differences, over the size of the column or 1.
-fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
-    let (slots, own) = everything(&record.pendulum);
-    let values = values.unwrap_or(own);
-    let count = record.times.len();
-    let problem =
-        Problem::new(vec![record], free(&slots, 1, &values), TOLERANCE).expect("a problem");
-    let window = Window { record: 0, from: 0, to: count, start };
-    let found = line(&problem, &values, &window);
-    let columns = problem.columns(0);
-    let places: Vec<usize> = columns.places().collect();
-    let mut worst = 0_f64;
-    for column in 0..found.width {
-        let residuals = |h: f64| {
-            let (mut values, mut window) = (values.clone(), window);
-            match places.get(column) {
-                Some(place) => values[*place] += h,
-                None => window.start[column - places.len()] += h,
-            }
-            line(&problem, &values, &window).residuals
-        };
-        let [a, b, c, d] = [2e-5, -2e-5, 1e-5, -1e-5].map(residuals);
-        let size = (0..count).map(|k| found.row(k)[column].abs()).fold(1.0, f64::max);
-        for k in 0..count {
-            let (coarse, fine) = ((b[k] - a[k]) / 4e-5, (d[k] - c[k]) / 2e-5);
-            let expected = (4.0 * fine - coarse) / 3.0;
-            worst = worst.max((found.row(k)[column] - expected).abs() / size);
-        }
-    }
-    worst
-}
-
-#[test]
-fn derivatives_hold_for_a_decay_to_rest() {
-    let pendulum = with(
-        undriven(0.02, 0.003).with_friction(0.05).expect("in range"),
-        &[
-            (Kind::EncoderOffset, &[0.01]),
-            (Kind::EncoderGain, &[0.02]),
-            (Kind::EncoderEccentricity, &[0.03, 0.4]),
-            (Kind::LoadDependentFriction, &[0.01]),
-            (Kind::QuadraticDrag, &[0.004]),
-        ],
-    );
-    let start = [2.0, -0.1];
-    let record = record(pendulum, None, start, 90.0);
-    let last = record.readings.len() - 1;
-    assert!((record.readings[last] - record.readings[last - 50]).abs() < 1e-12, "at rest");
-    let mut values = everything(&record.pendulum).1;
-    let error = worst(record.clone(), None, start);
-    assert!(error < 1e-6, "{error:e}");
-    // Away from its own frequency too.
-    values[0] = 1.21;
-    let error = worst(record, Some(values), start);
-    assert!(error < 1e-6, "{error:e}");
-}
-
-#[test]
-fn derivatives_hold_for_forced_motion_with_sticks() {
-    let pendulum = with(
-        driven(0.1, 1.5, 0.87).with_friction(0.2).expect("in range"),
-        &[(Kind::DriveFrequency, &[0.01]), (Kind::EncoderGain, &[0.01])],
-    );
-    let start = [-0.43, 1.03];
-    let error = worst(record(pendulum, None, start, 15.0), None, start);
-    assert!(error < 1e-6, "{error:e}");
-}
-
-fn shaken() -> Arc<Recorded> {
-    let times = every(0.05, 40.0);
-    let up: Vec<f64> = times.iter().map(|t| 0.9 * (1.3 * t).cos()).collect();
-    let side: Vec<f64> = times.iter().map(|t| 0.5 * (0.8 * t).sin()).collect();
-    let samples = |values| Some(Samples { quantity: Quantity::Acceleration, values });
-    Arc::new(Recorded::new(&times, samples(&up), samples(&side)).expect("samples"))
-}
-
-#[test]
-fn derivatives_hold_under_a_recorded_motion() {
-    let pendulum = undriven(0.1, 0.0).with_friction(0.3).expect("in range");
-    let start = [1.0, 0.4];
-    let error = worst(record(pendulum, Some(shaken()), start, 20.0), None, start);
-    assert!(error < 1e-6, "{error:e}");
-}
-
-#[test]
-fn derivatives_hold_where_friction_is_negative() {
-    // What is missing in a model may ask for that.
-    let mut pendulum = with(undriven(0.05, 0.0), &[(Kind::QuadraticDrag, &[0.1])]);
-    pendulum.set_parameter(1, -0.01);
-    let start = [1.5, 0.0];
-    let record = record(pendulum.clone(), None, [1.5, -0.2], 30.0);
-    let turns = {
-        let course = Course::new(&pendulum, true, TOLERANCE, |_, value| value);
-        sample(&course, 0.0, start, &[30.0], |_, _| true).events
-    };
-    assert!(turns.len() > 8 && turns.iter().all(|event| event.kind == EventKind::Turn));
-    let error = worst(record, None, [1.5, -0.2]);
-    assert!(error < 1e-6, "{error:e}");
-}
-
-/// Gravity `s` in a fixed unit of time is another unit of time.
-#[test]
-fn gravity_is_the_square_of_the_frequency() {
-    let pendulum = with(
-        driven(0.1, 1.5, 0.87).with_friction(0.2).expect("in range"),
-        &[(Kind::LoadDependentFriction, &[0.05]), (Kind::QuadraticDrag, &[0.02])],
-    );
-    let gravity = 1.3_f64;
-    let ratio = gravity.sqrt();
-    let mut slow = pendulum.clone();
-    // In units of the reference: rates times w0 / w_ref, torques times its square.
-    slow.gamma *= ratio;
-    slow.theta_r *= gravity;
-    slow.drive.omega *= ratio;
-    slow.effects[0].parameters[0] *= gravity;
-    let times = every(0.5, 30.0);
-    let run = |pendulum: &Pendulum, gravity: f64, start: State, times: &[f64]| {
-        let course = Course::new(pendulum, true, 1e-14, |_, value| value).with_gravity(gravity);
-        sample(&course, 0.0, start, times, |_, _| true)
-    };
-    let own = run(&pendulum, 1.0, [-0.43, 1.03], &times);
-    assert!(own.events.iter().any(|event| event.kind == EventKind::Release));
-    let scaled: Vec<f64> = times.iter().map(|time| time / ratio).collect();
-    let other = run(&slow, gravity, [-0.43, 1.03 * ratio], &scaled);
-    for (a, b) in own.states.iter().zip(&other.states) {
-        assert!((a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1] / ratio).abs() < 1e-9, "{a:?} {b:?}");
-    }
-    assert_eq!(own.events.len(), other.events.len());
-}
 
 fn noise(k: usize) -> f64 {
     // Not random, but like nothing in the model.
@@ -287,6 +102,35 @@ fn initial_states_are_eliminated_exactly() {
             let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
             assert!((own[(i, j)] - covariance[(i, j)]).abs() < 1e-7 * size);
         }
+    }
+}
+
+#[test]
+fn chaotic_motion_takes_no_digits_from_the_covariance() {
+    // The state's part of the information is 1e10 times what is left of the parameters' part.
+    let pendulum = driven(0.05, 1.7, 0.87).with_friction(0.02).expect("in range");
+    let start = [1.0, 0.4];
+    let record = record(pendulum, None, start, 45.0);
+    let (slots, values) = everything(&record.pendulum);
+    let count = record.times.len();
+    let problem =
+        Problem::new(vec![record], free(&slots, 1, &values), TOLERANCE).expect("a problem");
+    let window = Window { record: 0, from: 0, to: count, start };
+    let linear = line(&problem, &values, &window);
+    let matrix = DMatrix::from_row_slice(count, linear.width, &linear.rows);
+    let growth = matrix.column(values.len()).amax();
+    assert!(growth > 100.0, "{growth}");
+    let scale = DVector::from_iterator(linear.width, matrix.column_iter().map(|c| c.norm()));
+    let scaled = DMatrix::from_fn(count, linear.width, |i, j| matrix[(i, j)] / scale[j]);
+    let whole = scaled.svd(false, true);
+    let right = whole.v_t.expect("asked for");
+    let own = Normal::at(&problem, &values, &[window]).expect("equations").covariance();
+    for k in 0..values.len() {
+        let sum: f64 = (0..linear.width)
+            .map(|j| (right[(j, k)] / whole.singular_values[j] / scale[k]).powi(2))
+            .sum();
+        let ratio = own[(k, k)] / sum;
+        assert!((ratio - 1.0).abs() < 1e-5, "{k}: {ratio}");
     }
 }
 

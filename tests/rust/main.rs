@@ -5,7 +5,7 @@
 //! - [`stick_slip`], [`free_decay`], [`edges`]: friction, event by event, and where rounding could decide
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`effects`]: the library, each effect in every respect
-//! - [`fit`]: parameters from records
+//! - [`fit`], [`fit_derivatives`]: parameters from records
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
@@ -22,6 +22,8 @@ mod effects_in_lanes;
 mod elementary;
 mod exact;
 mod fit;
+mod fit_derivatives;
+mod fit_records;
 mod free_decay;
 mod friction;
 mod input;

@@ -46,7 +46,7 @@ _DEFAULT = 1000
     "--seed", type=Whole(0, MOST_SEED), default=0, help="Shifts the samples.  [default: 0]"
 )
 @progress_options
-@output_options
+@output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Map the basins of attraction over initial angle and velocity.
 

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     Command = Callable[..., Any]
+    Decorator = Callable[[Command], Command]
 
-__all__ = ["Outputs", "output_options", "progress_options"]
+__all__ = ["RESULTS", "Outputs", "output_options", "progress_options"]
 
 
 def progress_options(function: Command) -> Command:
@@ -29,21 +30,34 @@ def progress_options(function: Command) -> Command:
     return threads(quiet(function))
 
 
-def output_options(function: Command) -> Command:
-    """Add --json, --out, --plot, --rerun and --view."""
-    for option in (
-        click.option(
-            "--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files."
-        ),
-        click.option("--view", is_flag=True, help="Write the recording and open the viewer on it."),
-        click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd."),
-        click.option(
-            "--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf."
-        ),
-        click.option("--out", type=OutputFile([".nc", ".zarr"]), help="Result: .nc or .zarr."),
-    ):
-        function = option(function)
-    return function
+RESULTS = (".nc", ".zarr")
+"""The kinds of file that a dataset is written to."""
+
+
+def output_options(suffixes: tuple[str, ...] = RESULTS, what: str = "Result") -> Decorator:
+    """Add --json, --out with these suffixes, --plot, --rerun and --view."""
+    kinds = " or ".join(suffixes)
+    pictures = OutputFile([".png", ".svg", ".pdf"])
+
+    def add(function: Command) -> Command:
+        for option in (
+            click.option(
+                "--json",
+                "as_json",
+                is_flag=True,
+                help="One JSON object on stdout; alone, no files.",
+            ),
+            click.option(
+                "--view", is_flag=True, help="Write the recording and open the viewer on it."
+            ),
+            click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd."),
+            click.option("--plot", type=pictures, help="Figure: .png .svg .pdf."),
+            click.option("--out", type=OutputFile(suffixes), help=f"{what}: {kinds}."),
+        ):
+            function = option(function)
+        return function
+
+    return add
 
 
 def _can_view() -> None:
@@ -68,7 +82,7 @@ class Outputs:
     quiet: bool
 
     @classmethod
-    def take(cls, given: dict[str, Any], name: str) -> Outputs:
+    def take(cls, given: dict[str, Any], name: str, suffix: str = RESULTS[0]) -> Outputs:
         """Take the output options out of ``given``; with none, three files ``name.*``."""
         fields = {field.name: given.pop(field.name) for field in dataclasses.fields(cls)}
         outputs = cls(**fields)
@@ -76,7 +90,7 @@ class Outputs:
         if not any(asked):
             outputs = dataclasses.replace(
                 outputs,
-                out=OutputFile([".nc"]).convert(f"{name}.nc", None, None),
+                out=OutputFile([suffix]).convert(f"{name}{suffix}", None, None),
                 plot=OutputFile([".png"]).convert(f"{name}.png", None, None),
                 rerun=OutputFile([".rrd"]).convert(f"{name}.rrd", None, None),
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import math
 from typing import TYPE_CHECKING, Any
@@ -12,14 +13,16 @@ import click
 from pendmap.files import held_interrupts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
 
     import xarray as xr
 
     from pendmap.cli.options import Outputs
 
-__all__ = ["plain", "progress_bar", "show"]
+WIDEST = 1000
+
+__all__ = ["open_viewer", "plain", "progress_bar", "show", "write_all", "write_table"]
 
 
 @contextlib.contextmanager
@@ -47,17 +50,9 @@ def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], Non
 
 
 def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], Any]) -> None:
-    """Write the files asked for, then JSON or the summary to stdout.
-
-    An interrupt takes effect between two files and names those that are complete.
-    """
-    written: list[str] = []
-    try:
-        for write, path in _files(outputs):
-            with held_interrupts():
-                written.append(str(write(dataset, path)))
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(*written) from None
+    """Write the files asked for, then JSON or the summary to stdout."""
+    files = ((functools.partial(write, dataset), path) for write, path in _files(outputs))
+    written = write_all(files)
     if outputs.as_json:
         click.echo(json.dumps(plain(as_json(dataset)), allow_nan=False))
     elif not outputs.quiet:
@@ -65,6 +60,26 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
         click.echo(dataset.attrs["summary"])
         if written:
             click.echo("Written: " + ", ".join(written))
+    open_viewer(outputs)
+
+
+def write_all(files: Iterable[tuple[Callable[[Path], Path], Path]]) -> list[str]:
+    """Write files one after the other and return their names.
+
+    An interrupt takes effect between two files and names those that are complete.
+    """
+    written: list[str] = []
+    try:
+        for write, path in files:
+            with held_interrupts():
+                written.append(str(write(path)))
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(*written) from None
+    return written
+
+
+def open_viewer(outputs: Outputs) -> None:
+    """Open the viewer on the recording, where that was asked for."""
     if outputs.view and outputs.rerun is not None:
         from pendmap import viewer
 
@@ -88,6 +103,21 @@ def _files(outputs: Outputs) -> Iterator[tuple[Callable[[xr.Dataset, Path], Path
         from pendmap import viewer
 
         yield viewer.record, outputs.rerun
+
+
+def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Write a table in columns as wide as they need, however wide the terminal is."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(*head, box=None, pad_edge=False, header_style="bold")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    # Wider than any table: columns that were cut to fit a terminal would lose digits.
+    console = Console(width=WIDEST)
+    console.print(table, crop=False, soft_wrap=True)
+    console.print()
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)

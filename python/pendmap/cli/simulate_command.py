@@ -36,7 +36,7 @@ __all__ = ["command"]
 )
 @click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
 @click.option("--quiet", is_flag=True, help="No summary.")
-@output_options
+@output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Integrate one trajectory: time history, phase plane, Poincaré section.
 

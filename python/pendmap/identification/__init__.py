@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from pendmap.identification.compare import Comparison, RunComparison, compare
 from pendmap.identification.methods import METHODS, Method, identify
+from pendmap.identification.model_file import identified_model
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.report import IdentificationReport, identify_experiment
 from pendmap.identification.result import Estimate, Identification
@@ -11,6 +13,7 @@ from pendmap.identification.table1 import PeakErrors, Row, Table1, table1
 
 __all__ = [
     "METHODS",
+    "Comparison",
     "Estimate",
     "Identification",
     "IdentificationReport",
@@ -18,10 +21,13 @@ __all__ = [
     "PeakErrors",
     "Peaks",
     "Row",
+    "RunComparison",
     "StartingValues",
     "Table1",
+    "compare",
     "find_peaks",
     "global_start",
+    "identified_model",
     "identify",
     "identify_experiment",
     "starting_values",

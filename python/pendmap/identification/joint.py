@@ -6,15 +6,14 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit, fit_runs
+from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit
+from pendmap.identification.from_start import fit_from_start
 from pendmap.identification.reading import Reading, reading_of
-from pendmap.identification.trajectory import OFFSET, sizes, start_of
-from pendmap.model import Effect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.model import Rig
+    from pendmap.model import Effect, Rig
     from pendmap.records import Run
 
 __all__ = ["JointFit", "as_fit_run", "fit_together"]
@@ -67,7 +66,7 @@ def fit_together(
     *,
     start: Rig | None = None,
     known: dict[str, float] | None = None,
-    effects: Sequence[Effect] = (),
+    effects: Sequence[Effect | str] = (),
 ) -> JointFit:
     """Fit natural frequency, damping, the sensor's zero and effects to runs.
 
@@ -79,8 +78,8 @@ def fit_together(
         Where the search begins, with its effects.
     known : dict of str to float, optional
         Starting values of some parameters.
-    effects : sequence of Effect
-        Whatever else acts, parameters in SI; their sizes are fitted.
+    effects : sequence of Effect or str
+        Whatever else acts, parameters in SI, or its name; their sizes are fitted.
 
     Raises
     ------
@@ -94,17 +93,10 @@ def fit_together(
     readings = [
         reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
     ]
-    first, good = runs[0], runs[0].trusted
-    model = start_of(start or known, first.time[good], first.theta[good], readings[0].sigma)
-    extra = [*model.effects, *effects]
-    if all(effect.name != OFFSET for effect in extra):
-        extra.append(Effect(OFFSET, {"d": 0.0}))
-    model = dataclasses.replace(model, effects=tuple(extra))
-    names = ["w0", "c_over_m", "Tr", *sizes(extra)]
-    fit = fit_runs(
+    fit = fit_from_start(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
-        model,
-        names,
-        sigma_doubt=max(reading.doubt for reading in readings),
+        readings,
+        start=start or known,
+        effects=effects,
     )
     return JointFit(fit, tuple(runs), tuple(readings))

@@ -6,13 +6,14 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
+from pendmap.identification.from_start import TooShortError
 from pendmap.identification.joint import JointFit, fit_together
 from pendmap.identification.methods import check_names, identify, identify_peaks
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.result import Identification
 from pendmap.identification.table1 import Table1, table_of
 from pendmap.identification.trajectory import METHOD as BEST
-from pendmap.identification.trajectory import TooShortError, identification_of
+from pendmap.identification.trajectory import identification_of
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -69,8 +70,6 @@ class IdentificationReport:
     @property
     def model(self) -> Rig:
         """The pendulum that the best method found, with its effects."""
-        if self.joint is not None and self.best.method == BEST:
-            return self.joint.fit.model
         return self.best.rig
 
 
@@ -96,7 +95,7 @@ def identify_experiment(
     *,
     methods: Iterable[str] | None = None,
     start: Rig | None = None,
-    effects: Sequence[Effect] = (),
+    effects: Sequence[Effect | str] = (),
 ) -> IdentificationReport:
     """Identify damping from an experiment by every method.
 
@@ -111,8 +110,8 @@ def identify_experiment(
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
         Where the trajectory method begins, with its effects; by default found from the record.
-    effects : sequence of Effect
-        Further effects that it fits the sizes of.
+    effects : sequence of Effect or str
+        Further effects, or their names, that it fits the sizes of.
 
     Raises
     ------
@@ -137,7 +136,7 @@ def identify_experiment(
 
 
 def _best(
-    experiment: Experiment, run: Run, start: Rig | None, effects: Sequence[Effect]
+    experiment: Experiment, run: Run, start: Rig | None, effects: Sequence[Effect | str]
 ) -> tuple[JointFit | None, Identification]:
     others = [r for r in experiment.runs if r.kind == "free" and not r.hold_out and r is not run]
     runs = [run, *(r for r in others if not r.peaks_only)]

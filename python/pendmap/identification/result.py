@@ -61,6 +61,8 @@ class Identification:
         Names and covariance matrix of what was fitted together.
     misfit : float or None
         chi^2 per degree of freedom of the method's own model, where it has one.
+    model : Rig or None
+        The pendulum, where the method finds more of it than ``estimates`` tell: effects.
     """
 
     method: str
@@ -70,6 +72,7 @@ class Identification:
     applicable: bool = True
     covariance: tuple[tuple[str, ...], NDArray[np.float64]] | None = None
     misfit: float | None = None
+    model: Rig | None = None
 
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""
@@ -113,6 +116,8 @@ class Identification:
         """The pendulum that was found; what the method does not know is 0, and so is a negative
         damping, which no pendulum has.
         """  # noqa: D205 (one sentence)
+        if self.model is not None:
+            return self.model
         known: dict[str, Any] = {
             n: e.value for n, e in self.estimates.items() if n in Rig.numbers()
         }

@@ -76,13 +76,13 @@ class PeakErrors:
 
     @property
     def period_rms(self) -> float:
-        """Root mean square of the period errors, percent."""
-        return float(np.sqrt(np.nanmean(self.period_error**2)))
+        """Root mean square of the period errors, percent; NaN if there are none."""
+        return _rms(self.period_error)
 
     @property
     def peak_rms(self) -> float:
-        """Root mean square of the peak errors, percent."""
-        return float(np.sqrt(np.nanmean(self.peak_error**2)))
+        """Root mean square of the peak errors, percent; NaN if there are none."""
+        return _rms(self.peak_error)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,6 +111,11 @@ class Table1:
 
     rows: tuple[Row, ...]
     errors: Mapping[str, PeakErrors]
+
+
+def _rms(errors: Floats) -> float:
+    known = errors[np.isfinite(errors)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else math.nan
 
 
 def first_state(peaks: Peaks) -> State:
@@ -158,7 +163,8 @@ def peak_errors(
     shown = zero if offset is None else offset
     turned = peaks.turned
     origin = dataclasses.replace(start, theta=start.theta - zero)
-    times, angles = simulated_peaks(found.rig, origin, float(turned.time[-1]) * 1.2 + 5.0)
+    span = float(turned.time[-1]) - start.time
+    times, angles = simulated_peaks(found.rig, origin, start.time + 1.2 * span + 5.0)
     number = turned.index - turned.index[0]
     made_time, made = (np.full(int(number[-1]) + 1, math.nan) for _ in range(2))
     size = min(made.size, times.size)

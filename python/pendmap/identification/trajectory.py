@@ -7,39 +7,30 @@ from release to rest, stops included, and all its numbers are adapted to all rea
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.identification.fitting import FitRun, TrajectoryFit, fit_runs
+from pendmap.identification.from_start import OFFSET, TooShortError, fit_from_start
 from pendmap.identification.reading import Reading, reading_of
 from pendmap.identification.result import Estimate, Identification
-from pendmap.identification.rough import rough_start
-from pendmap.model import Rig
-from pendmap.model.effects import Effect
+from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-__all__ = [
-    "METHOD",
-    "OFFSET",
-    "TooShortError",
-    "fit_decay",
-    "identification_of",
-    "identify",
-    "sizes",
-    "start_of",
-]
+    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.model import Rig
+    from pendmap.model.effects import Effect
+
+__all__ = ["METHOD", "fit_decay", "identification_of", "identify"]
 
 METHOD: Final = "trajectory"
-OFFSET: Final = "encoder_offset"
 TOO_GOOD: Final = 0.7
 """A sum of squares below this part of its degrees of freedom shows that sigma is too large."""
 
@@ -144,11 +135,8 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str
         warnings=tuple(_warnings(fit, estimates, readings)),
         covariance=(names, fit.covariance),
         misfit=fit.chi2 / max(fit.degrees, 1),
+        model=fit.model,
     )
-
-
-class TooShortError(InputError):
-    """The record holds fewer than two half swings."""
 
 
 def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
@@ -185,50 +173,17 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     if good.shape != time.shape:
         raise InputError("trusted and time differ in length: they must be as many")
     reading = reading_of(time, theta, sigma, trusted=good)
-    model = start_of(start, time[good], theta[good], reading.sigma)
-    extra = [*effects]
-    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
-    if not friction:
-        model = dataclasses.replace(model, Tr=0.0)
-    if offset and all(effect.name != OFFSET for effect in effects):
-        extra.append(Effect(OFFSET, {"d": 0.0}))
-    model = dataclasses.replace(model, effects=tuple(extra))
-    names += sizes(extra) if free is None else [*free, *sizes(extra[len(effects) :])]
     run = FitRun(time, theta, reading.each, trusted=good)
-    return fit_runs([run], model, names, sigma_doubt=reading.doubt), reading
-
-
-SHAPES: Final = ("n", "w", "vs")
-"""Parameters of effects that say how they act, not how strongly."""
-
-
-def sizes(effects: Sequence[Effect]) -> list[str]:
-    """Return the names of all parameters of effects but those of shape."""
-    return [f"{e.name}.{p}" for e in effects for p in e.parameters if p not in SHAPES]
-
-
-def start_of(
-    start: Rig | Mapping[str, float] | None,
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
-    sigma: float,
-) -> Rig:
-    """Return where a search starts: what is given, the rest from the half swings of the record.
-
-    Raises
-    ------
-    TooShortError
-        If ``w0`` is not known and the record holds fewer than two half swings.
-    """
-    if isinstance(start, Rig):
-        return start
-    known: dict[str, Any] = dict(start or {})
-    if "w0" not in known:
-        rough = rough_start(time, theta, sigma)
-        if rough is None:
-            raise TooShortError("the record holds fewer than two half swings: there is no start")
-        known = rough | known
-    return Rig(**known)
+    found = fit_from_start(
+        [run],
+        [reading],
+        start=start,
+        offset=offset,
+        friction=friction,
+        effects=effects,
+        free=free,
+    )
+    return found, reading
 
 
 def _warnings(

@@ -6,7 +6,7 @@ import dataclasses
 import difflib
 import functools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
@@ -14,7 +14,10 @@ from pendmap.errors import InputError
 if TYPE_CHECKING:
     from pendmap.model.units import Units
 
-__all__ = ["Effect", "definition", "library"]
+__all__ = ["SHAPES", "Effect", "definition", "library"]
+
+SHAPES: Final = ("n", "w", "vs")
+"""Parameters of effects that say how they act, not how strongly."""
 
 
 @functools.cache
@@ -104,6 +107,30 @@ class Effect:
 
     def __hash__(self) -> int:
         return hash((self.name, *self.parameters.values()))
+
+    @classmethod
+    def blank(cls, name: str, units: Units) -> Effect:
+        """Return an effect where a search may begin: as weak as is of interest, of a usual shape.
+
+        Parameters
+        ----------
+        name : str
+            One of the library.
+        units : Units
+            Those that its parameters are wanted in.
+        """
+        entry = definition(name)
+        values = {}
+        for parameter in entry["parameters"]:
+            low, high = parameter["typical"]
+            shape = parameter["name"] in SHAPES
+            values[parameter["name"]] = float(f"{(low * high) ** 0.5:.1g}") if shape else low
+        return cls(entry["name"], values).given(units)
+
+    @property
+    def sizes(self) -> list[str]:
+        """The names of its parameters that say how strong it is, not how it acts."""
+        return [name for name in self.parameters if name not in SHAPES]
 
     def described(self) -> list[str]:
         """Return the names of its parameters with their SI units."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:
@@ -45,7 +43,7 @@ def rows(report: IdentificationReport) -> list[list[str]]:
         cells += [_percent(row.errors.get(name, math.nan)) for row in _different(report)]
         errors = report.table.errors.get(name)
         cells += ["\N{EN DASH}"] * 2 if errors is None else [
-            _percent(_rms(errors.period_error)), _percent(_rms(errors.peak_error)),
+            _percent(errors.period_rms), _percent(errors.peak_rms),
         ]  # fmt: skip
         made.append(cells)
     return made
@@ -77,11 +75,6 @@ def estimate(found: Estimate) -> str:
     if len(text) > 24:  # noqa: PLR2004 (an error that says nothing)
         text = f"{value:.6g} \N{PLUS-MINUS SIGN} {error:.2g}"
     return text.replace("-", minus)
-
-
-def _rms(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else math.nan
 
 
 def _percent(value: float) -> str:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
-__all__ = ["as_json", "as_text", "noise_said"]
+__all__ = ["as_json", "as_text", "findings_said", "noise_said"]
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -115,6 +115,19 @@ def _lines(run: Run) -> Iterator[str]:
         mark = "mended: " if found.mended else ""
         where = f" ({found.where})" if found.where.startswith(("row", "line")) else ""
         yield f"  - {mark}{found.text}{where}  [{found.what}]"
+
+
+def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
+    """Yield a line for what was found in an experiment and in some of its runs.
+
+    What says how the record was understood is left to ``pendmap look``.
+    """
+    for found in experiment.findings:
+        yield f"{experiment.path}: {found.text}"
+    for run in runs:
+        for found in run.findings:
+            mark = "mended: " if found.mended else ""
+            yield f"{run.name}: {mark}{found.text}"
 
 
 def _steps(run: Run) -> str:

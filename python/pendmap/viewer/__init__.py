@@ -1,6 +1,7 @@
 """Recordings for the Rerun viewer; the only place that imports rerun.
 
-``record`` looks at what a dataset holds and writes its recording; ``open_viewer`` shows one.
+``record`` looks at what a dataset holds and writes its recording, ``record_identification`` writes
+that of what was found in records; ``open_viewer`` shows one.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pendmap.errors import InputError
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
 from pendmap.viewer import basins, frame, trajectory
+from pendmap.viewer.identification import record_identification
 from pendmap.viewer.window import (
     NoDisplayError,
     NotARecordingError,
@@ -35,6 +37,7 @@ __all__ = [
     "check_display",
     "open_viewer",
     "record",
+    "record_identification",
 ]
 
 SUFFIXES = (".rrd",)

@@ -20,7 +20,18 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["INK", "Frame", "describe", "recording", "screen", "strict", "summary", "text", "write"]
+__all__ = [
+    "INK",
+    "Frame",
+    "describe",
+    "identified",
+    "recording",
+    "screen",
+    "strict",
+    "summary",
+    "text",
+    "write",
+]
 
 INK = (150, 150, 150)
 """Lines and labels in a mid tone: the background may be light or dark."""
@@ -38,8 +49,15 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     content.update(
         np.ascontiguousarray(dataset["label" if "label" in dataset else "theta"].values).data
     )
-    name = content.hexdigest()
-    stream = rr.RecordingStream("pendmap", recording_id=name, send_properties=False)
+    return identified(content.hexdigest())
+
+
+def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
+    """Return an empty recording that goes by this name, without the time of day in it.
+
+    The viewer shows all recordings of an application in the layout of the one opened first.
+    """
+    stream = rr.RecordingStream(application, recording_id=name, send_properties=False)
     stream.set_log_time_enabled(False)
     return stream
 
@@ -148,7 +166,8 @@ class Frame:
             origin=f"/{root}",
             name=name,
             visual_bounds=rrb.VisualBounds2D(
-                x_range=[-190.0, SIDE + 190.0], y_range=[-60.0, self.height + 150.0 + below]
+                x_range=[-190.0, SIDE + 190.0],
+                y_range=[-100.0 if self.units.si else -60.0, self.height + 150.0 + below],
             ),
             time_ranges=time_ranges,
         )
@@ -174,7 +193,8 @@ class Frame:
             lines.append([[-12, at], [0, at]])
             places.append([-55, at - 22])
             labels.append(label)
-        places += [[w / 2, h + 75], [-135, h / 2 - 22]]
+        # With its unit the velocity's name is too long to stand beside the ticks.
+        places += [[w / 2, h + 75], [60, -80] if self.units.si else [-135, h / 2 - 22]]
         labels += [
             plane.shifted(names.ANGLE, across),
             plane.shifted(names.speed(self.units), up),

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.errors import InputError
 from pendmap.model.units import TIME, VELOCITY, Units
 from pendmap.pictures import names, plane
-from pendmap.viewer import frame
+from pendmap.viewer import columns, frame
+from pendmap.viewer.columns import FASTEST, LATEST, Look
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,28 +37,14 @@ TRAIL_POINTS = 48
 TRAILS = 20000
 """Trails that are logged at most; the trail of a longer trajectory moves on in larger steps."""
 
-FASTEST, LATEST = 1e30, 9e9
-"""Velocity and time that a recording can hold."""
-
 MANY = 1000
 """Points of a section above which they are drawn smaller."""
-
-_POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 2)
-_STRIP = pa.list_(pa.field("item", _POINT, nullable=False))
 
 _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "theta": (lambda _: names.ANGLE, (0, 114, 178)),
     "omega": (names.speed, (213, 94, 0)),
     "energy": (lambda _: "energy", (0, 158, 115)),
 }
-
-
-@dataclass(frozen=True)
-class Look:
-    """Colour, and radius in points of the screen."""
-
-    colour: tuple[int, int, int]
-    size: float
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
@@ -135,10 +120,6 @@ def _stroke(dataset: xr.Dataset) -> float:
     return abs(float(dataset.attrs["p"])) / omega**2 if omega else 0.0
 
 
-def _at(time: Floats) -> rr.TimeColumn:
-    return rr.TimeColumn(frame.TIMELINE, duration=time)
-
-
 def _state(
     stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Floats, units: Units
 ) -> None:
@@ -152,7 +133,7 @@ def _state(
         text = said(units)
         path = f"state/{name}"
         stream.log(path, rr.SeriesLines(colors=[colour], names=[text], widths=[1.5]), static=True)
-        stream.send_columns(path, [_at(time)], rr.Scalars.columns(scalars=values))
+        stream.send_columns(path, [columns.at(time)], rr.Scalars.columns(scalars=values))
 
 
 def _pendulum(stream: rr.RecordingStream, dataset: xr.Dataset, time: Floats, theta: Floats) -> None:
@@ -173,10 +154,10 @@ def _pendulum(stream: rr.RecordingStream, dataset: xr.Dataset, time: Floats, the
     stream.log(
         "pendulum/axes/rail", rr.LineStrips2D(rail, colors=[frame.INK], radii=thin), static=True
     )
-    _points(stream, "pendulum/data/pivot", time, pivot, Look(PIVOT, 4.0))
-    _points(stream, "pendulum/data/bob", time, bob, Look(BOB, 9.0))
+    columns.points(stream, "pendulum/data/pivot", time, pivot, Look(PIVOT, 4.0))
+    columns.points(stream, "pendulum/data/bob", time, bob, Look(BOB, 9.0))
     arm = np.stack([pivot, bob], axis=1)
-    _strips(stream, "pendulum/data/arm", time, arm, Look(ARM, 2.0))
+    columns.strips(stream, "pendulum/data/arm", time, arm, Look(ARM, 2.0))
     turns = omega or 1.0
     samples = (
         2 * math.pi / turns / max(float(np.median(np.diff(tau))), 1e-12) if time.size > 1 else 1
@@ -185,7 +166,7 @@ def _pendulum(stream: rr.RecordingStream, dataset: xr.Dataset, time: Floats, the
     chosen = np.arange(0, time.size, max(1, -(-time.size // TRAILS)))
     back = every * np.arange(min(TRAIL_POINTS, max(2, math.ceil(samples / every))))[::-1]
     trail = bob[np.maximum(chosen[:, None] - back[None, :], 0)]
-    _strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
+    columns.strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
 
 
 def _phase(stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Floats) -> None:
@@ -194,7 +175,7 @@ def _phase(stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Fl
     lines = rr.LineStrips2D([curve], colors=[CURVE], radii=rr.Radius.ui_points(0.6))
     stream.log("phase/data/curve", lines, static=True)
     now = np.stack([plane.wrapped(theta), velocity], axis=1)
-    _points(stream, "phase/data/now", time, now, Look(BOB, 6.0))
+    columns.points(stream, "phase/data/now", time, now, Look(BOB, 6.0))
 
 
 def _section(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
@@ -203,39 +184,4 @@ def _section(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     at = np.stack([dataset["section_theta"].values, dataset["section_velocity"].values], axis=1)
     size = 1.4 if time.size > MANY else 2.5
     period = rr.TimeColumn("period", sequence=dataset["period"].values.astype(np.int64))
-    _points(stream, "poincare/data/points", time, at, Look(BOB, size), period)
-
-
-def _points(
-    stream: rr.RecordingStream,
-    path: str,
-    time: Floats,
-    at: Floats,
-    look: Look,
-    *further: rr.TimeColumn,
-) -> None:
-    """Log one point an instant, shape (n, 2)."""
-    style = rr.Points2D.from_fields(colors=[look.colour], radii=rr.Radius.ui_points(look.size))
-    stream.log(path, style, static=True)
-    if time.size:
-        columns = rr.Points2D.columns(positions=at.astype(np.float32))
-        stream.send_columns(path, [_at(time), *further], columns)
-
-
-def _strips(
-    stream: rr.RecordingStream,
-    path: str,
-    time: Floats,
-    strips: Floats,
-    look: Look,
-) -> None:
-    """Log one strip an instant, shape (n, m, 2), as Arrow arrays: lists take fifty times longer."""
-    style = rr.LineStrips2D.from_fields(colors=[look.colour], radii=rr.Radius.ui_points(look.size))
-    stream.log(path, style, static=True)
-    count, length, _ = strips.shape
-    flat = pa.array(strips.astype(np.float32).reshape(-1))
-    points = pa.FixedSizeListArray.from_arrays(flat, type=_POINT)
-    offsets = pa.array(np.arange(count + 1, dtype=np.int32) * length)
-    arrow = pa.ListArray.from_arrays(offsets, points, type=_STRIP)
-    columns = rr.LineStrips2D.columns(strips=arrow)
-    stream.send_columns(path, [_at(time)], columns)
+    columns.points(stream, "poincare/data/points", time, at, Look(BOB, size), period)

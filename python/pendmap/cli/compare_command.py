@@ -1,0 +1,56 @@
+"""``pendmap compare``: a model against records that it was not fitted to."""
+
+from __future__ import annotations
+
+import functools
+import json
+from pathlib import Path
+
+import click
+
+from pendmap.cli.show import plain, write_all, write_table
+from pendmap.cli.types import OutputFile
+
+__all__ = ["command"]
+
+
+@click.command("compare")
+@click.argument("model", type=click.Path(path_type=Path), metavar="MODEL")
+@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
+@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files.")
+@click.option("--quiet", is_flag=True, help="No summary.")
+def command(*, model: Path, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> None:
+    """Simulate a MODEL beside every free decay of an EXPERIMENT.
+
+    MODEL is a model file in SI, as identify writes it; nothing of it is adapted. Its rms is over
+    the whole record, from the start that brings it nearest; periods and peaks are those of a motion
+    from the first measured peak, in percent of the measured ones, as in the paper's table 1. Writes
+    compare.png if no figure is named. --json alone writes no file.
+    """
+    if plot is None and not as_json:
+        plot = OutputFile([".png"]).convert("compare.png", None, None)
+    from pendmap.errors import InputError
+    from pendmap.identification import compare
+    from pendmap.identification.compared import as_json as fields
+    from pendmap.identification.compared import as_text, runs_table
+    from pendmap.model import Rig, load_model
+    from pendmap.records import read_experiment
+
+    rig = load_model(model)
+    if not isinstance(rig, Rig):
+        raise InputError(f"{model}: has no dimensions: allowed is a model in SI, with its w0")
+    comparison = compare(rig, read_experiment(path))
+    written: list[str] = []
+    if plot is not None:
+        from pendmap import figures
+
+        written = write_all([(functools.partial(figures.draw_comparison, comparison), plot)])
+    if as_json:
+        click.echo(json.dumps(plain(fields(comparison) | {"model": str(model)}), allow_nan=False))
+    elif not quiet:
+        write_table(*runs_table(comparison))
+        for line in as_text(comparison):
+            click.echo(line)
+        if written:
+            click.echo("Written: " + ", ".join(written))

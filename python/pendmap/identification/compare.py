@@ -1,0 +1,139 @@
+"""A model against records that it was not fitted to."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from pendmap.errors import InputError
+from pendmap.identification.fitting import TrajectoryFit, fit_runs
+from pendmap.identification.from_start import OFFSET
+from pendmap.identification.joint import as_fit_run
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.reading import reading_of
+from pendmap.identification.result import Estimate, Identification
+from pendmap.identification.table1 import PeakErrors, Table1, table_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pendmap.model import Rig
+    from pendmap.records import Experiment, Run
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["MODEL", "Comparison", "RunComparison", "compare"]
+
+MODEL = "model"
+"""What the model is called in table 1."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RunComparison:
+    """A model beside one free decay.
+
+    Parameters
+    ----------
+    run : Run
+        The record.
+    sigma : float
+        Its noise, rad.
+    start : (float, float)
+        Angle (rad) and velocity (rad/s) at its first sample from which the model comes nearest.
+    curve : ndarray, shape (2, N)
+        Angle and velocity of the model at each sample.
+    residual : ndarray, shape (N,)
+        What the sensor read less the model's reading, rad; 0 where a sample does not count.
+    rms : float
+        Of the residual over the samples that count, rad.
+    peaks : Peaks
+        Of the record.
+    table : Table1
+        Table 1 and figure 7, with one column; the model starts at the first peak, as measured.
+    """
+
+    run: Run
+    sigma: float
+    start: tuple[float, float]
+    curve: Floats
+    residual: Floats
+    rms: float
+    peaks: Peaks
+    table: Table1
+
+    @property
+    def errors(self) -> PeakErrors | None:
+        """Errors of periods and peaks; none where there are too few."""
+        return self.table.errors.get(MODEL)
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """A model beside an experiment.
+
+    Parameters
+    ----------
+    model : Rig
+        With its effects, those on the reading included.
+    experiment : Experiment
+        The records.
+    runs : tuple of RunComparison
+        One for each free decay.
+    """
+
+    model: Rig
+    experiment: Experiment
+    runs: tuple[RunComparison, ...]
+
+
+def compare(model: Rig, experiment: Experiment) -> Comparison:
+    """Compare a model with every free decay of an experiment.
+
+    Nothing of the model is adapted. Where a record begins is not known better than its noise, so
+    that angle and velocity of the first sample are adapted for the residual; periods and peaks are
+    those of a motion from the first peak as it was measured.
+
+    Parameters
+    ----------
+    model : Rig
+        In SI; :func:`pendmap.load_model` reads it.
+    experiment : Experiment
+        As of :func:`pendmap.read_experiment`.
+
+    Raises
+    ------
+    InputError
+        If no run is a free decay of samples.
+    """
+    free = [run for run in experiment.runs if run.kind == "free" and not run.peaks_only]
+    if not free:
+        raise InputError(
+            f"{experiment.path}: no run is a free decay of samples: allowed is one or more"
+        )
+    return Comparison(model, experiment, tuple(_compared(model, run) for run in free))
+
+
+def _compared(model: Rig, run: Run) -> RunComparison:
+    reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
+    fit: TrajectoryFit = fit_runs([as_fit_run(run, reading)], model, free=())
+    first = fit.windows[0]
+    peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
+    return RunComparison(
+        run,
+        reading.sigma,
+        (first[3], first[4]),
+        fit.curves[0],
+        fit.residuals[0],
+        fit.rms,
+        peaks,
+        table_of(peaks, {MODEL: _as_identification(model)}),
+    )
+
+
+def _as_identification(model: Rig) -> Identification:
+    estimates = {name: Estimate(getattr(model, name)) for name in ("w0", "c_over_m", "Tr")}
+    for effect in model.effects:
+        if effect.name == OFFSET:
+            estimates["offset"] = Estimate(effect.parameters["d"])
+    return Identification(MODEL, estimates, model=model)

@@ -1,0 +1,123 @@
+"""From a record to a fit: a start that the record gives, then the search.
+
+Where a rough start leads astray, a second one is taken from the methods of peaks.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.identification.fitting import TrajectoryFit, fit_runs
+from pendmap.identification.rough import rough_start
+from pendmap.identification.start import starting_values
+from pendmap.model import Rig
+from pendmap.model.effects import Effect
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.identification.reading import Reading
+    from pendmap.identification.runs import FitRun
+
+__all__ = ["OFFSET", "TooShortError", "fit_from_start"]
+
+OFFSET: Final = "encoder_offset"
+"""The effect that is the sensor's zero."""
+POOR: Final = 0.1
+"""Residuals above this part of the record's own scatter are no fit: the search went astray."""
+
+
+class TooShortError(InputError):
+    """The record holds fewer than two half swings."""
+
+
+def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
+    runs: Sequence[FitRun],
+    readings: Sequence[Reading],
+    *,
+    start: Rig | Mapping[str, float] | None = None,
+    offset: bool = True,
+    friction: bool = True,
+    effects: Sequence[Effect | str] = (),
+    free: Sequence[str] | None = None,
+) -> TrajectoryFit:
+    """Return the fit to several records, from a start that the first of them gives.
+
+    Where a rough start leads to a poor fit, a second one begins where the methods of peaks, or a
+    global search over their envelope, say; the better one counts.
+
+    Parameters
+    ----------
+    runs, readings : sequence
+        The records, and what their readings are worth.
+    start, offset, friction, effects, free
+        As of :func:`identify`; effects may be names, whose sizes then begin small.
+
+    Raises
+    ------
+    TooShortError
+        If the first record holds fewer than two half swings and no start is given.
+    """
+    first = runs[0]
+    good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
+    time, theta = first.time[good], first.theta[good]
+    doubt = max(reading.doubt for reading in readings)
+    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
+
+    def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
+        model = _start_of(begin, time, theta, readings[0].sigma)
+        if not friction:
+            model = dataclasses.replace(model, Tr=0.0)
+        named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
+        known = [*model.effects, *named]
+        zero = [] if OFFSET in {e.name for e in known} or not offset else [OFFSET]
+        more = [Effect(name, {"d": 0.0}) for name in zero]
+        model = dataclasses.replace(model, effects=(*known, *more))
+        wanted = _sizes(known) if free is None else free
+        return fit_runs(runs, model, [*names, *wanted, *_sizes(more)], sigma_doubt=doubt)
+
+    found = fitted(start)
+    poor = not found.converged or found.rms > POOR * float(np.std(theta))
+    if isinstance(start, Rig) or not poor:
+        return found
+    try:
+        other = starting_values(time, theta, sigma=readings[0].sigma)
+        again = fitted({"w0": other.w0, "c_over_m": other.c_over_m, "Tr": other.Tr})
+    except InputError:
+        return found
+    return again if (again.converged, -again.chi2) > (found.converged, -found.chi2) else found
+
+
+def _sizes(effects: Sequence[Effect]) -> list[str]:
+    """Return the names of all parameters of effects but those of shape."""
+    return [f"{effect.name}.{size}" for effect in effects for size in effect.sizes]
+
+
+def _start_of(
+    start: Rig | Mapping[str, float] | None,
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    sigma: float,
+) -> Rig:
+    """Return where a search starts: what is given, the rest from the half swings of the record.
+
+    Raises
+    ------
+    TooShortError
+        If ``w0`` is not known and the record holds fewer than two half swings.
+    """
+    if isinstance(start, Rig):
+        return start
+    known: dict[str, Any] = dict(start or {})
+    if "w0" not in known:
+        rough = rough_start(time, theta, sigma)
+        if rough is None:
+            raise TooShortError("the record holds fewer than two half swings: there is no start")
+        known = rough | known
+    return Rig(**known)

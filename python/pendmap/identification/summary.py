@@ -1,0 +1,117 @@
+"""What an identification found, as JSON and as text."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap.records.summary import findings_said
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pendmap.identification.report import IdentificationReport
+    from pendmap.identification.result import Estimate, Identification
+
+__all__ = ["COLUMNS", "as_json", "as_text", "methods_table", "table1_table", "with_error"]
+
+COLUMNS: Final = {
+    "w0": "w0 (rad/s)",
+    "c_over_m": "c/m (1/s)",
+    "zeta": "zeta",
+    "Tr": "Tr (rad/s^2)",
+    "theta_r": "theta_r (rad)",
+    "offset": "offset (rad)",
+}
+"""What the table of methods shows, and how it is headed; effects' parameters follow."""
+
+DIGITS: Final = 2
+"""Digits of a standard error."""
+
+
+def as_json(report: IdentificationReport) -> dict[str, Any]:
+    """Return the JSON object of ``pendmap identify``, without the paths of files."""
+    run = report.run
+    return {
+        "experiment": str(report.experiment.path),
+        "run": run.name,
+        "noise": report.peaks.sigma,
+        "best": report.best.method,
+        "methods": {name: _method(found) for name, found in report.methods.items()},
+        "table1": [
+            {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
+            for r in report.table.rows
+        ],
+        "rms": None if report.joint is None else report.joint.fit.rms,
+        "findings": [f.text for f in (*report.experiment.findings, *run.findings)],
+    }
+
+
+def _method(found: Identification) -> dict[str, Any]:
+    known = {**found.estimates, **found.derived}
+    names = list(dict.fromkeys([*COLUMNS, *known]))
+    entry: dict[str, Any] = {name: known[name].value if name in known else None for name in names}
+    return entry | {
+        "stderr": {name: known[name].stderr if name in known else None for name in names},
+        "ci95": {name: known[name].ci95 if name in known else None for name in names},
+        "warnings": list(found.warnings),
+        "used": found.used,
+        "applicable": found.applicable,
+        "misfit": found.misfit,
+    }
+
+
+def as_text(report: IdentificationReport) -> Iterator[str]:
+    """Yield the lines below the tables: intervals, warnings, what was found in the record."""
+    best = report.best
+    yield f"{best.method}: {best.used}"
+    for name, estimate in {**best.estimates, **best.derived}.items():
+        if estimate.ci95 is not None:
+            low, high = estimate.ci95
+            yield f"  {name} = {with_error(estimate)}, 95 % in [{low:.6g}, {high:.6g}]"
+    for name, found in report.methods.items():
+        for warning in found.warnings:
+            yield f"{name}: {warning}"
+    yield from findings_said(report.experiment, report.run)
+
+
+def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
+    """Return heads and rows of the table of methods."""
+    extra = [n for n in report.best.estimates if n not in COLUMNS]
+    names = [*COLUMNS, *extra]
+    rows = []
+    for method, found in report.methods.items():
+        known = {**found.estimates, **found.derived}
+        shown = [with_error(known[name]) if name in known else "" for name in names]
+        if not found.applicable:
+            shown = ["not applicable", *[""] * (len(names) - 1)]
+        rows.append([method, *shown])
+    return ["method", *COLUMNS.values(), *extra], rows
+
+
+def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
+    """Return heads and rows of table 1: percent errors of each method's simulation."""
+    rows = []
+    for name, errors in report.table.errors.items():
+        percent = [
+            "at rest" if math.isnan(row.errors[name]) else f"{row.errors[name]:.3g} %"
+            for row in report.table.rows
+        ]
+        overall = [
+            "" if math.isnan(r) else f"{r:.3g} %" for r in (errors.period_rms, errors.peak_rms)
+        ]
+        rows.append([name, *percent, *overall])
+    units = {"period": "s", "peak": "rad"}
+    measured = [f"{r.what} {r.measured:.4g} {units[r.what]}" for r in report.table.rows]
+    return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows
+
+
+def with_error(estimate: Estimate) -> str:
+    """Return a number with its standard error in the last digits: ``6.2047(12)``, +- 0.0012."""
+    value, error = estimate.value, estimate.stderr
+    if error is None or not math.isfinite(error) or error <= 0:
+        return f"{value:.5g}"
+    places = DIGITS - 1 - math.floor(math.log10(error))
+    if places <= 0 or places > 15:  # noqa: PLR2004 (no digits left, or none needed)
+        return f"{value:.5g} +- {error:.2g}"
+    return f"{value:.{places}f}({round(error * 10**places)})"

@@ -1,0 +1,220 @@
+"""A record beside its model: both readings, what is left, velocities, at instants to be drawn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
+
+from pendmap.errors import InputError
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.table1 import first_state
+from pendmap.trajectory import simulate
+
+if TYPE_CHECKING:
+    from pendmap.identification import IdentificationReport
+    from pendmap.records import Run
+
+__all__ = ["INSTANTS", "PER_SWING", "Comparison", "comparisons"]
+
+Floats = npt.NDArray[np.float64]
+
+INSTANTS = 20000
+"""Instants of a run that are drawn; of a longer one every k-th, unless that leaves too few of each
+swing."""
+
+PER_SWING = 24
+"""Instants of a swing that are kept."""
+
+GAP = 8.0
+"""Intervals, over the usual one, from which on nothing is drawn across a gap."""
+
+SLOPE = 0.05
+"""Part of a swing over which the record's velocity is a difference: a longer one cuts its peaks
+(by 0.4 % here), a shorter one lets the noise through."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A record and its model.
+
+    Parameters
+    ----------
+    name : str
+        Of the run.
+    time, record : ndarray, shape (n,)
+        s, and what the sensor read, rad; a row without numbers ends what is before a gap.
+    speed : ndarray, shape (n,)
+        Velocity of the record, measured or as a difference, rad/s; no number where it is not known.
+    left_out : ndarray of bool, shape (n,)
+        Samples that are not for fitting.
+    model_time, model, model_speed : ndarray, shape (m,)
+        s, what the sensor would read of the model, rad, and its velocity, rad/s; empty without one.
+        ``model_time`` is ``time`` but for a record of peaks alone.
+    residual : ndarray, shape (n,)
+        Record less model, rad; no number where there is none.
+    peaks : Peaks
+        Of the record, in the turn in which they are drawn.
+    sigma : float
+        Noise of a reading, rad; 0 where it is not known.
+    sparse : bool
+        Whether the record holds peaks alone, with nothing between them.
+    """
+
+    name: str
+    time: Floats
+    record: Floats
+    speed: Floats
+    left_out: npt.NDArray[np.bool_]
+    model_time: Floats
+    model: Floats
+    model_speed: Floats
+    residual: Floats
+    peaks: Peaks
+    sigma: float
+    sparse: bool = False
+
+
+def comparisons(report: IdentificationReport) -> list[Comparison]:
+    """Return every run that was fitted, or else the decay with the best model's simulation."""
+    joint = report.joint
+    if joint is None:
+        return [_simulated(report)]
+    made = []
+    for k, (run, reading) in enumerate(zip(joint.runs, joint.readings, strict=True)):
+        (theta, speed), residual = joint.fit.curves[k], joint.fit.residuals[k]
+        counted = run.trusted & np.isfinite(theta)
+        # The fit gives the angle itself: the sensor's errors are added, as they are nearby where a
+        # sample does not count.
+        offset = (run.theta - residual - theta)[counted]
+        error = np.interp(run.time, run.time[counted], offset) if offset.size else 0.0
+        known = np.where(counted, residual, math.nan)
+        own = run is report.run
+        peaks = (
+            report.peaks
+            if own
+            else find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
+        )
+        columns = (theta + error, speed, known)
+        made.append(_drawn(run, columns, peaks, report.model.w0, reading.sigma))
+    return made
+
+
+def _simulated(report: IdentificationReport) -> Comparison:
+    """Return the decay with a simulation from its first peak, if a method found a model."""
+    run = report.run
+    peaks = report.peaks if run.peaks_only else _in_turn(report.peaks, run)
+    try:
+        best = report.best
+    except InputError:
+        best = None
+    never = np.full(run.time.size, math.nan)
+    if best is None or not len(peaks.turned):
+        w0 = math.pi / float(np.median(np.diff(peaks.time))) if len(peaks) > 1 else 0.0
+        return (
+            _of_peaks(run, peaks, None, 0.0)
+            if run.peaks_only
+            else _drawn(run, (never, never, never), peaks, w0, peaks.sigma)
+        )
+    start = first_state(peaks)
+    zero = best["offset"] if "offset" in best.estimates else 0.0
+    until = max(float(run.time[-1]) - start.time, 1e-3)
+    made = simulate(best.rig, start.theta - zero, start.velocity, until)
+    curve = CubicHermiteSpline(
+        made["time"].values + start.time, made["theta"].values + zero, made["velocity"].values
+    )
+    if run.peaks_only:
+        return _of_peaks(run, peaks, curve, best.rig.w0)
+    model, speed = curve(run.time, extrapolate=False), curve(run.time, 1, extrapolate=False)
+    residual = np.where(run.trusted, run.theta - model, math.nan)
+    return _drawn(run, (model, speed, residual), peaks, best.rig.w0, peaks.sigma)
+
+
+def _of_peaks(run: Run, peaks: Peaks, curve: CubicHermiteSpline | None, w0: float) -> Comparison:
+    """Return peaks alone with the model's curve; they turn, so that their velocity is 0."""
+    time, none = peaks.time, np.empty(0)
+    model_time, model, speed, residual = none, none, none, np.full(time.size, math.nan)
+    if curve is not None:
+        per_swing = min(max(PER_SWING, INSTANTS * math.tau / (w0 * np.ptp(time))), 200.0)
+        count = math.ceil(float(np.ptp(time)) * w0 / math.tau * per_swing) + 1
+        model_time = np.linspace(float(time[0]), float(time[-1]), count)
+        model, speed = curve(model_time), curve(model_time, 1)
+        residual = peaks.amplitude - curve(time)
+    return Comparison(
+        name=run.name,
+        time=time,
+        record=peaks.amplitude,
+        speed=np.zeros(time.size),
+        left_out=np.zeros(time.size, bool),
+        model_time=model_time,
+        model=model,
+        model_speed=speed,
+        residual=residual,
+        peaks=peaks,
+        sigma=peaks.sigma,
+        sparse=True,
+    )
+
+
+def _drawn(
+    run: Run, columns: tuple[Floats, Floats, Floats], peaks: Peaks, w0: float, sigma: float
+) -> Comparison:
+    """Return model, its velocity and the residual beside a run, thinned and cut at gaps."""
+    time = run.time
+    step = float(np.median(np.diff(time)))
+    swing = math.tau / w0 / step if w0 else math.inf
+    every = max(1, min(-(-time.size // INSTANTS), int(min(swing, time.size) / PER_SWING)))
+    kept = slice(None, None, every)
+    chosen = time[kept]
+    cuts = np.flatnonzero(np.diff(chosen) > GAP * every * step) + 1
+    ends = (chosen[cuts - 1] + chosen[cuts]) / 2
+    model, model_speed, residual = columns
+    record, speed, made, made_speed, left = (
+        np.insert(column[kept], cuts, math.nan)
+        for column in (run.theta, _speed(run, w0, step), model, model_speed, residual)
+    )
+    there = bool(np.isfinite(made).any())
+    instants = np.insert(chosen, cuts, ends)
+    return Comparison(
+        name=run.name,
+        time=instants,
+        record=record,
+        speed=speed,
+        left_out=np.insert(~run.trusted[kept], cuts, values=False),
+        model_time=instants if there else np.empty(0),
+        model=made if there else np.empty(0),
+        model_speed=made_speed if there else np.empty(0),
+        residual=left,
+        peaks=_in_turn(peaks, run),
+        sigma=sigma,
+    )
+
+
+def _speed(run: Run, w0: float, step: float) -> Floats:
+    """Return the velocity that was measured, or else differences between trusted samples."""
+    if run.velocity is not None:
+        return np.where(run.trusted, run.velocity, math.nan)
+    speed = np.full(run.time.size, math.nan)
+    reach = max(1, round(SLOPE * math.tau / w0 / step / 2)) if w0 else 1
+    if run.time.size > 2 * reach:
+        time, theta = run.time, run.theta
+        wide = time[2 * reach :] - time[: -2 * reach]
+        good = run.trusted[2 * reach :] & run.trusted[: -2 * reach] & run.trusted[reach:-reach]
+        good &= wide < 2 * reach * step * 1.5
+        speed[reach:-reach] = np.where(
+            good, (theta[2 * reach :] - theta[: -2 * reach]) / wide, math.nan
+        )
+    return speed
+
+
+def _in_turn(peaks: Peaks, run: Run) -> Peaks:
+    """Return peaks in the turns in which the record has them: theirs end in the one of rest."""
+    if not len(peaks):
+        return peaks
+    near = np.interp(peaks.time, run.time, run.theta)
+    away = math.tau * np.round(np.median(near - peaks.amplitude) / math.tau)
+    return replace(peaks, amplitude=peaks.amplitude + away) if away else peaks

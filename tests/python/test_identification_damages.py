@@ -1,0 +1,49 @@
+"""A hundred kinds of damaged file: identification ends in a result or in one clear line."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import pytest
+
+import pendmap
+from damages import DAMAGES
+from pendmap.identification import identified_model, identify_experiment
+from pendmap.identification.summary import as_json, as_text, methods_table, table1_table
+from test_records_damaged import one_line, sound
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+READ = [name for name, damage in DAMAGES.items() if damage.says is not None]
+TRUTH = 6.2
+"""Natural frequency of the sound record, rad/s."""
+
+
+@pytest.mark.parametrize("name", READ)
+def test_damage_ends_in_a_result_with_its_warning_or_in_one_line(name: str, tmp_path: Path) -> None:
+    damage = DAMAGES[name]
+    path = tmp_path / f"record{damage.suffix}"
+    made = damage.make(sound())
+    path.write_bytes(made if isinstance(made, bytes) else made.encode())
+    experiment = pendmap.read_experiment(path)
+    try:
+        report = identify_experiment(experiment, methods=["trajectory", "combined_repaired"])
+        model = identified_model(report)
+    except pendmap.InputError as error:
+        one_line(str(error))
+        return
+    for found in report.methods.values():
+        assert found.applicable or found.warnings
+        for estimate in found.estimates.values():
+            assert math.isfinite(estimate.value)
+        for warning in found.warnings:
+            one_line(warning)
+    warned = any(found.warnings for found in report.methods.values()) or report.run.findings
+    # What reads as a sound record does, must also lead to its pendulum.
+    assert warned or model.w0 == pytest.approx(TRUTH, rel=1e-3), name
+    assert as_json(report)["methods"]
+    assert list(as_text(report))
+    for head, rows in (methods_table(report), table1_table(report)):
+        assert all(len(row) == len(head) for row in rows)

@@ -1,0 +1,78 @@
+"""Identification from an experiment: which runs are read, and how."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from decays import decay, record
+from pendmap import InputError
+from pendmap.identification import find_peaks, identify, identify_experiment
+from pendmap.records import Experiment, Run
+
+WIDE = decay()
+SMALL = decay(release=0.2, c_over_m=0.0496, tr=0.03, until=40.0)
+BOTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
+
+
+def test_an_experiment_gives_its_longest_free_run() -> None:
+    def run(seconds: float, kind: Literal["free", "forced"] = "free", **given: bool) -> Run:
+        time, angle = record(WIDE, seconds=seconds)
+        return Run("a", "a.csv", kind, time, angle, np.ones(time.size, bool), **given)  # type: ignore[arg-type]
+
+    def experiment(*runs: Run) -> Experiment:
+        return Experiment(Path("there"), runs)
+
+    runs = run(10), run(84), run(85, hold_out=True), run(85, "forced")
+    report = identify_experiment(experiment(*runs), methods=["combined_repaired"])
+    assert report.run is runs[1]
+    assert report.model == report.best.rig
+    time, angle = record(WIDE, seconds=84)
+    same = identify(time, angle, methods=["combined_repaired"])
+    assert report.best.estimates == same["combined_repaired"].estimates
+    with pytest.raises(InputError, match="no run is free"):
+        identify_experiment(experiment(*runs[2:]))
+    with pytest.raises(InputError, match="'best' is not known: allowed are trajectory, combined"):
+        identify(time, angle, methods=["best"])
+
+
+def test_free_runs_are_fitted_together() -> None:
+    def run(seed: int, release: float) -> Run:
+        time, angle = record(decay(release=release, until=40.0), seconds=30, seed=seed)
+        return Run(f"{seed}", f"{seed}.csv", "free", time, angle, np.ones(time.size, bool))
+
+    runs = run(1, 2.5), run(2, 1.0)
+    both = identify_experiment(Experiment(Path("there"), runs), methods=["trajectory"])
+    alone = identify_experiment(Experiment(Path("there"), runs[:1]), methods=["trajectory"])
+    assert both.joint is not None
+    assert len(both.joint.fit.curves) == 2
+    assert "2 free runs" in both.best.used
+    for name, true in BOTH.items():
+        one, two = alone.best.estimates[name], both.best.estimates[name]
+        assert one.stderr is not None
+        assert two.stderr is not None
+        assert two.stderr < one.stderr
+        assert abs(two.value - true) < 4 * two.stderr
+
+
+def test_peaks_alone_are_enough_for_methods_of_peaks() -> None:
+    time, angle = record(SMALL, seconds=30, noise_deg=1e-3)
+    peaks = find_peaks(time, angle).turned
+    run = Run(
+        "a",
+        "a.csv",
+        "free",
+        peaks.time,
+        peaks.amplitude,
+        np.ones(len(peaks), bool),
+        peaks_only=True,
+    )
+    report = identify_experiment(Experiment(Path("there"), (run,)))
+    assert not report.methods["trajectory"].applicable
+    assert report.joint is None
+    found = report.methods["combined_repaired"]
+    assert found["Tr"] == pytest.approx(0.03, rel=0.02)
+    assert report.table.errors["combined_repaired"].peak_rms < 1

@@ -1,0 +1,147 @@
+"""``pendmap identify`` and ``compare``: from a record to a model that every command takes."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from decays import decay, record
+from pendmap.identification import Estimate
+from pendmap.identification.summary import with_error
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+FIELDS = ("w0", "c_over_m", "zeta", "Tr", "theta_r", "stderr", "ci95", "warnings")
+TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
+
+
+@pytest.fixture
+def decay_file(tmp_path: Path) -> Path:
+    """The record of a free decay, as a file of two columns."""
+    time, angle = record(decay(), seconds=60, seed=3)
+    path = tmp_path / "decay.csv"
+    table = np.stack([time, angle], axis=1)
+    np.savetxt(path, table, delimiter=",", header="t_s,theta_rad", comments="", fmt="%.8f")
+    return path
+
+
+def test_from_a_record_to_its_basins(
+    tmp_path: Path, decay_file: Path, pendmap_command: Run
+) -> None:
+    before = decay_file.read_bytes()
+    run = pendmap_command("identify", decay_file, "--out", "model.toml")
+    assert run.returncode == 0, run.stderr
+    assert "trajectory" in run.stdout
+    assert "Written: model.toml" in run.stdout
+    assert decay_file.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["decay.csv", "model.toml"]
+    content = tomllib.loads((tmp_path / "model.toml").read_text(encoding="utf-8"))
+    for name, true in TRUTH.items():
+        low, high = content["covariance"]["ci95"][name]
+        assert low < content["pendulum"][name] < high
+        assert abs(content["pendulum"][name] - true) < (high - low)
+    assert content["covariance"]["names"][:3] == list(TRUTH)
+    (used,) = content["provenance"]["records"]
+    assert used["file"].endswith("decay.csv")
+    assert len(used["sha256"]) == 64
+    assert "identify" in content["provenance"]["command"]
+    mapped = pendmap_command(
+        *("basins", "--model", "model.toml", "--stroke-mm", 60, "--frequency-hz", 1.9),
+        *("--grid", 20, "--json"),
+    )
+    assert mapped.returncode == 0, mapped.stderr
+    assert json.loads(mapped.stdout)["cells"] == 400
+    compared = pendmap_command("compare", "model.toml", decay_file, "--json")
+    assert compared.returncode == 0, compared.stderr
+    (one,) = json.loads(compared.stdout)["runs"]
+    assert one["rms"] == pytest.approx(one["noise"], rel=0.05)
+    assert one["period_rms_percent"] < 1
+    assert {row["what"] for row in one["table1"]} == {"period", "peak"}
+
+
+def test_json_has_every_method(decay_file: Path, pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("identify", decay_file, "--json")
+    assert run.returncode == 0, run.stderr
+    found: dict[str, Any] = json.loads(run.stdout)
+    assert found["best"] == "trajectory"
+    assert found["model"] is None
+    for name in ("combined", "log_decrement", "de_paula", "trajectory", "energy_balance"):
+        assert set(FIELDS) <= set(found["methods"][name]), name
+    best = found["methods"]["trajectory"]
+    assert best["zeta"] == pytest.approx(best["c_over_m"] / (2 * best["w0"]), rel=1e-12)
+    assert best["theta_r"] == pytest.approx(best["Tr"] / best["w0"] ** 2, rel=1e-12)
+    assert found["methods"]["log_decrement"]["Tr"] is None
+    assert found["methods"]["log_decrement"]["theta_r"] is None
+    assert [path.name for path in tmp_path.iterdir()] == ["decay.csv"]
+
+
+def test_some_methods_and_an_effect(decay_file: Path, pendmap_command: Run) -> None:
+    words = ("--method", "trajectory", "--method", "log_decrement", "--effect", "quadratic_drag")
+    run = pendmap_command("identify", decay_file, *words, "--json")
+    assert run.returncode == 0, run.stderr
+    methods = json.loads(run.stdout)["methods"]
+    assert list(methods) == ["trajectory", "log_decrement"]
+    low, high = methods["trajectory"]["ci95"]["quadratic_drag.q"]
+    assert low - (high - low) < 0 < high + (high - low)
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("identify", "absent.csv"), "absent.csv: No such file"),
+        (("identify", "empty.csv"), "empty.csv"),
+        (("identify", "."), "has no experiment.toml"),
+        (("identify", "decay.csv", "--method", "best"), "allowed are trajectory"),
+        (("identify", "decay.csv", "--effect", "quadratic"), "perhaps quadratic_drag"),
+        (("identify", "decay.csv", "--out", "model.nc"), "allowed are .toml"),
+        (("identify", "forced"), "no run is free"),
+        (("compare", "absent.toml", "decay.csv"), "absent.toml: No such file"),
+        (("compare", "bare.toml", "decay.csv"), "bare.toml: has no dimensions"),
+        (("compare", "model.toml", "forced"), "no run is a free decay"),
+    ],
+)
+def test_refused_on_one_line(
+    tmp_path: Path,
+    decay_file: Path,
+    pendmap_command: Run,
+    words: tuple[str, ...],
+    complaint: str,
+) -> None:
+    (tmp_path / "empty.csv").write_text("", encoding="utf-8")
+    (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
+    (tmp_path / "model.toml").write_text("[pendulum]\nw0 = 6.2\n", encoding="utf-8")
+    forced = tmp_path / "forced"
+    forced.mkdir()
+    (forced / "run_00.csv").write_bytes(decay_file.read_bytes())
+    (forced / "experiment.toml").write_text(
+        '[[run]]\nfile = "run_00.csv"\nkind = "forced"\ndrive = { p = 0.2, Omega = 12.0 }\n',
+        encoding="utf-8",
+    )
+    before = sorted(path.name for path in tmp_path.rglob("*"))
+    run = pendmap_command(*words)
+    assert run.returncode == 2
+    assert complaint in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "shown"),
+    [
+        (6.204711, 1.4e-5, "6.204711(14)"),
+        (-0.0275698, 5.5e-7, "-0.02756980(55)"),
+        (1.0, None, "1"),
+        (1234.5, 150.0, "1234.5 +- 1.5e+02"),
+        (0.5, math.inf, "0.5"),
+    ],
+)
+def test_numbers_with_their_errors(value: float, error: float | None, shown: str) -> None:
+    assert with_error(Estimate(value, error)) == shown

@@ -1,0 +1,69 @@
+//! Records without noise, for the tests of fits.
+
+use std::sync::Arc;
+
+use pendmap::fit::linear::{Linear, linearise};
+use pendmap::fit::window::Window;
+use pendmap::fit::{Free, Problem, Record, Slot};
+use pendmap::integrate::State;
+use pendmap::integrate::course::Course;
+use pendmap::integrate::sample::sample;
+use pendmap::model::{Effect, Kind, Observation, Pendulum, Recorded};
+
+/// The error allowed to a step.
+pub const TOLERANCE: f64 = 1e-13;
+
+/// Times from 0 on.
+pub fn every(interval: f64, until: f64) -> Vec<f64> {
+    (0..=(until / interval) as usize).map(|k| k as f64 * interval).collect()
+}
+
+/// With effects.
+pub fn with(pendulum: Pendulum, effects: &[(Kind, &[f64])]) -> Pendulum {
+    effects.iter().fold(pendulum, |pendulum, (kind, values)| {
+        pendulum.with_effect(Effect::new(*kind, values).expect("in range")).expect("once")
+    })
+}
+
+/// A record of `pendulum` without noise.
+pub fn record(
+    pendulum: Pendulum,
+    recorded: Option<Arc<Recorded>>,
+    start: State,
+    until: f64,
+) -> Record {
+    let times = every(0.06, until);
+    let mut course = Course::new(&pendulum, true, 1e-14, |_, value| value);
+    if let Some(recorded) = &recorded {
+        course = course.driven_by(Arc::clone(recorded));
+    }
+    let states = sample(&course, 0.0, start, &times, |_, _| true).states;
+    let sensor = Observation::lift(&pendulum, |_, value| value);
+    let readings = states.iter().map(|state| sensor.read(state[0])).collect();
+    let weights = vec![1.0; times.len()];
+    Record { pendulum, recorded, times, readings, weights, longest: f64::INFINITY }
+}
+
+/// The same parameters free in all records.
+pub fn free(slots: &[Slot], records: usize, start: &[f64]) -> Vec<Free> {
+    let all = |slot: &Slot| (0..records).map(|record| (record, *slot)).collect();
+    slots.iter().zip(start).map(|(slot, start)| Free { places: all(slot), start: *start }).collect()
+}
+
+/// Gravity, then all parameters of the pendulum, and their values.
+/// Times from 0 on.
+pub fn everything(pendulum: &Pendulum) -> (Vec<Slot>, Vec<f64>) {
+    let parameters = pendulum.parameters();
+    let slots = (0..parameters.len()).map(Slot::Parameter);
+    let values = parameters.iter().map(|(_, value)| *value);
+    (
+        std::iter::once(Slot::Gravity).chain(slots).collect(),
+        std::iter::once(1.0).chain(values).collect(),
+    )
+}
+
+/// A window at these values.
+pub fn line(problem: &Problem, values: &[f64], window: &Window) -> Linear {
+    let shaped = problem.shaped(window.record, values).expect("in range");
+    linearise(problem, &shaped, &problem.columns(window.record), window)
+}
