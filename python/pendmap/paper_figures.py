@@ -17,7 +17,16 @@ if TYPE_CHECKING:
 
     from pendmap.identification import IdentificationReport
 
-__all__ = ["FIGURES", "PRINTED", "TABLE", "draw", "report", "table_text", "wanted", "write_table"]
+__all__ = [
+    "FIGURES",
+    "PRINTED",
+    "TABLE",
+    "draw",
+    "printed_table",
+    "report",
+    "wanted",
+    "write_table",
+]
 
 TABLE: Final = "table1"
 FIGURES: Final = {
@@ -116,31 +125,10 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     )
 
 
-def table_text(found: IdentificationReport) -> str:
-    """Return table 1 of a record in words, with the paper's below it."""
-    from pendmap.pictures import table1  # noqa: PLC0415
-
-    head, rows = table1.columns(found), table1.rows(found)
-    lines = ["Errors of each simulation from the first peak on, percent, and what it simulates"]
-    lines += _aligned([head, *rows])
-    if any(table1.RESTS in row for row in rows):
-        lines.append(f"{table1.RESTS}: the simulation stands still by then")
-    lines += [f"{name}: {why}" for name, why in table1.refused(found)]
-    lines += ["", "The paper's own table, percent"]
-    printed = [[name.replace("_", " "), *(f"{x:g}" for x in row)] for name, row in PRINTED.items()]
-    lines += _aligned([["method", *_PRINTED_HEAD], *printed])
-    return "\n".join(lines)
-
-
-def _aligned(rows: list[list[str]]) -> list[str]:
-    """Return rows as lines, the first column to the left, numbers to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = []
-    for row in rows:
-        cells = [row[0].ljust(widths[0])]
-        cells += [text.rjust(wide) for text, wide in zip(row[1:], widths[1:], strict=True)]
-        lines.append("  ".join(cells).rstrip())
-    return lines
+def printed_table() -> tuple[list[str], list[list[str]]]:
+    """Return the paper's own table 1, head and rows."""
+    rows = [[name, *(f"{x:g} %" for x in row)] for name, row in PRINTED.items()]
+    return ["the paper's own", *_PRINTED_HEAD], rows
 
 
 def write_table(found: IdentificationReport, path: str | os.PathLike[str]) -> Path:

@@ -209,9 +209,8 @@ def test_the_table_says_what_was_found() -> None:
     rows = table1.rows(found)
     assert [len(row) for row in rows] == [len(table1.columns(found))] * len(rows)
     assert rows[0][0] == "trajectory"
-    assert float(rows[0][1].split()[0]) == pytest.approx(6.2, abs=1e-3)
-    assert table1.estimate(Estimate(-0.0123456, 0.00123)) == "\u22120.0123 \u00b1 0.0012"
-    assert table1.estimate(Estimate(6.2, None)) == "6.2"
+    assert float(rows[0][1].partition("(")[0]) == pytest.approx(6.2, abs=1e-3)
+    assert table1.estimate(Estimate(-0.0123456, 0.00123)) == "\u22120.0123(12)"
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])

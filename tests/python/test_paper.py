@@ -72,7 +72,7 @@ def test_all_that_are_there(pendmap_command: Run, tmp_path: Path) -> None:
 def test_the_table_is_printed(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("paper", "table1", "--seed", 1, "--plot", "table.pdf")
     assert run.returncode == 0, run.stderr
-    for words in ("trajectory", "log decrement", "16.95", "Written: table.pdf"):
+    for words in ("trajectory", "log_decrement", "16.95 %", "Written: table.pdf"):
         assert words in run.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["table.pdf"]
 

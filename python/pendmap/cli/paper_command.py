@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from pendmap.cli.types import OutputFile
 from pendmap.files import held_interrupts
+
+if TYPE_CHECKING:
+    from pendmap.identification import IdentificationReport
 
 __all__ = ["command"]
 
@@ -66,8 +70,18 @@ def command(  # noqa: PLR0913 (an option each)
         click.echo(json.dumps({"files": written}))
     elif not quiet:
         if paper_figures.TABLE in keys:
-            click.echo(paper_figures.table_text(paper_figures.report(seed)))
+            _say(paper_figures.report(seed))
         click.echo("Written: " + ", ".join(written))
+
+
+def _say(found: IdentificationReport) -> None:
+    """Print what each method finds, what its simulation misses, and the paper's table."""
+    from pendmap import paper_figures
+    from pendmap.cli.show import write_table
+    from pendmap.identification.summary import methods_table, table1_table
+
+    for head, rows in (methods_table(found), table1_table(found), paper_figures.printed_table()):
+        write_table(head, rows)
 
 
 def _name(key: str) -> str:

@@ -75,9 +75,11 @@ def _draw(
             x / whole[0], (top - down) / whole[1], why, fontsize=size, va="bottom",
             color=style.QUIET,
         )  # fmt: skip
+    note = "in brackets: standard error of the last digits"
     if any(table1.RESTS in row for row in rows):
-        last = LINE * (len(rows) + len(refused) + 3) - 0.04
-        write(0, last, f"{table1.RESTS}: the simulation stands still by then", style.QUIET)
+        note += f";   {table1.RESTS}: the simulation stands still by then"
+    if rows:
+        write(0, LINE * (len(rows) + len(refused) + 3) - 0.04, note, style.QUIET)
 
 
 def _folded(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.identification.summary import with_error
 from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:
@@ -14,9 +15,8 @@ __all__ = ["QUANTITIES", "RESTS", "columns", "estimate", "refused", "rows"]
 
 QUANTITIES: Final = (("w0", "w0 (rad/s)"), ("c_over_m", "c/m (1/s)"), ("Tr", "Tr (rad/s\u00b2)"))
 """What methods find: the name in a report, and that of the column."""
-RESTS: Final = "rests"
+RESTS: Final = "at rest"
 """What stands for an error where a simulation has come to rest before."""
-_DIGITS: Final = 2
 _MANY: Final = 100.0
 
 
@@ -65,16 +65,8 @@ def refused(report: IdentificationReport) -> list[tuple[str, str]]:
 
 
 def estimate(found: Estimate) -> str:
-    """Return a number with its standard error, as many digits as the error leaves."""
-    value, error = found.value, found.stderr
-    minus = "\N{MINUS SIGN}"
-    if error is None or not math.isfinite(error) or error <= 0:
-        return f"{value:.5g}".replace("-", minus)
-    places = max(_DIGITS - 1 - math.floor(math.log10(error)), 0)
-    text = f"{value:.{places}f} \N{PLUS-MINUS SIGN} {error:.{places}f}"
-    if len(text) > 24:  # noqa: PLR2004 (an error that says nothing)
-        text = f"{value:.6g} \N{PLUS-MINUS SIGN} {error:.2g}"
-    return text.replace("-", minus)
+    """Return a number with its standard error in brackets, as it is written in pictures."""
+    return with_error(found).replace("-", "\N{MINUS SIGN}")
 
 
 def _percent(value: float) -> str:
