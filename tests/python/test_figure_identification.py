@@ -18,9 +18,9 @@ from decays import decay, record
 from pendmap import figures
 from pendmap.figures import identification as drawing
 from pendmap.figures import pendulum, style
-from pendmap.figures.blocks import signed_log_axis
 from pendmap.figures.decrements import triplets_of
 from pendmap.figures.half_cycles import course_of
+from pendmap.figures.sides import signed_log_axis
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
 from pendmap.identification.decrement import recursion
 from pendmap.pictures import methods, table1

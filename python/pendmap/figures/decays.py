@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.figures import blocks, style
+from pendmap.figures import blocks, sides, style
 from pendmap.figures.half_cycles import course_of, first_and_last
 from pendmap.identification.report import BEST
 from pendmap.identification.table1 import first_state, simulated_peaks
@@ -188,7 +188,7 @@ def _differences(axes: Axes, turned: Peaks, decays: dict[str, Decay]) -> None:
     error = 1e3 * Z95 * turned.stderr_amplitude
     axes.fill_between(turned.time, -error, error, color=blocks.NOISE, lw=0, zorder=0)
     least = 1e3 * float(np.median(turned.stderr_amplitude))
-    blocks.signed_log_axis(
+    sides.signed_log_axis(
         axes, curves, "difference (mrad)", least=least if 0 < least < math.inf else 1e-12
     )
 
@@ -214,7 +214,7 @@ def _near(
     everything = np.concatenate(values)
     # A model that decays too slowly would make the measured swing a line.
     bound = 3.0 * float(np.abs(theta).max()) if theta.size else math.inf
-    blocks.angle_axis(axes, np.clip(everything, -bound, bound))
+    sides.angle_axis(axes, np.clip(everything, -bound, bound))
     axes.set_xlim(*span)
     style.scale(axes, "x", span, names.clock(_SI))
 
@@ -233,7 +233,7 @@ def _residuals(axes: Axes, report: IdentificationReport) -> None:
         axes.axhline(side, color=MEASURED, lw=0.8, ls="--")
     known = np.abs(away[np.isfinite(away)])
     top = max(1.4 * float(np.percentile(known, 99.5)), 1.6 * noise) if known.size else noise
-    blocks.middle_axis(axes, top, "mrad")
+    sides.middle_axis(axes, top, "mrad")
 
 
 BLOCK: Final = blocks.Block("decay", "The decay by each model", _height, _draw)

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.figures import blocks, style
+from pendmap.figures import blocks, sides, style
 from pendmap.identification.combined import CUT
 from pendmap.identification.decrement import triplets
 from pendmap.identification.result import Estimate
@@ -155,7 +155,7 @@ def _draw(
         removed = f", {_removed(zero)} removed" if zero is not None and k else ""
         axes[1].set_title(f"{next(letters)}{DELTA}{removed}")
         for panel in axes:
-            blocks.log_axis(panel, "x", ends, SIZE)
+            sides.log_axis(panel, "x", ends, SIZE)
         _log_height(axes[0], known, level)
         _signed_height(axes[1], known, level)
         if source is not None:
@@ -185,7 +185,7 @@ def _log_height(axes: Axes, known: Floats, level: float) -> None:
         everything = np.array([1e-3, 1.0])
     low = max(float(np.percentile(everything, 2)), float(everything.max()) * 1e-4)
     low = min(low, level) if level else low
-    blocks.log_axis(axes, "y", (low / 1.6, float(everything.max()) * 1.6), f"|{DELTA}|")
+    sides.log_axis(axes, "y", (low / 1.6, float(everything.max()) * 1.6), f"|{DELTA}|")
 
 
 def _signed_height(axes: Axes, known: Floats, level: float) -> None:

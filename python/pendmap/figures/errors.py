@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.patches import Patch
 
-from pendmap.figures import blocks, style
+from pendmap.figures import blocks, sides, style
 from pendmap.figures.decays import NOTHING, Z95, handles_of
 from pendmap.model.units import Units
 from pendmap.pictures import names
@@ -54,8 +54,8 @@ def _draw(
             axes.plot(x, y, color=one.colour, ls=one.dash, lw=1.1)
     some = next(iter(errors.values()))
     _noise(left, right, report.peaks.turned, some)
-    blocks.signed_log_axis(left, [e.period_error for e in errors.values()], "error (%)")
-    blocks.signed_log_axis(right, [e.peak_error[1:] for e in errors.values()], "error (%)")
+    sides.signed_log_axis(left, [e.period_error for e in errors.values()], "error (%)")
+    sides.signed_log_axis(right, [e.peak_error[1:] for e in errors.values()], "error (%)")
     left.set_title(next(letters) + "of each period")
     right.set_title(next(letters) + "of each peak; time runs to the left")
     if some.period_time.size:
@@ -65,7 +65,7 @@ def _draw(
         style.scale(left, "x", left.get_xlim(), names.clock(_SI))
     sizes = some.peak[1:]
     ends = (max(float(np.min(sizes)), 1e-9) / 1.15, float(np.max(sizes)) * 1.15)
-    blocks.log_axis(right, "x", ends, PEAK)
+    sides.log_axis(right, "x", ends, PEAK)
 
 
 def _noise(left: Axes, right: Axes, turned: Peaks, some: PeakErrors) -> None:

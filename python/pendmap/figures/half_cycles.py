@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.lines import Line2D
 
-from pendmap.figures import blocks, style
+from pendmap.figures import blocks, sides, style
 from pendmap.figures.record import UNUSED
 from pendmap.model.units import Units
 from pendmap.pictures import names
@@ -154,7 +154,7 @@ def _whole(axes: Axes, course: Course, peaks: Peaks, title: str, *, thin: bool) 
         _coloured(axes, course.time, course.theta, course.half, 0.6)
     _peaks(axes, peaks, 1.6 if thin else 3.0, by_parity=not thin)
     every = np.concatenate([course.theta, course.other_theta])
-    blocks.angle_axis(axes, every)
+    sides.angle_axis(axes, every)
     _time(axes, np.concatenate([course.time, course.other_time]))
     more = "; grey: not for fitting" if course.other_time.size else ""
     axes.set_title(f"{title}the whole record, {len(peaks)} peaks{more}")
@@ -212,7 +212,7 @@ def _angle(
     axes.plot(
         peaks.crossing_time[cross], np.zeros(int(cross.sum())), "|", color=MEASURED, ms=8, mew=1.2
     )
-    blocks.angle_axis(axes, np.concatenate([course.theta[near], some.amplitude]))
+    sides.angle_axis(axes, np.concatenate([course.theta[near], some.amplitude]))
 
 
 def _velocity(
@@ -231,7 +231,7 @@ def _velocity(
         speed = _slopes(course, time, SPAN * float(np.median(steps)))
     _coloured(axes, time, speed, half, 1.1)
     axes.axhline(0.0, color=style.QUIET, lw=0.6, zorder=0)
-    blocks.angle_axis(axes, speed, names.speed(_SI))
+    sides.angle_axis(axes, speed, names.speed(_SI))
 
 
 def _slopes(course: Course, at: Floats, reach: float) -> Floats:
