@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pendmap import Pendulum, Rig, basins, figures, read_experiment, simulate
+from pendmap import Pendulum, Rig, basins, figures, paper_figures, read_experiment, simulate
 from pendmap.figures import style
 
 HERE = Path(__file__).resolve().parent
@@ -81,8 +81,22 @@ def record() -> None:
         figures.draw_record(read_experiment(path), HERE / "record.png", dpi=100)
 
 
+def identification() -> None:
+    """The decay by each model, and what each misses, on a virtual rig like the paper's."""
+    figures.draw_identification(
+        paper_figures.report(),
+        HERE / "identification.png",
+        parts=("decay",),
+        size=(8.6, 7.6),
+        dpi=90,
+        title="The decay by each model",
+        subtitle="virtual rig like the paper's, encoder zero off by 0.05\N{DEGREE SIGN}",
+    )
+
+
 if __name__ == "__main__":
     figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
     figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
     friction()
     record()
+    identification()

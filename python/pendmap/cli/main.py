@@ -27,6 +27,7 @@ _COMMANDS = {
     "identify": "Find natural frequency, damping and friction in a free decay, by every method.",
     "compare": "Compare a model with records that it was not fitted to.",
     "rig": "Write an experiment of a virtual rig, its truth beside it.",
+    "paper": "Draw a figure of the paper, by its number.",
     "plot": "Draw a result again, without computing.",
     "view": "Open a recording in the Rerun viewer.",
 }

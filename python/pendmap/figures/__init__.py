@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, experiment, style, trajectory
+from pendmap.figures import basins, experiment, identification, pendulum, style, trajectory
 from pendmap.figures import runs as runs_figure
 from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
@@ -23,9 +23,18 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from pendmap.identification import IdentificationReport
     from pendmap.records import Experiment
 
-__all__ = ["SUFFIXES", "RunPanel", "draw", "draw_record", "draw_runs"]
+__all__ = [
+    "SUFFIXES",
+    "RunPanel",
+    "draw",
+    "draw_identification",
+    "draw_pendulum",
+    "draw_record",
+    "draw_runs",
+]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
@@ -171,4 +180,77 @@ def draw_runs(
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         made = runs_figure.figure(runs, title=title, subtitle=subtitle, dpi=style.resolution(None))
         style.write(made, part)
+    return Path(path)
+
+
+def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
+    report: IdentificationReport,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+    parts: Sequence[str] | None = None,
+    title: str | None = None,
+    subtitle: str | None = None,
+) -> Path:
+    """Draw what was identified into a file: figures 4 to 7 of the paper and its table 1.
+
+    Parameters
+    ----------
+    report : IdentificationReport
+        What ``pendmap.identification.identify_experiment`` returned.
+    path : str or path
+        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
+    size : (float, float), optional
+        Width and height in inches; by default as large as the parts need.
+    dpi : float, optional
+        Pixels per inch, 200 by default.
+    parts : sequence of str, optional
+        Which parts, by default all: ``record`` (figure 4: angle, velocity, its sign, odd and even
+        half cycles), ``decrement`` (5: of each three peaks, with the zero error and without),
+        ``decay`` (6: every model beside the record), ``errors`` (7: of periods and peaks) and
+        ``table`` (table 1).
+    title, subtitle : str, optional
+        What stands above; by default the record's name, and what was measured.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix or part, and for an impossible size or resolution.
+    OSError
+        If the file cannot be written.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 3.
+    """
+    resolution = style.resolution(dpi)
+    style.check_size(size, resolution)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        made = identification.figure(
+            report, parts=parts, size=size, dpi=resolution, title=title, subtitle=subtitle
+        )
+        style.write(made, part)
+    return Path(path)
+
+
+def draw_pendulum(
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Draw the pendulum with its moving pivot and its equation (eq. 2.1) into a file: figure 3.
+
+    Parameters, result and errors are those of :func:`draw_record`.
+    """
+    resolution = style.resolution(dpi)
+    style.check_size(size, resolution)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(pendulum.figure(size=size, dpi=resolution), part)
     return Path(path)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from pendmap.virtual_rig.catalogue import EFFECTS, describe
 from pendmap.virtual_rig.experiment import Experiment, Request, Run, make
+from pendmap.virtual_rig.paper_rig import paper_decay
 from pendmap.virtual_rig.presets import PRESETS
 from pendmap.virtual_rig.writer import Places, held_out, places, write
 
@@ -22,6 +23,7 @@ __all__ = [
     "describe",
     "held_out",
     "make",
+    "paper_decay",
     "places",
     "write",
 ]

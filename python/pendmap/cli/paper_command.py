@@ -1,0 +1,89 @@
+"""``pendmap paper``: the paper's figures, by number."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pendmap.cli.types import OutputFile
+from pendmap.files import held_interrupts
+
+if TYPE_CHECKING:
+    from pendmap.identification import IdentificationReport
+
+__all__ = ["command"]
+
+_PICTURES = (".png", ".svg", ".pdf")
+
+
+@click.command("paper")
+@click.argument("figure", metavar="FIGURE", nargs=-1, required=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False, exists=True),
+    default=Path(),
+    metavar="DIR",
+    help="Folder for the files.  [default: the current one]",
+)
+@click.option("--plot", type=OutputFile(_PICTURES), help="File of one figure: .png .svg .pdf.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, help="Of the rig's noise.  [default: 0]"
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+def command(  # noqa: PLR0913 (an option each)
+    *,
+    figure: tuple[str, ...],
+    out: Path,
+    plot: Path | None,
+    seed: int,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Draw a figure of Horton, Wiercigroch & Xu (2008): 3 to 7, table1, or all of these.
+
+    3 is the pendulum. The others are made on a virtual rig like the paper's: 4 a decay with its
+    half cycles, 5 the decrements, 6 the decay by each model, 7 and table1 the errors of each.
+    Writes figure_4.png and so on, and table_1.csv.
+    """
+    from pendmap import paper_figures
+
+    keys = paper_figures.wanted(" ".join(figure))
+    if plot is not None and len(keys) > 1:
+        raise click.UsageError("--plot is one file: allowed with one figure; --out takes a folder")
+    written: list[str] = []
+    try:
+        for key in keys:
+            with held_interrupts():
+                path = plot or out / _name(key)
+                if path.suffix == ".csv":
+                    paper_figures.write_table(paper_figures.report(seed), path)
+                else:
+                    paper_figures.draw(key, path, seed=seed)
+                written.append(str(path))
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(*written) from None
+    if as_json:
+        click.echo(json.dumps({"files": written}))
+    elif not quiet:
+        if paper_figures.TABLE in keys:
+            _say(paper_figures.report(seed))
+        click.echo("Written: " + ", ".join(written))
+
+
+def _say(found: IdentificationReport) -> None:
+    """Print what each method finds, what its simulation misses, and the paper's table."""
+    from pendmap import paper_figures
+    from pendmap.cli.show import write_table
+    from pendmap.identification.summary import methods_table, table1_table
+
+    for head, rows in (methods_table(found), table1_table(found), paper_figures.printed_table()):
+        write_table(head, rows)
+
+
+def _name(key: str) -> str:
+    """Return a figure's file, or that of the table."""
+    return "table_1.csv" if key.startswith("table") else f"figure_{key}.png"

@@ -1,0 +1,175 @@
+"""The pendulum with its moving pivot, drawn (figure 3)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from matplotlib.patches import Arc, Circle, FancyArrowPatch, Polygon, Rectangle
+
+from pendmap.figures import sheet as sheets
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["figure"]
+
+SIZE: Final = (6.0, 5.6)
+"""Inches."""
+THETA: Final = math.radians(38.0)
+"""How far it is drawn out."""
+LENGTH: Final = 3.0
+BOB: Final = 0.3
+"""Lengths in units of the drawing, of which one is an inch."""
+
+_STEEL: Final = "#3d4f66"
+_DARK: Final = "#1d3557"
+_RAIL: Final = "#b8c2cf"
+_FORCE: Final = "#d55e00"
+_MOTION: Final = "#0072b2"
+_HELP: Final = "#8a8a8a"
+
+
+def figure(*, size: tuple[float, float] | None = None, dpi: float = 200.0) -> Figure:
+    """Return the drawing: pivot, rod, bob, angle, excitation, gravity, torques of friction."""
+    width, height = size or SIZE
+    equation = "th'' + (c/m) th' + w0\u00b2 (1 + p cos \u03a9t) sin th = \u2212Tr sign(th')"
+    known = "w0\u00b2 = g/l,   p = Y\u03a9\u00b2/g"
+    equation = f"{equation};   {known}".replace("th", "\u03b8").replace("w0", "\u03c9\u2080")
+    made = sheets.headed((width, height), dpi, "The parametric pendulum", equation, left=0.3)
+    scale = min((width - 0.2) / 5.8, (height - 0.75) / 4.85)
+    wide, high = (width - 0.2) / scale, (height - 0.75) / scale
+    axes = sheets.place(made, 0.1, 0.05, width - 0.2, height - 0.75)
+    axes.set_xlim(-wide / 2 + 0.55, wide / 2 + 0.55)
+    axes.set_ylim(1.25 - high, 1.25)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    font = 11.0 * min(scale, 1.2)
+    _guide(axes, font)
+    _rod(axes, font)
+    _forces(axes, font)
+    return made
+
+
+def _guide(axes: Axes, font: float) -> None:
+    """The slider between its rails, and how it moves."""
+    for side in (-0.42, 0.32):
+        axes.add_patch(Rectangle((side, -0.62), 0.1, 1.6, fc=_RAIL, ec="none", zorder=1))
+    outer = {-1: -0.42, 1: 0.42}
+    for way, x in outer.items():
+        for k in range(9):
+            y = -0.62 + 0.18 * k
+            axes.plot([x, x + 0.12 * way], [y, y + 0.12], color=_HELP, lw=0.7, zorder=1)
+    axes.add_patch(Rectangle((-0.3, -0.24), 0.6, 0.48, fc="white", ec=_DARK, lw=1.4, zorder=2))
+    _arrow(axes, (-1.0, -0.6), (-1.0, 0.75), _MOTION, both=True)
+    axes.plot([-1.12, -0.56], [0, 0], color=_HELP, lw=0.8, ls=(0, (6, 3)))
+    axes.text(-1.15, 0.25, "Y cos \u03a9t", ha="right", va="center", color=_MOTION, fontsize=font)
+    axes.text(
+        -1.15, -0.16, "pivot, up and down", ha="right", va="center", color=_HELP,
+        fontsize=0.78 * font,
+    )  # fmt: skip
+
+
+def _rod(axes: Axes, font: float) -> None:
+    """Rod and bob, where they hang at rest, the angle, the length."""
+    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
+    down = -LENGTH - 0.3
+    axes.plot([0, 0], [-0.3, down], color=_HELP, lw=0.9, ls=(0, (6, 3)), zorder=1)
+    axes.add_patch(Circle((0, -LENGTH), BOB, fc="none", ec=_HELP, lw=0.9, ls=(0, (3, 2)), zorder=1))
+    across, along = 0.055 * math.cos(THETA), 0.055 * math.sin(THETA)
+    axes.add_patch(
+        Polygon(
+            [(-across, -along), (across, along), (x + across, y + along), (x - across, y - along)],
+            fc=_STEEL, ec="none", zorder=3,
+        )
+    )  # fmt: skip
+    axes.add_patch(Circle((0, 0), 0.13, fc="white", ec=_DARK, lw=1.6, zorder=4))
+    axes.add_patch(Circle((0, 0), 0.04, fc=_DARK, ec="none", zorder=5))
+    axes.add_patch(Circle((x, y), BOB, fc=_DARK, ec="none", zorder=4))
+    axes.text(
+        x, y, "m", color="white", ha="center", va="center", fontsize=font, style="italic", zorder=5
+    )
+    radius = 1.55
+    axes.add_patch(
+        Arc((0, 0), 2 * radius, 2 * radius, theta1=270, theta2=270 + math.degrees(THETA) - 4,
+            color=_DARK, lw=1.3)
+    )  # fmt: skip
+    end = THETA - math.radians(0.5)
+    before = THETA - math.radians(6)
+    _arrow(
+        axes,
+        (radius * math.sin(before), -radius * math.cos(before)),
+        (radius * math.sin(end), -radius * math.cos(end)),
+        _DARK,
+    )
+    half = THETA / 2
+    axes.text(
+        (radius + 0.22) * math.sin(half), -(radius + 0.22) * math.cos(half), "\u03b8",
+        ha="center", va="center", fontsize=1.3 * font, color=_DARK,
+    )  # fmt: skip
+    # The length stands beside the rod, on the other side of the angle.
+    shift = 0.34
+    move = (shift * math.cos(THETA), shift * math.sin(THETA))
+    _arrow(axes, move, (x + move[0], y + move[1]), _HELP, both=True, thin=True)
+    axes.text(
+        x / 2 + 1.65 * move[0], y / 2 + 1.65 * move[1], "l", ha="center", va="center",
+        fontsize=1.1 * font, style="italic",
+    )  # fmt: skip
+
+
+def _forces(axes: Axes, font: float) -> None:
+    """Gravity, and friction and drag against the motion."""
+    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
+    _arrow(axes, (x, y - BOB), (x, y - BOB - 0.75), _FORCE)
+    axes.text(x + 0.14, y - BOB - 0.5, "m g", color=_FORCE, fontsize=font, va="center",
+              style="italic")  # fmt: skip
+    # The velocity is along the arc, upward.
+    side = (math.cos(THETA), math.sin(THETA))
+    start = (x + (BOB + 0.05) * side[0], y + (BOB + 0.05) * side[1])
+    _arrow(axes, start, (start[0] + 0.7 * side[0], start[1] + 0.7 * side[1]), _MOTION)
+    axes.text(
+        start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "d\u03b8/dt > 0",
+        color=_MOTION, fontsize=font, ha="center", va="bottom",
+    )  # fmt: skip
+    # A torque on the axle, against the turning.
+    first, last, radius = math.radians(52), math.radians(-14), 0.98
+    axes.add_patch(
+        Arc((0, 0), 2 * radius, 2 * radius, theta1=math.degrees(last) + 6,
+            theta2=math.degrees(first), color=_FORCE, lw=1.6)
+    )  # fmt: skip
+    before = last + math.radians(9)
+    _arrow(
+        axes,
+        (radius * math.cos(before), radius * math.sin(before)),
+        (radius * math.cos(last), radius * math.sin(last)),
+        _FORCE,
+    )
+    axes.text(
+        1.14, 0.38, "drag and dry friction\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)", color=_FORCE,
+        fontsize=0.82 * font, va="center", linespacing=1.4,
+    )  # fmt: skip
+
+
+def _arrow(  # noqa: PLR0913 (from, to, look)
+    axes: Axes,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    colour: str,
+    *,
+    both: bool = False,
+    thin: bool = False,
+) -> None:
+    axes.add_patch(
+        FancyArrowPatch(
+            start,
+            end,
+            arrowstyle="<|-|>" if both else "-|>",
+            mutation_scale=9 if thin else 13,
+            color=colour,
+            lw=0.9 if thin else 1.6,
+            shrinkA=0,
+            shrinkB=0,
+            zorder=5,
+        )
+    )

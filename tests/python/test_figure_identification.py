@@ -1,0 +1,228 @@
+"""The figure of an identification: what it shows of which record, and that every word has room."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from matplotlib.text import Text
+
+import pendmap
+from decays import decay, record
+from pendmap import figures
+from pendmap.figures import identification as drawing
+from pendmap.figures import pendulum, style
+from pendmap.figures.decrements import triplets_of
+from pendmap.figures.half_cycles import course_of
+from pendmap.figures.sides import signed_log_axis
+from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
+from pendmap.identification.decrement import recursion
+from pendmap.pictures import methods, table1
+from pendmap.records import Experiment, Run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+OFFSET = math.radians(0.05)
+
+
+def as_report(time: Any, theta: Any, **given: Any) -> IdentificationReport:  # noqa: ANN401
+    run = Run("run", "run.csv", "free", time, theta, np.ones(time.size, bool), **given)
+    return identify_experiment(Experiment(Path("run.csv"), (run,)))
+
+
+def peaks_of(count: int | None) -> IdentificationReport:
+    made = decay()
+    return as_report(made.peak_time[:count], made.peak[:count], peaks_only=True)
+
+
+RECORDS: dict[str, Callable[[], IdentificationReport]] = {
+    "whole": lambda: as_report(*record(decay(), offset=OFFSET, counts=4096)),
+    "ends above 12 degrees": lambda: as_report(*record(decay(), seconds=15.0)),
+    "begins under 12 degrees": lambda: as_report(
+        *record(decay(release=0.19), seconds=12.0, noise_deg=0.01)
+    ),
+    "rests two turns away": lambda: as_report(*record(decay(), seconds=85.0, offset=2 * math.tau)),
+    "short": lambda: as_report(*record(decay(release=1.0), seconds=1.2)),
+    "still": lambda: as_report(np.arange(300) / 100, 1e-3 * np.sin(np.arange(300)) ** 3),
+    "peaks": lambda: peaks_of(None),
+    "four peaks": lambda: peaks_of(4),
+    "two peaks": lambda: peaks_of(2),
+}
+
+
+@functools.cache
+def report(name: str) -> IdentificationReport:
+    return RECORDS[name]()
+
+
+@functools.cache
+def drawn(name: str, **given: Any) -> Figure:  # noqa: ANN401
+    with rc_context(style.RC):
+        figure = drawing.figure(report(name), dpi=100.0, **given)
+        figure.canvas.draw()
+    return figure
+
+
+def assert_room(figure: Figure) -> None:
+    """No word is cut, none covers another, none stands in another's panel."""
+    boxes = []
+    for part in figure.findobj(Text):
+        assert isinstance(part, Text)
+        if not part.get_visible() or not part.get_text().strip():
+            continue
+        box = part.get_window_extent()
+        if box.width == 0:
+            continue
+        assert figure.bbox.x0 - 1 <= box.x0, part.get_text()
+        assert box.x1 <= figure.bbox.x1 + 1, part.get_text()
+        assert figure.bbox.y0 - 1 <= box.y0, part.get_text()
+        assert box.y1 <= figure.bbox.y1 + 1, part.get_text()
+        boxes.append((part.get_text(), box))
+    panels = [("a panel", axes.get_window_extent()) for axes in figure.axes if axes.axison]
+    for (one, a), (other, b) in [
+        *itertools.combinations(boxes, 2),
+        *itertools.product(boxes, panels),
+    ]:
+        wide = min(a.x1, b.x1) - max(a.x0, b.x0)
+        high = min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert not (wide > 1.5 and high > 1.5), (one, other)
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_every_word_has_its_place(name: str) -> None:
+    assert_room(drawn(name))
+
+
+@pytest.mark.parametrize("part", drawing.PARTS)
+def test_every_part_alone(part: str) -> None:
+    assert_room(drawn("ends above 12 degrees", parts=(part,), title="Figure", subtitle=""))
+
+
+def test_sizes_that_may_be_chosen() -> None:
+    with pytest.raises(pendmap.InputError, match=r"at least \d+\.\d x \d+\.\d inches"):
+        drawn("whole", size=(4.0, 4.0))
+    figure = drawn("whole", size=(16.0, 12.0))
+    assert tuple(figure.get_size_inches()) == (16.0, 12.0)
+    assert_room(figure)
+
+
+@pytest.mark.parametrize("parts", [("decays",), ()])
+def test_unknown_parts_are_refused(parts: tuple[str, ...]) -> None:
+    with pytest.raises(pendmap.InputError, match="allowed are record, decrement"):
+        drawn("whole", parts=parts)
+
+
+def test_files_are_whole(tmp_path: Path) -> None:
+    for suffix in figures.SUFFIXES:
+        path = figures.draw_identification(
+            report("begins under 12 degrees"), tmp_path / f"a{suffix}", parts=("errors",)
+        )
+        assert path.stat().st_size > 5000
+    with pytest.raises(pendmap.InputError, match="allowed are"):
+        figures.draw_identification(report("begins under 12 degrees"), tmp_path / "a.gif")
+    assert len(list(tmp_path.iterdir())) == len(figures.SUFFIXES)
+
+
+def test_the_pendulum(tmp_path: Path) -> None:
+    assert figures.draw_pendulum(tmp_path / "a.png").stat().st_size > 5000
+    for size in (None, (9.0, 5.6), (5.6, 8.0)):
+        with rc_context(style.RC):
+            figure = pendulum.figure(size=size, dpi=100.0)
+            figure.canvas.draw()
+        assert_room(figure)
+
+
+@pytest.mark.parametrize("theta_r", [0.0, 0.002])
+def test_triplets_of_exact_peaks_are_the_decrement(theta_r: float) -> None:
+    sizes = recursion(0.2, 0.004, theta_r, 30)
+    peaks = Peaks.of(np.arange(30.0), sizes * (-1.0) ** np.arange(30))
+    found = triplets_of(peaks)
+    assert found.delta == pytest.approx(0.004, abs=1e-10)
+    assert list(found.odd[:3]) == [False, True, False]
+
+
+def test_a_zero_error_makes_triplets_alternate_until_it_is_removed() -> None:
+    sizes = recursion(0.2, 0.004, 0.002, 30)
+    peaks = Peaks.of(np.arange(30.0), sizes * (-1.0) ** np.arange(30) + OFFSET)
+    raw = triplets_of(peaks)
+    assert np.all(raw.delta[raw.odd] < 0)
+    assert np.all(raw.delta[~raw.odd] > 0.05)
+    assert triplets_of(peaks, OFFSET).delta == pytest.approx(0.004, abs=1e-10)
+
+
+def test_the_errors_of_triplets_are_those_of_repeated_readings() -> None:
+    rng = np.random.default_rng(3)
+    sizes = recursion(0.2, 0.004, 0.002, 30)
+    sign = (-1.0) ** np.arange(30)
+    found = triplets_of(Peaks.of(np.arange(30.0), sizes * sign, stderr_amplitude=1e-4))
+    drawn_ = [
+        triplets_of(Peaks.of(np.arange(30.0), sizes * sign + 1e-4 * rng.standard_normal(30))).delta
+        for _ in range(2000)
+    ]
+    assert np.std(drawn_, axis=0) == pytest.approx(found.stderr, rel=0.1)
+
+
+def test_half_cycles_are_numbered_by_their_peaks() -> None:
+    for name in ("whole", "rests two turns away"):
+        found = report(name)
+        course = course_of(found.run, found.peaks)
+        assert abs(float(np.mean(course.theta))) < 0.1
+        # Between an odd peak, which is low here, and the next one the angle grows.
+        inner = course.half == 7
+        assert np.sum(inner) > 40
+        assert course.theta[inner][-1] > course.theta[inner][0]
+
+
+def test_only_methods_that_apply_are_drawn() -> None:
+    names = {
+        text.get_text()
+        for box in drawn("ends above 12 degrees").legends
+        for text in box.get_texts()
+    }
+    assert "trajectory" in names
+    assert not {"log decrement", "combined, as printed"} & names
+    words = " ".join(
+        t.get_text() for t in drawn("ends above 12 degrees").findobj(Text) if isinstance(t, Text)
+    )
+    assert "not applicable" in words
+    printed = methods.drawn(["combined", "combined_odd_ends", "de_paula"])
+    assert printed == ["combined", "de_paula"]
+    assert methods.drawn(["combined_odd_ends", "de_paula"])[0] == "combined_odd_ends"
+
+
+def test_colours_differ() -> None:
+    looks = [methods.look(name) for name in report("whole").methods]
+    assert len({one.colour for one in looks}) == len({one.label for one in looks}) == len(looks)
+
+
+def test_the_table_says_what_was_found() -> None:
+    found = report("whole")
+    rows = table1.rows(found)
+    assert [len(row) for row in rows] == [len(table1.columns(found))] * len(rows)
+    assert rows[0][0] == "trajectory"
+    assert float(rows[0][1].partition("(")[0]) == pytest.approx(6.2, abs=1e-3)
+    assert table1.estimate(Estimate(-0.0123456, 0.00123)) == "\u22120.0123(12)"
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+@pytest.mark.parametrize("spread", [1.0, 30.0, 1e3, 1e7])
+def test_labels_over_many_powers_of_ten_have_room(scale: float, spread: float) -> None:
+    from matplotlib.figure import Figure as Empty  # noqa: PLC0415
+
+    with rc_context(style.RC):
+        figure = Empty(figsize=(4, 2), dpi=100)
+        axes = figure.add_axes((0.3, 0.2, 0.6, 0.7))
+        near = scale * np.sin(np.arange(50.0))
+        signed_log_axis(axes, [near, -near * spread], "error")
+        figure.draw_without_rendering()
+    assert_room(figure)
+    assert len([t for t in axes.get_yticklabels() if t.get_text()]) >= 3

@@ -1,0 +1,94 @@
+"""``pendmap paper``: the figures of the paper, by number."""
+
+from __future__ import annotations
+
+import csv
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+
+import pendmap
+from pendmap import paper_figures, virtual_rig
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+
+@pytest.mark.parametrize("name", ["4", "figure 4", "Figure_4", "fig.4", "fig4"])
+def test_a_figure_has_several_names(name: str) -> None:
+    assert paper_figures.wanted(name) == ["4"]
+    assert paper_figures.wanted("table 1") == paper_figures.wanted("table1") == ["table1"]
+    assert paper_figures.wanted("all") == ["3", "4", "5", "6", "7", "table1"]
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("8", "not there yet"),
+        ("figure 1", "not there yet"),
+        ("10", "'10' is not one"),
+        ("x", "'x'"),
+    ],
+)
+def test_what_is_not_there_is_refused_in_one_line(
+    pendmap_command: Run, tmp_path: Path, name: str, says: str
+) -> None:
+    run = pendmap_command("paper", name)
+    assert run.returncode == 2
+    assert says in run.stderr
+    assert "allowed are 3, 4, 5, 6, 7, table1 and all" in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_one_figure(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("paper", "3")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == "Written: figure_3.png\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["figure_3.png"]
+    run = pendmap_command("paper", "figure", "3", "--plot", "a.svg", "--json")
+    assert json.loads(run.stdout) == {"files": ["a.svg"]}
+
+
+def test_all_that_are_there(pendmap_command: Run, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    run = pendmap_command("paper", "all", "--out", "out", "--json")
+    assert run.returncode == 0, run.stderr
+    files = json.loads(run.stdout)["files"]
+    names = [*(f"figure_{k}.png" for k in range(3, 8)), "table_1.csv"]
+    assert files == [f"out/{name}" for name in names]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(names)
+    assert all((tmp_path / name).stat().st_size > 300 for name in files)
+    with (tmp_path / "out" / "table_1.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["what"] for row in rows] == ["period", "period", "peak", "peak"]
+    assert float(rows[2]["measured"]) == pytest.approx(1.2, abs=0.05)
+    assert float(rows[2]["trajectory_percent"]) < 0.1 < float(rows[2]["combined_percent"])
+
+
+def test_the_table_is_printed(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("paper", "table1", "--seed", 1, "--plot", "table.pdf")
+    assert run.returncode == 0, run.stderr
+    for words in ("trajectory", "log_decrement", "16.95 %", "Written: table.pdf"):
+        assert words in run.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["table.pdf"]
+
+
+def test_options_that_do_not_go_together(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("paper", "all", "--plot", "a.png")
+    assert run.returncode == 2
+    assert "--plot is one file" in run.stderr
+    run = pendmap_command("paper", "4", "--out", "nowhere")
+    assert run.returncode == 2
+    assert "nowhere" in run.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_same_seed_gives_the_same_record() -> None:
+    one, same, other = (virtual_rig.paper_decay(seed)[1] for seed in (3, 3, 4))
+    assert one.tobytes() == same.tobytes() != other.tobytes()
+    with pytest.raises(pendmap.InputError, match="one figure"):
+        paper_figures.draw("all", "a.png")
