@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, experiment, identification, pendulum, style, trajectory
+from pendmap.figures import basins, style, trajectory
 from pendmap.figures import runs as runs_figure
 from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
@@ -23,13 +23,14 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.identification import IdentificationReport
+    from pendmap.identification import Comparison, IdentificationReport
     from pendmap.records import Experiment
 
 __all__ = [
     "SUFFIXES",
     "RunPanel",
     "draw",
+    "draw_comparison",
     "draw_identification",
     "draw_pendulum",
     "draw_record",
@@ -142,10 +143,43 @@ def draw_record(
     OSError
         If the file cannot be written.
     """
+    from pendmap.figures import experiment  # noqa: PLC0415 (what reads records takes a while)
+
     resolution = style.resolution(dpi)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         style.write(experiment.figure(records, size=size, dpi=resolution), part)
+    return Path(path)
+
+
+def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
+    """Draw a model beside the records that it is compared with into a file.
+
+    For each run: record and model, the residual with the noise, errors of periods and peaks.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What ``pendmap.identification.compare`` returned.
+    path : str or path
+        As of :func:`draw`.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If the file cannot be written.
+    """
+    from pendmap.figures import comparison as sheet  # noqa: PLC0415 (scipy takes a while)
+
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(sheet.figure(comparison, dpi=style.resolution(None)), part)
     return Path(path)
 
 
@@ -229,6 +263,8 @@ def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
     ----------
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 3.
     """
+    from pendmap.figures import identification  # noqa: PLC0415 (likewise)
+
     resolution = style.resolution(dpi)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
@@ -249,6 +285,8 @@ def draw_pendulum(
 
     Parameters, result and errors are those of :func:`draw_record`.
     """
+    from pendmap.figures import pendulum  # noqa: PLC0415 (likewise)
+
     resolution = style.resolution(dpi)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):

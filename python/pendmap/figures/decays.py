@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pendmap.figures.half_cycles import Course
     from pendmap.identification import IdentificationReport, Peaks
     from pendmap.model import Rig
+    from pendmap.records import Run
 
     Floats = NDArray[np.float64]
 
@@ -223,12 +224,20 @@ def _residuals(axes: Axes, report: IdentificationReport) -> None:
     """Draw the residuals of the whole record, with the noise that it has without any model."""
     if report.joint is None:
         return
-    run = report.run
-    away = 1e3 * np.where(run.trusted, report.joint.fit.residuals[0], np.nan)
+    draw_residuals(
+        axes, report.run, report.joint.fit.residuals[0], report.joint.readings[0].sigma, BEST
+    )
+
+
+def draw_residuals(
+    axes: Axes, run: Run, residual: NDArray[np.float64], sigma: float, method: str
+) -> None:
+    """Draw the residuals of a model over a record, with the noise ``sigma`` as lines."""
+    away = 1e3 * np.where(run.trusted, residual, np.nan)
     every = max(1, away.size // MOST)
-    one = look(BEST)
+    one = look(method)
     axes.plot(run.time[::every], away[::every], ".", color=one.colour, ms=1.2, rasterized=True)
-    noise = 1e3 * report.joint.readings[0].sigma
+    noise = 1e3 * sigma
     for side in (-noise, noise):
         axes.axhline(side, color=MEASURED, lw=0.8, ls="--")
     known = np.abs(away[np.isfinite(away)])

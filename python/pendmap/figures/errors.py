@@ -14,7 +14,7 @@ from pendmap.pictures import names
 from pendmap.pictures.methods import drawn, look
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pendmap.figures.blocks import Box
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
 
-__all__ = ["BLOCK"]
+__all__ = ["BLOCK", "draw_errors"]
 
 PEAK: Final = "measured peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 _SI: Final = Units(si=True)
@@ -36,12 +36,24 @@ def _draw(
     figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
 ) -> None:
     errors = {name: report.table.errors[name] for name in drawn(report.table.errors)}
+    draw_errors(figure, box, errors, report.peaks, letters, title)
+
+
+def draw_errors(  # noqa: PLR0913, PLR0917 (where, what, and how it is named)
+    figure: Figure,
+    box: Box,
+    errors: Mapping[str, PeakErrors],
+    peaks: Peaks,
+    letters: Iterator[str],
+    title: str,
+) -> None:
+    """Draw the errors of periods and peaks by model, with what the noise of the peaks explains."""
     if not errors:
         room = blocks.named(figure, box, title)
         blocks.say(figure, room, NOTHING)
         return
     handles, texts = handles_of(list(errors))
-    if np.any(report.peaks.turned.stderr_amplitude > 0):
+    if np.any(peaks.turned.stderr_amplitude > 0):
         handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
     room = blocks.named(figure, box, title, handles, texts)
     left, right = (cell.panel(figure) for cell in room.columns(2, 0.85))
@@ -53,7 +65,7 @@ def _draw(
         ):
             axes.plot(x, y, color=one.colour, ls=one.dash, lw=1.1)
     some = next(iter(errors.values()))
-    _noise(left, right, report.peaks.turned, some)
+    _noise(left, right, peaks.turned, some)
     sides.signed_log_axis(left, [e.period_error for e in errors.values()], "error (%)")
     sides.signed_log_axis(right, [e.peak_error[1:] for e in errors.values()], "error (%)")
     left.set_title(next(letters) + "of each period")

@@ -45,6 +45,7 @@ _LOOKS: Final = {
     "log_decrement": Look("log decrement", "#e69f00"),
     "de_paula": Look("de Paula", "#cc79a7"),
     "energy_balance": Look("energy balance", "#56b4e9", "--"),
+    "model": Look("model", "#0072b2"),
 }
 """Okabe and Ito's colours, for the methods that stand beside one another."""
 _OTHER: Final = "#8a8a8a"
