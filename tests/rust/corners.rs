@@ -256,3 +256,14 @@ fn a_load_that_only_just_touches_zero_is_not_missed() {
     }
     assert!(touches > 3, "{touches}");
 }
+
+/// The equation holds the side of one corner: a second effect with one needs more.
+#[test]
+fn one_effect_of_the_library_has_a_corner() {
+    let cornered = Kind::ALL.iter().filter(|kind| {
+        let effect = Effect { kind: **kind, parameters: [1.0; 3] };
+        let pendulum = Pendulum { effects: vec![effect], ..driven(0.1, 1.0, 2.0) };
+        pendulum.equation().has_corner()
+    });
+    assert_eq!(cornered.count(), 1);
+}

@@ -4,17 +4,20 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
-use super::block::{Block, Held, Scratch};
-use super::corner::{self, Corner};
-use super::general::{Clock, Own, Running, STEP, Shared, Stages, Stepping, WHOLE};
-use super::step::{Moving, Rubbing};
-use super::stroboscopic::Strobe;
-use super::ticket::{Progress, Reached, Switching, Ticket};
+use crate::integrate::block::{Block, Held};
+use crate::integrate::corner::{self, Corner};
+use crate::integrate::general::{Clock, Running, STEP, Shared, Stages, Stepping};
+use crate::integrate::step::{Moving, Rubbing};
+use crate::integrate::stroboscopic::Strobe;
 use crate::lanes::Lane;
 use crate::lanes::sine::{Coarse, Degree, Fine};
 use crate::model::Equation;
 use crate::model::pendulum::Route;
 use crate::model::rest::{Release, release};
+
+mod queue;
+
+use queue::keep;
 
 /// How much further than its first acceleration takes it a velocity may go within a step.
 const REACH: f64 = 1.25;
@@ -251,136 +254,6 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let equation = &self.equation;
         Q::apart(self.tokens.1, Stepping { equation, clock, signs, part, state, ends, stages });
     }
-
-    #[inline(always)]
-    fn flagged<A: Lane>(
-        &self,
-        block: &mut Block,
-        at: usize,
-        flags: u128,
-        [before, after]: [Moving<A>; 2],
-        ends: [A; 2],
-        time: [f64; 2],
-    ) {
-        let stored = &mut block.scratch;
-        before.half_turns.store(&mut stored[0]);
-        before.kick.store(&mut stored[1]);
-        after.half_turns.store(&mut stored[2]);
-        after.kick.store(&mut stored[3]);
-        ends[0].store(&mut stored[4]);
-        ends[1].store(&mut stored[5]);
-        self.enqueue(block, at, flags, time);
-    }
-
-    /// Tickets for the flagged lanes of the bundle at `at`.
-    #[inline(never)]
-    fn enqueue(&self, block: &mut Block, at: usize, mut flags: u128, time: [f64; 2]) {
-        let scale = 1.0 / self.strobe.schedule.kick;
-        // What a stage's load adds to the kick in one step.
-        let gain = scale / (time[1] - time[0]);
-        while flags != 0 {
-            let bit = flags.trailing_zeros() as usize;
-            flags &= flags - 1;
-            let [x0, k0, x1, k1, first, last, ..] =
-                block.scratch.each_ref().map(|values| values[bit]);
-            let sense = 1_f64.copysign(k0);
-            let state = [x0 * PI, k0 * scale];
-            let whole = Reached {
-                theta: x1 * PI,
-                velocity: k1 * scale,
-                acceleration: [first * gain, last * gain],
-                switching: Switching::of(&block.scratch, bit),
-            };
-            block.queue.extend(Ticket::known(at + bit, state, sense, time, &whole));
-        }
-    }
-
-    /// Runs the queue until every ticket has arrived or is held.
-    #[inline(always)]
-    fn work_off(&self, block: &mut Block, stages: &mut Stages<Q>) {
-        let token = self.tokens.1;
-        while !block.queue.is_empty() {
-            let mut first = 0;
-            while first < block.queue.len() {
-                let count = (block.queue.len() - first).min(Q::WIDTH);
-                gather(&block.queue[first..first + count], &mut block.scratch);
-                let asked = &mut *block.scratch;
-                let mut lanes = Running {
-                    theta: Q::load(token, &asked[0]),
-                    velocity: Q::load(token, &asked[1]),
-                };
-                let sense = Q::load(token, &asked[2]);
-                let clock =
-                    Own { begin: Q::load(token, &asked[3]), length: Q::load(token, &asked[4]) };
-                let mut ends = [sense; 2];
-                let mut side = sense;
-                let mut early = None;
-                if let Some(corner) = &self.corner {
-                    let begin = corner.forcing(clock.begin);
-                    let switch = corner.at(&begin, lanes.theta, lanes.velocity);
-                    side = switch.side(Q::load(token, &asked[6]));
-                    early = Some(switch);
-                }
-                self.carry(WHOLE, clock, [sense, side], &mut lanes, &mut ends, stages);
-                if let (Some(corner), Some(early)) = (&self.corner, early) {
-                    let end = corner.forcing(clock.begin + clock.length);
-                    let last = corner.at(&end, lanes.theta, lanes.velocity);
-                    let rates = [early.rate(ends[0]), last.rate(ends[1])];
-                    keep(asked, side, [early.value, last.value], rates);
-                }
-                lanes.theta.store(&mut asked[0]);
-                lanes.velocity.store(&mut asked[1]);
-                ends[0].store(&mut asked[2]);
-                ends[1].store(&mut asked[3]);
-                self.answer(block, first, count);
-                first += count;
-            }
-            block.queue.retain(|ticket| ticket.lane != usize::MAX);
-        }
-    }
-
-    #[inline(never)]
-    fn answer(&self, block: &mut Block, first: usize, count: usize) {
-        let holds = self.strobe.friction.then_some(&self.single);
-        for i in 0..count {
-            let ends = &block.scratch;
-            let reached = Reached {
-                theta: ends[0][i],
-                velocity: ends[1][i],
-                acceleration: [ends[2][i], ends[3][i]],
-                switching: Switching::of(ends, i),
-            };
-            let ticket = &mut block.queue[first + i];
-            let lane = ticket.lane;
-            match ticket.take(&reached, holds, self.length) {
-                Progress::Asks => continue,
-                Progress::Arrived { theta, velocity } => {
-                    block.half_turns[lane] = theta * FRAC_1_PI;
-                    block.kick[lane] = velocity * self.strobe.schedule.kick;
-                }
-                Progress::Held { theta, until, sense } => {
-                    let half_turns = theta * FRAC_1_PI;
-                    block.half_turns[lane] = half_turns;
-                    block.kick[lane] = 0.0;
-                    block.held_at[lane] = half_turns;
-                    block.held.push(Held { lane, half_turns, until, sense });
-                }
-            }
-            ticket.lane = usize::MAX;
-        }
-    }
-}
-
-#[inline(never)]
-fn gather(tickets: &[Ticket], asked: &mut Scratch) {
-    for (i, ticket) in tickets.iter().enumerate() {
-        asked[0][i] = ticket.theta;
-        asked[1][i] = ticket.velocity;
-        asked[2][i] = ticket.sense;
-        asked[3][i] = ticket.begin;
-        asked[4][i] = ticket.length;
-        asked[6][i] = ticket.side;
-    }
 }
 
 /// The acceleration at the end of a step, by the cubic that the velocity is with these angles,
@@ -391,17 +264,6 @@ fn last_acceleration<L: Lane>(begin: Running<L>, end: Running<L>, first: L, leng
     let mean = (end.theta - begin.theta).scale(12.0 / length);
     let both = end.velocity.scale_add(6.0, begin.velocity.scale(6.0));
     (both - mean).scale_add(1.0 / length, first)
-}
-
-/// Writes the side of a corner, and values and rates of its function at both ends, where
-/// [`Switching::of`] reads them.
-#[inline(always)]
-fn keep<L: Lane>(scratch: &mut Scratch, side: L, values: [L; 2], rates: [L; 2]) {
-    side.store(&mut scratch[6]);
-    values[0].store(&mut scratch[7]);
-    rates[0].store(&mut scratch[8]);
-    values[1].store(&mut scratch[9]);
-    rates[1].store(&mut scratch[10]);
 }
 
 /// The lanes whose velocity, `u` before and `v` after a step in the sense of the motion, has passed

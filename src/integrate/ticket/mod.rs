@@ -6,10 +6,14 @@
 //! zero of the switching function of a corner, where only the formula changes. The velocity's zero is
 //! found first, and then whether a corner comes before it.
 
-use super::block::Scratch;
-use super::corner;
 use crate::model::Equation;
 use crate::model::rest::{Release, release};
+
+mod corners;
+mod cubic;
+
+pub use corners::Switching;
+use cubic::Cubic;
 
 /// Integrations after which a ticket gives up; its trajectory counts as failed.
 const MOST_ROUNDS: u32 = 400;
@@ -24,19 +28,11 @@ const MOST_NEWTON: u32 = 8;
 /// Where the velocity's least value, as its cubic gives it, is below this part of its change over the
 /// piece, the integration decides.
 const GRAZING: f64 = 0.1;
-/// Steps of Newton's method on the cubic.
-const POLISHINGS: usize = 3;
 /// A first guess is at least this part of the piece.
 const LEAST_GUESS: f64 = 1e-6;
 /// After a release the next one is at least this part of the period away: at the stick's edge a slip
 /// may be shorter than rounding can tell.
 const LEAST_SLIP: f64 = 1e-7;
-
-/// Integrations after which corners are no longer looked for: where many crowd they are as good as
-/// none, since the equation is continuous.
-const MOST_CORNERED: u32 = 100;
-/// Integrations that a hollow of the switching function may take.
-const MOST_HOLLOWS: u32 = 6;
 
 /// What a ticket waits for.
 #[derive(Clone, Copy, Debug)]
@@ -52,25 +48,6 @@ enum Stage {
     Hollow { stop: Option<[f64; 2]>, tries: u32 },
     /// A zero of the switching function between the two times.
     Corner { low: f64, high: f64, tries: u32 },
-}
-
-/// The switching function of a corner over an integration; all 0 where there is none.
-#[derive(Clone, Copy, Debug)]
-pub struct Switching {
-    /// The side held.
-    side: f64,
-    /// Value and rate at the begin.
-    begin: [f64; 2],
-    /// The same at the end.
-    end: [f64; 2],
-}
-
-impl Switching {
-    /// That of a lane of a bundle.
-    pub(super) fn of(scratch: &Scratch, lane: usize) -> Self {
-        let [side, a, b, c, d] = [6, 7, 8, 9, 10].map(|row: usize| scratch[row][lane]);
-        Self { side, begin: [a, b], end: [c, d] }
-    }
 }
 
 /// The end of an integration, as the lanes return it.
@@ -321,107 +298,6 @@ impl Ticket {
         }
     }
 
-    /// Values and rates of the switching function at both ends, on the side of the piece.
-    fn switching(&self, reached: &Reached) -> [f64; 4] {
-        let Switching { side, begin, end } = reached.switching;
-        let [s0, r0] = begin.map(|x| side * x);
-        let [s1, r1] = end.map(|x| side * x);
-        if self.crossed { [0.0, s1, r0.max(0.0), r1] } else { [s0, s1, r0, r1] }
-    }
-
-    /// Asks on if the switching function passes zero in the first `h` of the piece, or may do so.
-    fn look_for_corner(
-        &mut self,
-        reached: &Reached,
-        h: f64,
-        stop: Option<[f64; 2]>,
-    ) -> Option<Progress> {
-        if reached.switching.side == 0.0 || self.rounds > MOST_CORNERED {
-            return None;
-        }
-        let ends = self.switching(reached);
-        let [s0, s1, r0, r1] = ends;
-        if s1 < 0.0 {
-            self.whole = Some(*reached);
-            self.seek_corner(h);
-        } else if s0 + corner::REACH * h * r0 < 0.0 || s1 - corner::REACH * h * r1 < 0.0 {
-            self.length = Cubic::new(ends, h).lowest() * h;
-            self.stage = Stage::Hollow { stop, tries: 0 };
-        } else {
-            return None;
-        }
-        Some(Progress::Asks)
-    }
-
-    /// The switching function's least value is on the other side, or further on, or nothing.
-    fn hollow(
-        &mut self,
-        reached: &Reached,
-        stop: Option<[f64; 2]>,
-        tries: u32,
-    ) -> Option<Progress> {
-        let t = self.length;
-        let [_, s, r0, r] = self.switching(reached);
-        if s < 0.0 {
-            self.whole = Some(*reached);
-            self.seek_corner(t);
-            return Some(Progress::Asks);
-        }
-        let bend = (r - r0) / t;
-        let step = -r / bend;
-        let inside = t + step > 0.0 && t + step < self.piece;
-        if !(bend > 0.0 && inside && s + 0.5 * r * step < 0.0) || tries >= MOST_HOLLOWS {
-            return None;
-        }
-        self.length = t + step;
-        self.stage = Stage::Hollow { stop, tries: tries + 1 };
-        Some(Progress::Asks)
-    }
-
-    /// Asks for the state at the first zero of the switching function over a piece of length `h`.
-    fn seek_corner(&mut self, h: f64) {
-        self.piece = h;
-        self.close = closeness(h);
-        let guess = self.whole.map_or(0.5, |w| Cubic::new(self.switching(&w), h).zero());
-        self.length = guess.clamp(LEAST_GUESS, 1.0) * h;
-        self.stage = Stage::Corner { low: 0.0, high: h, tries: 0 };
-    }
-
-    fn cornered(
-        &mut self,
-        reached: &Reached,
-        [mut low, mut high]: [f64; 2],
-        tries: u32,
-    ) -> Progress {
-        let t = self.length;
-        let [_, s, _, r] = self.switching(reached);
-        if s >= 0.0 {
-            low = t;
-        } else {
-            high = t;
-        }
-        // After a corner the begin is a zero itself, and is divided out.
-        let slope = if self.crossed { r - s / t } else { r };
-        let step = if s == 0.0 { 0.0 } else { -s / slope };
-        if step.abs() <= self.close || high <= self.close {
-            let begin = self.begin + t;
-            if begin >= self.end {
-                return Progress::Arrived { theta: reached.theta, velocity: reached.velocity };
-            }
-            let state = [reached.theta, reached.velocity];
-            let next = Self::new(self.lane, state, self.sense, begin, self.end);
-            *self = Self { rounds: self.rounds, side: -self.side, crossed: true, ..next };
-            return Progress::Asks;
-        }
-        let mut next = t + step;
-        if !(next > low && next < high) || tries >= MOST_NEWTON {
-            next = 0.5 * (low + high);
-        }
-        self.length = next;
-        self.stage = Stage::Corner { low, high, tries: (tries + 1) % (2 * MOST_NEWTON) };
-        Progress::Asks
-    }
-
     /// The velocity is zero at `tau`: what comes next.
     fn stopped(
         &mut self,
@@ -458,52 +334,4 @@ impl Ticket {
 /// The Newton step at which a zero within a piece of length `h` is found.
 fn closeness(h: f64) -> f64 {
     h * (CLOSE * (4.0 * h).powi(4)).clamp(CLOSEST[0], CLOSEST[1])
-}
-
-/// The velocity over a piece, or a switching function, as a cubic of the time in pieces, from both
-/// ends.
-struct Cubic([f64; 4]);
-
-impl Cubic {
-    fn new([u0, u1, b0, b1]: [f64; 4], h: f64) -> Self {
-        let (d0, d1, rise) = (b0 * h, b1 * h, u1 - u0);
-        Self([u0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise])
-    }
-
-    fn at(&self, x: f64) -> f64 {
-        let [a, b, c, d] = self.0;
-        a + x * (b + x * (c + x * d))
-    }
-
-    /// Where it is least, inside.
-    fn lowest(&self) -> f64 {
-        let [_, b, c, d] = self.0;
-        // b + 2 c x + 3 d x^2 = 0 with rising slope, without cancellation.
-        let root = (c * c - 3.0 * b * d).max(0.0).sqrt();
-        let x = if c >= 0.0 { -b / (c + root) } else { (root - c) / (3.0 * d) };
-        if (0.0..=1.0).contains(&x) { x } else { 0.5 }
-    }
-
-    /// Its passage from above to below zero, which its ends promise: near enough to begin Newton's
-    /// method on the motion itself.
-    fn zero(&self) -> f64 {
-        // After a reversal the begin is a zero itself, and is divided out.
-        let [a, b, c, d] = match self.0 {
-            [0.0, b, c, d] => [b, c, d, 0.0],
-            whole => whole,
-        };
-        let (mut low, mut high) = (0.0, 1.0);
-        let mut x = a / (a - (a + b + c + d));
-        for _ in 0..POLISHINGS {
-            let value = a + x * (b + x * (c + x * d));
-            if value < 0.0 {
-                high = x;
-            } else {
-                low = x;
-            }
-            let next = x - value / (b + x * (2.0 * c + 3.0 * d * x));
-            x = if next > low && next < high { next } else { 0.5 * (low + high) };
-        }
-        x
-    }
 }
