@@ -42,10 +42,12 @@ pub struct Switch<L> {
 
 impl<L: Lane> Corner<L> {
     /// Of an equation that has one; `number` is of the shape of the others.
+    #[inline(always)]
     pub fn new(equation: &Equation<f64>, number: L) -> Option<Self> {
         let zero = number.like(0.0);
         let shape = Tangent { value: zero, slope: [zero; 2] };
-        equation.has_corner().then(|| Self(equation.map(shape), zero))
+        // No closure: it would lose the instruction set.
+        if equation.has_corner() { Some(Self(equation.map(shape), zero)) } else { None }
     }
 
     /// The drive at time `tau`.

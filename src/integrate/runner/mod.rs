@@ -181,10 +181,11 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let length = Q::splat(token, table.length);
         let clock = Shared { forcing: &table.steps()[k], length };
         let corner = match &self.corner {
-            Some(corner) => {
-                let [begin, end] = time.map(|time| corner.forcing(Q::splat(token, time)));
-                Some((corner, begin, end))
-            }
+            Some(corner) => Some((
+                corner,
+                corner.forcing(Q::splat(token, time[0])),
+                corner.forcing(Q::splat(token, time[1])),
+            )),
             None => None,
         };
         let mut at = 0;
