@@ -1,0 +1,261 @@
+"""Which effects are missing: candidates refitted, accepted, dropped and exchanged."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+from pendmap.discrepancy.baseline import taken_by
+from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.discrepancy.scores import Scores, scores_of
+from pendmap.discrepancy.trial import Held, Trial, fitted, tried, with_candidates
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Sequence
+
+    from pendmap.discrepancy.evidence import Evidence
+
+__all__ = ["GATE", "Attempt", "Found", "Search"]
+
+GATE: Final = 12.0
+"""The least score of a candidate that is refitted: of all candidates together none passes 8.5
+where nothing is missing."""
+
+GAIN: Final = 12.0
+"""The least fall of the BIC for which an effect is accepted."""
+
+REFITTED: Final = 4
+"""So many candidates are refitted, those with the greatest scores."""
+
+LOSS: Final = 4.0
+"""By so much a model may be worse on what was held back and still be accepted: two standard
+errors of what a parameter that is right, but not exact, does there."""
+
+PAIRED: Final = 8
+"""Pairs are looked for among so many candidates."""
+
+KICK: Final = 0.1
+"""Part of the score's step from which a candidate is fitted a second time."""
+
+SHORT: Final = 0.8
+"""A first fit that gains less than this part of what the score promised is tried again."""
+
+ZERO: Final = "encoder_offset"
+"""Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Attempt:
+    """A candidate that was refitted.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The effects.
+    shape : dict of str to float
+        Of the first, without dimensions.
+    score : float
+        What was expected of it.
+    gain : float
+        By how much the BIC fell.
+    held_gain : float
+        The same of the sum of squares on what was held back.
+    accepted : bool
+        Whether it is in the model from there on.
+    stage : int
+        How many effects the model had before.
+    """
+
+    names: tuple[str, ...]
+    shape: dict[str, float]
+    score: float
+    gain: float
+    held_gain: float
+    accepted: bool
+    stage: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """A trial and how it does on what was held back."""
+
+    trial: Trial
+    held: Held
+
+
+class Search:
+    """The search for the effects that a model lacks.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    base : Trial
+        The model to begin with.
+    most : int
+        How many effects are added at most; the sensor's zero does not count.
+    without : collection of str
+        Effects that are no candidates.
+    progress : callable
+        Called with the number of effects found so far.
+    """
+
+    def __init__(
+        self,
+        evidence: Evidence,
+        base: Trial,
+        most: int,
+        without: Collection[str],
+        progress: Callable[[int], None],
+    ) -> None:
+        self.evidence = evidence
+        self.most = most
+        self.without = without
+        self.progress = progress
+        self.base = Found(base, tried(evidence, base))
+        self.attempts: list[Attempt] = []
+        self.first: Scores | None = None
+
+    def run(self) -> Found:
+        """Return the best model."""
+        best = self.base
+        while self._room(best.trial) > 0:
+            following = self._following(best)
+            if following is None:
+                break
+            best = following
+            self.progress(len(best.trial.chosen))
+        return self._without_idle(best) if len(best.trial.chosen) > 1 else best
+
+    def pool(self, trial: Trial) -> list[list[Candidate]]:
+        """Return the candidates that a trial's model does not have yet."""
+        return candidates(taken_by(trial), driven=self.evidence.forced, without=self.without)
+
+    def scores(self, trial: Trial) -> Scores:
+        """Return the scores of all candidates at a trial."""
+        return scores_of(self.evidence, trial, self.pool(trial))
+
+    def level(self) -> float:
+        """Return by what sums of squares are divided: the noise as the baseline leaves it."""
+        return max(self.base.trial.remainder.level, 0.5)
+
+    def _room(self, trial: Trial) -> int:
+        return self.most - len([name for name in trial.names if name != ZERO])
+
+    def _following(self, current: Found) -> Found | None:
+        """Return the model with the best further effect, or pair of them, that is accepted."""
+        scores = self.scores(current.trial)
+        if self.first is None:
+            self.first = scores
+        level = self.level()
+        ranked = scores.best()
+        wanted = [[k] for k in ranked[:REFITTED] if scores.scores[k].gain >= GATE * level]
+        if self._room(current.trial) > 1:
+            wanted += self._promising_pairs(scores, ranked, level)
+        refitted = []
+        for places in wanted:
+            found = self.refit(current.trial, scores, places)
+            if found is not None:
+                refitted.append((found, places))
+        refitted.sort(key=lambda pair: pair[0].trial.bic(level))
+        accepted = None
+        for found, places in refitted:
+            good = accepted is None and self.accepts(current, found)
+            accepted = found if good else accepted
+            self._note(current, found, scores, places, good=good)
+        return accepted
+
+    def _promising_pairs(
+        self, scores: Scores, ranked: Sequence[int], level: float
+    ) -> list[list[int]]:
+        """Return the best pair, if it promises more than its members one after the other."""
+        pairs = scores.pairs([k for k in ranked[:PAIRED] if scores.scores[k].gain > 0])
+        if not pairs:
+            return []
+        gain, a, b = pairs[0]
+        alone = max(scores.scores[a].gain, scores.scores[b].gain, scores.scores[ranked[0]].gain)
+        return [[a, b]] if gain - alone > 2 * GATE * level else []
+
+    def refit(self, trial: Trial, scores: Scores, places: Sequence[int]) -> Found | None:
+        """Fit candidates from the score's whole step, and from a part of it if that fails."""
+        added = [scores.scores[k].candidate for k in places]
+        start = {n: v for k in places for n, v in scores.scores[k].start.items()}
+        found = self._fit(trial, added, start)
+        promised = scores.together(places)
+        if found is None or trial.chi2 - found.chi2 < SHORT * promised:
+            sizes = {candidate.free[0] for candidate in added}
+            kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
+            other = self._fit(trial, added, kick)
+            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+        return None if found is None else Found(found, tried(self.evidence, found))
+
+    def _fit(
+        self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]
+    ) -> Trial | None:
+        try:
+            return with_candidates(self.evidence, trial, added, start)
+        except InputError:
+            return None  # the start leads out of the range of numbers
+
+    def accepts(self, current: Found, found: Found) -> bool:
+        """Whether a model is better than one with fewer effects, by more than chance."""
+        level = self.level()
+        fall = current.trial.bic(level) - found.trial.bic(level)
+        held = (current.held.chi2 - found.held.chi2) / level
+        return fall >= GAIN and held >= -LOSS
+
+    def _note(
+        self, current: Found, found: Found, scores: Scores, places: Sequence[int], *, good: bool
+    ) -> None:
+        level = self.level()
+        added = [scores.scores[k].candidate for k in places]
+        self.attempts.append(
+            Attempt(
+                tuple(candidate.name for candidate in added),
+                dict(added[0].shape),
+                scores.together(places) / level,
+                current.trial.bic(level) - found.trial.bic(level),
+                (current.held.chi2 - found.held.chi2) / level,
+                good,
+                len(current.trial.chosen),
+            )
+        )
+
+    def less(self, trial: Trial, dropped: Candidate) -> Trial:
+        """Fit a trial's model without one of the effects that were added."""
+        gone = {*dropped.free, *dropped.adapted}
+        free = [name for name in trial.free if name not in gone]
+        model = trial.fit.model
+        effects = tuple(e for e in model.effects if e.name != dropped.name)
+        own = {name: 0.0 for name in gone if name in ("Tr", "torque")}
+        model = dataclasses.replace(model, effects=effects, **own)
+        start = {name: value for name, value in trial.start.items() if name not in gone}
+        chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+        return fitted(
+            self.evidence, model, free, chosen, start=start, windows=trial.fit.windows
+        )
+
+    def _without_idle(self, best: Found) -> Found:
+        """Drop effects that a later one made idle, and exchange those that another one beats."""
+        level = self.level()
+        for candidate in best.trial.chosen:
+            rest = self.less(best.trial, candidate)
+            if rest.bic(level) - best.trial.bic(level) < GAIN:
+                shorter = Found(rest, tried(self.evidence, rest))
+                return self._without_idle(shorter) if len(rest.chosen) > 1 else shorter
+            scores = self.scores(rest)
+            ranked = [k for k in scores.best() if scores.scores[k].candidate.name != candidate.name]
+            rest_gain = rest.chi2 - best.trial.chi2
+            for k in ranked[:2]:
+                if scores.scores[k].gain < rest_gain:
+                    break
+                other = self.refit(rest, scores, [k])
+                if other is not None and other.trial.bic(level) < best.trial.bic(level) - 1:
+                    self._note(Found(rest, best.held), other, scores, [k], good=True)
+                    return self._without_idle(other)
+        return best
+
+
+def _chi2(trial: Trial) -> float:
+    return trial.chi2
