@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -59,6 +60,8 @@ def command(
     the library is scored; the verdict is none, named, partial, ambiguous or unknown. The model with
     the effects found is written to diagnose.toml, for --model of every other command.
     """
+    # The matrices are tall and narrow: threads for them cost more than they bring.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.discrepancy import diagnose
     from pendmap.model.effects import definition
     from pendmap.records import read_experiment

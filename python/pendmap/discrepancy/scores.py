@@ -75,18 +75,19 @@ class Scores:
     ----------
     scores : tuple of Score
         One for each candidate and shape.
-    columns : tuple of ndarray of float, shape (n, 1 or 2)
-        For each the orthonormal directions in which it moves the readings.
-    residual : ndarray of float, shape (n,)
-        What is left to explain.
-    run : ndarray of int, shape (n,)
-        Which run each reading is of.
+    columns : tuple of list of int
+        The columns of each in what follows.
+    gram : ndarray of float, shape (k, k)
+        Products of what the candidates do to the readings, each of unit length; a row of zeros for
+        what the records do not show.
+    pull : ndarray of float, shape (k,)
+        Its products with the residuals.
     """
 
     scores: tuple[Score, ...]
-    columns: tuple[Floats, ...]
-    residual: Floats
-    run: NDArray[np.int64]
+    columns: tuple[list[int], ...]
+    gram: Floats
+    pull: Floats
 
     def best(self) -> list[int]:
         """Return the places of each effect's best shape, the greatest gain first."""
@@ -99,10 +100,8 @@ class Scores:
 
     def together(self, places: Sequence[int]) -> float:
         """Return the gain expected of several candidates at once."""
-        joint = np.hstack([self.columns[k] for k in places])
-        q, r = np.linalg.qr(joint)
-        sound = np.abs(np.diag(r)) > UNSEEN
-        return float(np.sum((q[:, sound].T @ self.residual) ** 2))
+        own = [c for k in places for c in self.columns[k]]
+        return _gain(self.gram[np.ix_(own, own)], self.pull[own])
 
     def likeness(self, one: int, other: int) -> float:
         """Return the cosine of the angle between what two candidates do to the readings.
@@ -110,9 +109,9 @@ class Scores:
         The largest canonical correlation: 1 where the one can do all that the other does.
         """
         a, b = self.columns[one], self.columns[other]
-        if not (a.size and b.size):
-            return 0.0
-        return float(np.linalg.norm(a.T @ b, 2))
+        left = _root_inverse(self.gram[np.ix_(a, a)])
+        right = _root_inverse(self.gram[np.ix_(b, b)])
+        return float(np.linalg.norm(left @ self.gram[np.ix_(a, b)] @ right, 2))
 
     def pairs(self, places: Sequence[int]) -> list[tuple[float, int, int]]:
         """Return the joint gains of all pairs among some candidates, the greatest first."""
@@ -120,9 +119,7 @@ class Scores:
         return sorted(found, reverse=True)
 
 
-def scores_of(
-    evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]
-) -> Scores:
+def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]) -> Scores:
     """Return the scores of candidates at a fit.
 
     Parameters
@@ -132,11 +129,11 @@ def scores_of(
     trial : Trial
         The fit.
     pool : sequence of sequence of Candidate
-        By effect, each in its shapes; shapes of different effects are scored together.
+        By effect, each in its shapes; shapes of different effects are derived together.
     """
-    scores: list[Score] = []
-    columns: list[Floats] = []
-    residual, run = np.zeros(0), np.zeros(0, np.int64)
+    every: list[Candidate] = []
+    parts: list[Floats] = []
+    base, residual = np.zeros((0, 0)), np.zeros(0)
     for batch in itertools.zip_longest(*pool):
         present = [candidate for candidate in batch if candidate is not None]
         model = trial.fit.model
@@ -144,46 +141,68 @@ def scores_of(
             model = place(model, candidate)
         names = [name for candidate in present for name in candidate.free]
         found = sensitivities(trial.fit, evidence.fitted, names, model)
-        old = [k for k, name in enumerate(found.names) if name in trial.fit.estimates]
-        base = _orthonormal(found.columns[:, old])
-        residual = found.residual - base @ (base.T @ found.residual)
-        run = found.run
-        for candidate in present:
-            where = [found.names.index(name) for name in candidate.free]
-            raw = found.columns[:, where]
-            score, basis = _scored(candidate, raw, base, residual, trial)
-            scores.append(score)
-            columns.append(basis)
-    return Scores(tuple(scores), tuple(columns), residual, run)
+        if not every:
+            old = [k for k, name in enumerate(found.names) if name in trial.fit.estimates]
+            base, residual = _orthonormal(found.columns[:, old]), found.residual
+        every += present
+        parts.append(found.columns[:, [found.names.index(name) for name in names]])
+    if not every:
+        return Scores((), (), np.zeros((0, 0)), np.zeros(0))
+    residual = residual - base @ (base.T @ residual)
+    columns = np.hstack(parts)
+    sizes = np.linalg.norm(columns, axis=0)
+    columns /= np.where(sizes > 0, sizes, 1.0)
+    # Twice is enough: what rounding left of the base the first time is gone.
+    for _ in range(2):
+        columns -= base @ (base.T @ columns)
+    gram, pull = columns.T @ columns, columns.T @ residual
+    unseen = np.sqrt(np.diag(gram)) < UNSEEN
+    gram[unseen], gram[:, unseen], pull[unseen] = 0.0, 0.0, 0.0
+    lengths = np.where(unseen, 1.0, np.sqrt(np.diag(gram)))
+    gram, pull, sizes = gram / np.outer(lengths, lengths), pull / lengths, sizes * lengths
+    scores, where, first = [], [], 0
+    for candidate in every:
+        own = list(range(first, first + len(candidate.free)))
+        first += len(own)
+        where.append(own)
+        units = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
+        scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], units))
+    return Scores(tuple(scores), tuple(where), gram, pull)
 
 
 def _scored(
-    candidate: Candidate, raw: Floats, base: Floats, residual: Floats, trial: Trial
-) -> tuple[Score, Floats]:
-    sizes = np.linalg.norm(raw, axis=0)
-    seen = raw - base @ (base.T @ raw)
-    # Twice is enough: what rounding left of the base the first time is gone.
-    seen -= base @ (base.T @ seen)
-    kept = np.linalg.norm(seen, axis=0)
-    if not np.all(sizes > 0) or np.all(kept < UNSEEN * sizes):
-        return Score(candidate, 0.0, {}, 0.0), np.zeros((len(raw), 0))
-    q, r = np.linalg.qr(seen / sizes)
-    sound = np.abs(np.diag(r)) > UNSEEN
-    basis = q[:, sound]
-    gain = float(np.sum((basis.T @ residual) ** 2))
-    solved = np.linalg.lstsq(seen / sizes, residual, rcond=UNSEEN)[0] / sizes
-    start = {candidate.free[0]: float(solved[0])}
+    candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, faint: float
+) -> Score:
+    """Score a candidate; ``faint`` is the size at which one with a phase is derived."""
+    if not gram.any():
+        return Score(candidate, 0.0, {}, 0.0)
+    step = np.where(sizes > 0, _inverse(gram) @ pull / np.where(sizes > 0, sizes, 1.0), 0.0)
+    start = {candidate.free[0]: float(step[0])}
+    scale = sizes.copy()
     if candidate.phase is not None:
-        effect = candidate.effect(trial.fit.model.units)
-        faint = effect.parameters[candidate.size]
-        quadrature = float(solved[1]) * faint
+        # The derivative by the phase is the size times that of the same effect a quarter on.
+        quadrature = float(step[1]) * faint
         start = {
-            candidate.free[0]: math.hypot(solved[0], quadrature),
-            candidate.free[1]: math.atan2(quadrature, solved[0]),
+            candidate.free[0]: math.hypot(step[0], quadrature),
+            candidate.free[1]: math.atan2(quadrature, step[0]),
         }
-        seen[:, 1] /= faint
-    information = float(np.linalg.eigvalsh(seen.T @ seen)[0])
-    return Score(candidate, gain, start, max(information, 0.0)), np.asarray(basis, np.float64)
+        scale[1] /= faint
+    information = float(np.linalg.eigvalsh(gram * np.outer(scale, scale))[0])
+    return Score(candidate, _gain(gram, pull), start, max(information, 0.0))
+
+
+def _gain(gram: Floats, pull: Floats) -> float:
+    return float(pull @ _inverse(gram) @ pull)
+
+
+def _inverse(gram: Floats) -> Floats:
+    return np.asarray(np.linalg.pinv(gram, rcond=UNSEEN**2, hermitian=True), np.float64)
+
+
+def _root_inverse(gram: Floats) -> Floats:
+    values, vectors = np.linalg.eigh(gram)
+    sound = values > UNSEEN**2 * max(float(values[-1]), 1e-300)
+    return np.asarray(vectors[:, sound] / np.sqrt(values[sound]) @ vectors[:, sound].T, np.float64)
 
 
 def _orthonormal(columns: Floats) -> Floats:
@@ -192,4 +211,4 @@ def _orthonormal(columns: Floats) -> Floats:
     if not kept.size:
         return np.zeros((len(columns), 0))
     u, s, _ = np.linalg.svd(kept / sizes[sizes > 0], full_matrices=False)
-    return np.asarray(u[:, s > 1e-7 * s[0]], np.float64)  # noqa: PLR2004 (a direction that is none)
+    return np.asarray(u[:, s > 1e-7 * s[0]], np.float64)  # a direction that is none

@@ -28,6 +28,9 @@ GAIN: Final = 12.0
 REFITTED: Final = 4
 """So many candidates are refitted, those with the greatest scores."""
 
+WORTH: Final = 0.4
+"""The part of the greatest score that a candidate's must have to be refitted beside it."""
+
 LOSS: Final = 4.0
 """By so much a model may be worse on what was held back and still be accepted: two standard
 errors of what a parameter that is right, but not exact, does there."""
@@ -43,6 +46,9 @@ SHORT: Final = 0.8
 
 ZERO: Final = "encoder_offset"
 """Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
+
+
+Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,6 +122,10 @@ class Search:
         self.base = Found(base, tried(evidence, base))
         self.attempts: list[Attempt] = []
         self.first: Scores | None = None
+        # What was computed once is not again: rivals are often candidates that were tried.
+        self._scores: dict[Key, Scores] = {}
+        self._trials: dict[tuple[Key, Key], Found | None] = {}
+        self._rests: dict[Key, Trial] = {key_of(base.chosen): base}
 
     def run(self) -> Found:
         """Return the best model."""
@@ -125,6 +135,7 @@ class Search:
             if following is None:
                 break
             best = following
+            self._rests[key_of(best.trial.chosen)] = best.trial
             self.progress(len(best.trial.chosen))
         return self._without_idle(best) if len(best.trial.chosen) > 1 else best
 
@@ -134,7 +145,10 @@ class Search:
 
     def scores(self, trial: Trial) -> Scores:
         """Return the scores of all candidates at a trial."""
-        return scores_of(self.evidence, trial, self.pool(trial))
+        key = key_of(trial.chosen)
+        if key not in self._scores:
+            self._scores[key] = scores_of(self.evidence, trial, self.pool(trial))
+        return self._scores[key]
 
     def level(self) -> float:
         """Return by what sums of squares are divided: the noise as the baseline leaves it."""
@@ -150,7 +164,10 @@ class Search:
             self.first = scores
         level = self.level()
         ranked = scores.best()
-        wanted = [[k] for k in ranked[:REFITTED] if scores.scores[k].gain >= GATE * level]
+        least = GATE * level
+        if ranked:
+            least = max(least, WORTH * scores.scores[ranked[0]].gain)
+        wanted = [[k] for k in ranked[:REFITTED] if scores.scores[k].gain >= least]
         if self._room(current.trial) > 1:
             wanted += self._promising_pairs(scores, ranked, level)
         refitted = []
@@ -180,6 +197,18 @@ class Search:
     def refit(self, trial: Trial, scores: Scores, places: Sequence[int]) -> Found | None:
         """Fit candidates from the score's whole step, and from a part of it if that fails."""
         added = [scores.scores[k].candidate for k in places]
+        key = (key_of(trial.chosen), key_of(added))
+        if key not in self._trials:
+            self._trials[key] = self._refitted(trial, scores, places, added)
+        return self._trials[key]
+
+    def _refitted(
+        self,
+        trial: Trial,
+        scores: Scores,
+        places: Sequence[int],
+        added: Sequence[Candidate],
+    ) -> Found | None:
         start = {n: v for k in places for n, v in scores.scores[k].start.items()}
         found = self._fit(trial, added, start)
         promised = scores.together(places)
@@ -224,6 +253,15 @@ class Search:
 
     def less(self, trial: Trial, dropped: Candidate) -> Trial:
         """Fit a trial's model without one of the effects that were added."""
+        chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+        key = key_of(chosen)
+        if key not in self._rests:
+            self._rests[key] = self._less(trial, dropped, chosen)
+        return self._rests[key]
+
+    def _less(
+        self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]
+    ) -> Trial:
         gone = {*dropped.free, *dropped.adapted}
         free = [name for name in trial.free if name not in gone]
         model = trial.fit.model
@@ -231,10 +269,7 @@ class Search:
         own = {name: 0.0 for name in gone if name in ("Tr", "torque")}
         model = dataclasses.replace(model, effects=effects, **own)
         start = {name: value for name, value in trial.start.items() if name not in gone}
-        chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
-        return fitted(
-            self.evidence, model, free, chosen, start=start, windows=trial.fit.windows
-        )
+        return fitted(self.evidence, model, free, chosen, start=start, windows=trial.fit.windows)
 
     def _without_idle(self, best: Found) -> Found:
         """Drop effects that a later one made idle, and exchange those that another one beats."""
@@ -255,6 +290,11 @@ class Search:
                     self._note(Found(rest, best.held), other, scores, [k], good=True)
                     return self._without_idle(other)
         return best
+
+
+def key_of(chosen: Sequence[Candidate]) -> Key:
+    """Return what a set of candidates is known by."""
+    return frozenset((c.name, tuple(sorted(c.shape.items()))) for c in chosen)
 
 
 def _chi2(trial: Trial) -> float:

@@ -26,6 +26,13 @@ ASTRAY: Final = 4.0
 short again may find a better one."""
 
 
+MOST_STEPS: Final = 40
+"""Steps of a fit at most."""
+
+FEW_STEPS: Final = 12
+"""Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Held:
     """A model on the records held back, its parameters as they were fitted to the others.
@@ -102,6 +109,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     *,
     start: Mapping[str, float] | None = None,
     windows: Windows | None = None,
+    steps: int = MOST_STEPS,
 ) -> Trial:
     """Fit a model to the evidence.
 
@@ -115,10 +123,12 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         What is fitted.
     chosen : sequence of Candidate
         The effects of the model that were added to the baseline.
-    start, windows
+    start, windows, steps
         As of :func:`pendmap.identification.fitting.fit_runs`.
     """
-    fit = fit_runs(evidence.fitted, model, free, start=start, windows=windows, profiled=())
+    fit = fit_runs(
+        evidence.fitted, model, free, start=start, windows=windows, profiled=(), steps=steps
+    )
     adapted = len(fit.names)
     remainder = remainder_of(fit, evidence.fitted, adapted)
     return Trial(fit, tuple(free), tuple(chosen), remainder)
@@ -150,7 +160,9 @@ def with_candidates(
         free += [*candidate.free, *candidate.adapted]
     begin = trial.start | dict(start)
     chosen = (*trial.chosen, *added)
-    found = fitted(evidence, model, free, chosen, start=begin, windows=trial.fit.windows)
+    found = fitted(
+        evidence, model, free, chosen, start=begin, windows=trial.fit.windows, steps=FEW_STEPS
+    )
     if trial.chi2 > ASTRAY * max(trial.fit.degrees, 1):
         again = fitted(evidence, found.fit.model, free, chosen, start=found.start)
         return min((found, again), key=lambda t: t.chi2)

@@ -105,6 +105,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     windows: Sequence[tuple[int, int, int, float, float]] | None = None,
     sigma_doubt: float = 0.0,
     hold: bool = False,
+    steps: int = 40,
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
 
@@ -136,6 +137,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     hold : bool
         Whether the parameters stay at their starts, so that initial states and phases that no run
         knows are adapted alone: a model is tried on records that it was not fitted to.
+    steps : int
+        The most steps of a stage.
 
     Raises
     ------
@@ -159,7 +162,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         "tolerance": tolerance_of(runs),
         "shortest": units.w0 * (swing if shortest_s is None else shortest_s),
         "growth": 4.0,
-        "steps": 40,
+        "steps": steps,
         "gain": 1e-3,
         "hold": len([q for q in quantities if q.name.partition("[")[0] in free]) if hold else 0,
         "profiled": chosen,
