@@ -1,8 +1,8 @@
 """One blind experiment: drawn, recorded by the virtual rig, diagnosed, compared with its truth.
 
-Difficulty is measured, not assumed: the same motion without noise and counts is scored with the noise
-that the record has. ``G`` is what the best possible model would gain there, ``s = 1 - G_impostor / G``
-how far the nearest other name falls short.
+Difficulty is measured, not assumed: the same motion without noise and counts is scored with the
+noise that the record has. ``G`` is what the best possible model would gain there,
+``s = 1 - G_impostor / G`` how far the nearest other name falls short.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import dataclasses
 import math
 import tempfile
 import time
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +19,12 @@ import numpy as np
 
 from pendmap import virtual_rig
 from pendmap.discrepancy import diagnose
-from pendmap.discrepancy.baseline import baseline
 from pendmap.discrepancy.candidates import candidates
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.scores import scores_of
+from pendmap.discrepancy.trial import fitted
 from pendmap.errors import InputError
+from pendmap.model import Rig
 from pendmap.model.effects import library
 from pendmap.records import read_experiment
 
@@ -86,8 +88,12 @@ def draw(what: str, rng: np.random.Generator) -> Case:
         effects, without = (name,), EQUALS.get(name, (name,))
         without = tuple(n for n in without if n in library())
     elif what == "form":
-        effects = (str(rng.choice([n for n in known if ":" in n and n.split(":")[0] in library()])),)
-    size = 1.0 if effects == ("none",) else float(np.exp(rng.uniform(math.log(0.5), math.log(4.0))))
+        effects = (
+            str(rng.choice([n for n in known if ":" in n and n.split(":")[0] in library()])),
+        )
+    size = (
+        1.0 if effects == ("none",) else float(np.exp(rng.uniform(math.log(0.08), math.log(1.2))))
+    )
     case = Case(
         what,
         kind,
@@ -138,7 +144,10 @@ def difficulty(case: Case, folder: Path) -> dict[str, Any]:
         alone = dataclasses.replace(case, effects=(effect,), dropouts=0.0, outliers=0.0)
         experiment, sigma = record(alone, folder, clean=True)
         evidence = _with_noise(evidence_of(experiment), sigma)
-        begin = baseline(evidence)
+        # From the truth: what is measured is the effect, not how well a start is found.
+        rig = tomllib.loads((folder / "clean.truth.toml").read_text(encoding="utf-8"))["pendulum"]
+        start = Rig(w0=rig["w0"], c_over_m=rig["c_over_m"], Tr=rig["Tr"])
+        begin = fitted(evidence, start, ["w0", "c_over_m", "Tr"])
         gains.append(begin.chi2)
         own = {effect.split(":")[0], *case.without}
         pool = candidates({"Tr", *own}, driven=evidence.forced)
@@ -170,27 +179,31 @@ def run(case: Case) -> dict[str, Any]:
             return result | {"error": str(error)}
     named = {effect.name: effect for effect in found.effects}
     held = found.best.held
-    return result | hard | {
-        "verdict": found.verdict,
-        "named": list(named),
-        "classes": found.equivalent,
-        "nearest": list(found.nearest.trial.names),
-        "probability": [effect.probability for effect in found.effects],
-        "parameters": {n: [dict(e.parameters), dict(e.ci95)] for n, e in named.items()},
-        "truth": truth,
-        "held": held.chi2 / held.degrees,
-        "left": found.judgement.left,
-        "uneven": found.judgement.uneven,
-        "closed": found.judgement.closed,
-        "ratio": [found.judgement.ratio, found.judgement.ratio_allowed],
-        "attempts": [[a.names, a.score, a.gain, a.held_gain, a.accepted] for a in found.attempts],
-        "seconds": seconds,
-        "samples": sum(r.time.size for r in experiment.runs),
-    }
+    return (
+        result
+        | hard
+        | {
+            "verdict": found.verdict,
+            "named": list(named),
+            "classes": found.equivalent,
+            "nearest": list(found.nearest.trial.names),
+            "probability": [effect.probability for effect in found.effects],
+            "parameters": {n: [dict(e.parameters), dict(e.ci95)] for n, e in named.items()},
+            "truth": truth,
+            "held": held.chi2 / held.degrees,
+            "left": found.judgement.left,
+            "uneven": found.judgement.uneven,
+            "closed": found.judgement.closed,
+            "ratio": [found.judgement.ratio, found.judgement.ratio_allowed],
+            "attempts": [
+                [a.names, a.score, a.gain, a.held_gain, a.accepted] for a in found.attempts
+            ],
+            "seconds": seconds,
+            "samples": sum(r.time.size for r in experiment.runs),
+        }
+    )
 
 
 def _parameters(path: Path) -> dict[str, Any]:
-    import tomllib
-
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     return {e["name"]: e["parameters"] for e in table.get("effect", [])}

@@ -44,7 +44,7 @@ NAME = "diagnose.toml"
 @click.option("--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}]")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
-def command(
+def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,
     model_path: Path | None,

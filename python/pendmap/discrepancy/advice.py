@@ -83,4 +83,6 @@ def _sentence(judgement: Judgement) -> str:
                 )
     if wanted:
         return "; ".join(wanted) + "."
-    return "The effects are told apart; runs held back or repeated on another day would confirm them."
+    return (
+        "The effects are told apart; runs held back or repeated on another day would confirm them."
+    )

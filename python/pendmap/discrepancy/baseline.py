@@ -1,4 +1,4 @@
-"""The model that a diagnosis begins with: viscous damping and Coulomb friction, or the one given."""
+"""The model to begin with: viscous damping and Coulomb friction, or the one that is given."""
 
 from __future__ import annotations
 
@@ -88,7 +88,8 @@ def _start(evidence: Evidence) -> Rig:
         good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
         rough = rough_start(run.time[good], run.theta[good], evidence.readings[k].sigma)
         if rough is not None:
-            return Rig(**(rough | ({} if known is None else {"w0": float(known)})))
+            found = Rig(w0=rough["w0"], c_over_m=rough["c_over_m"], Tr=rough.get("Tr", 0.0))
+            return found if known is None else dataclasses.replace(found, w0=float(known))
     if known is None:
         raise InputError(
             f"{evidence.experiment.path}: no free run shows a natural frequency: allowed is one of "

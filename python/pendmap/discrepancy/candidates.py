@@ -78,6 +78,12 @@ class Candidate:
         ]
 
     @property
+    def counts_turns(self) -> bool:
+        """Whether its shape is a whole number, of periods a turn."""
+        entries = definition(self.name)["parameters"]
+        return any(_whole(e) for e in entries if e["name"] in self.shape)
+
+    @property
     def count(self) -> int:
         """How many numbers are adapted to data when it is chosen."""
         return len(self.free) + len(self.shape)

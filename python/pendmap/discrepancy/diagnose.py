@@ -136,7 +136,7 @@ def diagnose(
     nearest = search.run()
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial, nearest.trial.remainder.level)
-    judgement = judge(evidence, search, nearest, runs.uneven)
+    judgement = judge(evidence, search, nearest, runs)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else search.base
     before = residual_torque(evidence, search.base.trial)

@@ -46,8 +46,9 @@ class Evidence:
         What models are fitted to, and what they are tried on.
     fitted_of, held_of : tuple of int
         Which of ``runs`` each belongs to.
-    whole : bool
-        Whether whole runs are held back, not stretches of all.
+    inside : bool
+        Whether stretches within the fitted runs are held back, which the fitted motion passes
+        through; else what is held back has initial states of its own.
     """
 
     experiment: Experiment
@@ -57,7 +58,7 @@ class Evidence:
     held: tuple[FitRun, ...]
     fitted_of: tuple[int, ...]
     held_of: tuple[int, ...]
-    whole: bool
+    inside: bool
 
     @property
     def forced(self) -> bool:
@@ -78,7 +79,10 @@ class Evidence:
 def evidence_of(experiment: Experiment) -> Evidence:
     """Divide an experiment into what is fitted and what is held back.
 
-    Runs marked ``hold_out`` are held back; where there are none, two stretches of each run.
+    Runs marked ``hold_out`` are held back; where there are none, two stretches of each free decay,
+    which the fitted motion passes through without being drawn to them. Where no run is free either,
+    stretches of the forced ones, with initial states of their own: windows there are too short to
+    pass through.
 
     Raises
     ------
@@ -106,7 +110,7 @@ def evidence_of(experiment: Experiment) -> Evidence:
             tuple(held),
             tuple(others),
             tuple(marked),
-            whole=True,
+            inside=False,
         )
     return _stretched(experiment, runs, readings, every)
 
@@ -117,20 +121,28 @@ def _stretched(
     readings: tuple[Reading, ...],
     every: Sequence[FitRun],
 ) -> Evidence:
+    inside = not all(run.forced for run in every)
     fitted, held, held_of = [], [], []
     for k, run in enumerate(every):
+        if inside and run.forced:
+            fitted.append(run)
+            continue
         good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted.copy()
         # Parts of the samples that count, not of the time at rest after them.
         counted = np.flatnonzero(good)
-        kept = good.copy()
+        back = np.zeros(good.shape, bool)
         for low, high in HELD:
-            a, b = (counted[int(part * (counted.size - 1))] for part in (low, high))
+            a, b = (int(counted[int(part * (counted.size - 1))]) for part in (low, high))
             if b - a < FEWEST:
                 continue
-            kept[a:b] = False
-            held.append(_part(run, good, int(a), int(b)))
+            back[a:b] = good[a:b]
+            if not inside:
+                held.append(_part(run, good, a, b))
+                held_of.append(k)
+        fitted.append(dataclasses.replace(run, trusted=good & ~back))
+        if inside and back.any():
+            held.append(dataclasses.replace(run, trusted=back))
             held_of.append(k)
-        fitted.append(dataclasses.replace(run, trusted=kept))
     return Evidence(
         experiment,
         runs,
@@ -139,7 +151,7 @@ def _stretched(
         tuple(held),
         tuple(range(len(runs))),
         tuple(held_of),
-        whole=False,
+        inside=inside,
     )
 
 

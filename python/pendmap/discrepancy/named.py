@@ -56,9 +56,7 @@ class NamedEffect:
         return Effect(self.name, self.parameters, self.ci95, self.probability, self.approximate)
 
 
-def named_effects(
-    evidence: Evidence, best: Found, judgement: Judgement
-) -> tuple[NamedEffect, ...]:
+def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tuple[NamedEffect, ...]:
     """Return the effects of the best model.
 
     Parameters
@@ -150,8 +148,9 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         model,
         **{name: 0.0 for name in own if name is not None},
         effects=(*kept, *named.values()),
-        Omega=0.0 if model.p == 0 and not any(e.drives for e in (*kept, *named.values())) else
-        (model.Omega or 1.0),
+        Omega=0.0
+        if model.p == 0 and not any(e.drives for e in (*kept, *named.values()))
+        else (model.Omega or 1.0),
         notes=notes,
     )
 

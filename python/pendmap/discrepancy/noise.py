@@ -1,10 +1,10 @@
 """The noise of residuals, with its colour, and what is in them besides.
 
-A pendulum's model errs slowly: what it lacks shows at the frequencies of the swing, of its few lowest
-harmonics and below. Noise stands above them too, so that the spectrum there says how strong it is
-where errors of the model cannot be told from it: as strong if it is white, stronger where it is
-correlated from sample to sample. A process of first order (AR(1)) is adapted to the upper part of the
-spectrum by Whittle's likelihood, and continued downward.
+A pendulum's model errs slowly: what it lacks shows at the frequencies of the swing, of its few
+lowest harmonics and below. Noise stands above them too, so that the spectrum there says how strong
+it is where errors of the model cannot be told from it: as strong if it is white, stronger where it
+is correlated from sample to sample. A process of first order (AR(1)) is adapted to the upper part
+of the spectrum by Whittle's likelihood, and continued downward.
 
 References
 ----------
@@ -161,7 +161,9 @@ def _spectrum(
     power = np.asarray(dct(residual, type=2, norm="ortho"), np.float64) ** 2
     interval = float(np.median(np.diff(time)))
     speed = np.abs(fit.curves[run][1][first:last][good])
-    swing = max(fit["w0"] if "w0" in fit.estimates else fit.model.w0, float(np.quantile(speed, 0.9)))
+    swing = max(
+        fit["w0"] if "w0" in fit.estimates else fit.model.w0, float(np.quantile(speed, 0.9))
+    )
     # Phase that the motion passes from sample to sample; the spectrum ends at pi.
     angle = np.pi * np.arange(residual.size) / residual.size
     edge = min(HARMONICS * swing * interval, 0.4 * np.pi)

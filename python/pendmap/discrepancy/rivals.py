@@ -6,6 +6,8 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.errors import InputError
+
 if TYPE_CHECKING:
     from pendmap.discrepancy.candidates import Candidate
     from pendmap.discrepancy.select import Found, Search
@@ -89,7 +91,7 @@ class Standing:
 
     @property
     def probability(self) -> float:
-        """The share of its likelihood among all names: equal odds before, none for special cases."""
+        """The share of its likelihood among all names, with equal odds for each beforehand."""
         weights = [math.exp(-0.5 * max(r.behind, 0.0)) for r in self.rivals if not r.contains]
         return 1.0 / (1.0 + sum(weights))
 
@@ -107,11 +109,16 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
         One of its effects.
     """
     level = search.level()
-    rest = search.less(best.trial, candidate)
+    try:
+        rest = search.less(best.trial, candidate)
+    except InputError:
+        return Standing(candidate, math.inf, ())  # without it there is no motion to speak of
     gain = (rest.chi2 - best.trial.chi2) / level
     scores = search.scores(rest)
     places = scores.best()
-    own = next(k for k in places if scores.scores[k].candidate.name == candidate.name)
+    own = next((k for k in places if scores.scores[k].candidate.name == candidate.name), None)
+    if own is None:
+        return Standing(candidate, gain, ())
     others = [k for k in places if k != own and scores.scores[k].gain > 0]
     reach = max(NEAR[0], NEAR[1] * gain)
     rivals = []

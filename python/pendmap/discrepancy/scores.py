@@ -6,8 +6,8 @@ off, the sum of squares falls by
 
 ``G = r' x (x' x)^-1 x' r``
 
-when the candidate is fitted (Rao's score test). The same matrix says how alike candidates are, which
-pairs belong together, and how weak an effect the records could show.
+when the candidate is fitted (Rao's score test). The same matrix says how alike candidates are,
+which pairs belong together, and how weak an effect the records could show.
 
 References
 ----------
@@ -57,8 +57,8 @@ class Score:
     start : mapping of str to float
         Size and phase where it is expected to be least, SI.
     information : float
-        ``x' x`` of the size: a size ``a`` gains ``a^2`` times this; of an effect with a phase at the
-        phase where it is least. 0 where the records do not show the effect at all.
+        ``x' x`` of the size: a size ``a`` gains ``a^2`` times this; of an effect with a phase at
+        the phase where it is least. 0 where the records do not show the effect at all.
     """
 
     candidate: Candidate
@@ -170,9 +170,7 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
     return Scores(tuple(scores), tuple(where), gram, pull)
 
 
-def _scored(
-    candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, faint: float
-) -> Score:
+def _scored(candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, faint: float) -> Score:
     """Score a candidate; ``faint`` is the size at which one with a phase is derived."""
     if not gram.any():
         return Score(candidate, 0.0, {}, 0.0)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Final
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
@@ -37,6 +40,15 @@ errors of what a parameter that is right, but not exact, does there."""
 
 PAIRED: Final = 8
 """Pairs are looked for among so many candidates."""
+
+FIRST_BEND: Final = 1.1
+"""Ratio of neighbouring shapes that are tried about the best one of the scan; then its root."""
+
+BENDS: Final = 3
+"""How often."""
+
+BENT: Final = 2
+"""Of how many refitted candidates."""
 
 KICK: Final = 0.1
 """Part of the score's step from which a candidate is fitted a second time."""
@@ -176,6 +188,9 @@ class Search:
             if found is not None:
                 refitted.append((found, places))
         refitted.sort(key=lambda pair: pair[0].trial.bic(level))
+        # A shape that was only scanned may lose to another effect for that reason.
+        refitted[:BENT] = [(self._bent(current.trial, f), places) for f, places in refitted[:BENT]]
+        refitted.sort(key=lambda pair: pair[0].trial.bic(level))
         accepted = None
         for found, places in refitted:
             good = accepted is None and self.accepts(current, found)
@@ -217,7 +232,43 @@ class Search:
             kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
             other = self._fit(trial, added, kick)
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
-        return None if found is None else Found(found, tried(self.evidence, found))
+        if found is None:
+            return None
+        try:
+            return Found(found, tried(self.evidence, found))
+        except InputError:
+            return None  # what was held back leads out of the range of numbers
+
+    def _bent(self, trial: Trial, found: Found) -> Found:
+        """Return a fit whose last effect has its scanned shape brought to its best by parabolas."""
+        candidate = found.trial.chosen[-1]
+        scanned = [n for n in candidate.shape if f"{candidate.name}.{n}" not in candidate.adapted]
+        if not scanned or candidate.counts_turns or len(found.trial.chosen) > len(trial.chosen) + 1:
+            return found
+        name = scanned[0]
+        fits = {candidate.shape[name]: found.trial}
+
+        def fit_at(value: float) -> None:
+            nearest = fits[min(fits, key=lambda x: abs(math.log(x / value)))]
+            bent = dataclasses.replace(candidate, shape={**candidate.shape, name: value})
+            again = self._fit(trial, [bent], nearest.start)
+            if again is not None:
+                fits[value] = again
+
+        width = FIRST_BEND
+        for _ in range(BENDS):
+            best = min(fits, key=lambda x: fits[x].chi2)
+            for other in (best / width, best * width):
+                fit_at(other)
+            vertex = _vertex(fits)
+            if vertex is not None:
+                fit_at(vertex)
+            width = math.sqrt(width)
+        best_trial = min(fits.values(), key=_chi2)
+        try:
+            return Found(best_trial, tried(self.evidence, best_trial))
+        except InputError:
+            return found
 
     def _fit(
         self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]
@@ -242,7 +293,7 @@ class Search:
         self.attempts.append(
             Attempt(
                 tuple(candidate.name for candidate in added),
-                dict(added[0].shape),
+                dict(found.trial.chosen[-len(added)].shape),
                 scores.together(places) / level,
                 current.trial.bic(level) - found.trial.bic(level),
                 (current.held.chi2 - found.held.chi2) / level,
@@ -259,23 +310,31 @@ class Search:
             self._rests[key] = self._less(trial, dropped, chosen)
         return self._rests[key]
 
-    def _less(
-        self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]
-    ) -> Trial:
+    def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
         gone = {*dropped.free, *dropped.adapted}
         free = [name for name in trial.free if name not in gone]
         model = trial.fit.model
         effects = tuple(e for e in model.effects if e.name != dropped.name)
-        own = {name: 0.0 for name in gone if name in ("Tr", "torque")}
+        own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
         model = dataclasses.replace(model, effects=effects, **own)
         start = {name: value for name, value in trial.start.items() if name not in gone}
-        return fitted(self.evidence, model, free, chosen, start=start, windows=trial.fit.windows)
+        try:
+            return fitted(
+                self.evidence, model, free, chosen, start=start, windows=trial.fit.windows
+            )
+        except InputError:
+            # Without it the motion is lost from here: from short windows on, as the baseline began.
+            begin = start | {n: v for n, v in self.base.trial.start.items() if n in free}
+            return fitted(self.evidence, model, free, chosen, start=begin)
 
     def _without_idle(self, best: Found) -> Found:
         """Drop effects that a later one made idle, and exchange those that another one beats."""
         level = self.level()
         for candidate in best.trial.chosen:
-            rest = self.less(best.trial, candidate)
+            try:
+                rest = self.less(best.trial, candidate)
+            except InputError:
+                continue  # without it there is no motion to speak of: it is not idle
             if rest.bic(level) - best.trial.bic(level) < GAIN:
                 shorter = Found(rest, tried(self.evidence, rest))
                 return self._without_idle(shorter) if len(rest.chosen) > 1 else shorter
@@ -290,6 +349,18 @@ class Search:
                     self._note(Found(rest, best.held), other, scores, [k], good=True)
                     return self._without_idle(other)
         return best
+
+
+def _vertex(fits: dict[float, Trial]) -> float | None:
+    """Return where the parabola through the best fit and its neighbours is least."""
+    places = sorted(fits)
+    k = places.index(min(fits, key=lambda x: fits[x].chi2))
+    if not 0 < k < len(places) - 1:
+        return None
+    x = np.log(places[k - 1 : k + 2])
+    y = np.array([fits[p].chi2 for p in places[k - 1 : k + 2]])
+    a, b, _ = np.polyfit(x - x[1], y, 2)
+    return float(math.exp(x[1] - b / (2 * a))) if a > 0 else None
 
 
 def key_of(chosen: Sequence[Candidate]) -> Key:

@@ -66,6 +66,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "left": {
             "z": judgement.left,
             "uneven": judgement.uneven,
+            "spread": judgement.spread,
             "chi2_per_degree": judgement.ratio,
             "allowed": judgement.ratio_allowed,
         },
@@ -92,8 +93,10 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         ],
         "findings": [
             finding.text
-            for holder in (found.evidence.experiment, *found.evidence.runs)
-            for finding in holder.findings
+            for finding in (
+                *found.evidence.experiment.findings,
+                *(finding for run in found.evidence.runs for finding in run.findings),
+            )
         ],
     }
 
@@ -140,11 +143,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
     for effect in found.effects:
         values = ", ".join(
             f"{name} = {value:.4g}"
-            + (
-                " [{:.4g}, {:.4g}]".format(*effect.ci95[name])
-                if name in effect.ci95
-                else ""
-            )
+            + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
             for name, value in effect.parameters.items()
         )
         nearly = ", its form only nearly right" if effect.approximate else ""

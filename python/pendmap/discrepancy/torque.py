@@ -4,8 +4,8 @@ What a model reads too little, ``e(t)``, obeys for a small lack of torque ``u`` 
 
 ``e'' + c_over_m e' + w0^2 (1 + a) cos(theta) e = u``.
 
-Multiplied by a bump ``phi(t) = (1 - s^2)^6``, ``s`` from -1 to 1 over ``WIDTH`` of a small swing, and
-integrated by parts, no derivative of the readings is left:
+Multiplied by a bump ``phi(t) = (1 - s^2)^6``, ``s`` from -1 to 1 over ``WIDTH`` of a small swing,
+and integrated by parts, no derivative of the readings is left:
 
 ``int phi u dt = int (phi'' - c_over_m phi' + w0^2 (1 + a) cos(theta) phi) e dt``.
 
@@ -207,8 +207,8 @@ def binned(torque: Torque, over: str, *, signed: bool = False) -> list[dict[str,
 def standing_out(torque: Torque) -> list[dict[str, Any]]:
     """Return the bins in which the torque stands out of the noise, the clearest first.
 
-    Over amplitude, drive phase and laboratory time it is the torque along the motion, over angle and
-    velocity the torque itself.
+    Over amplitude and laboratory time it is the torque along the motion, over angle, velocity and
+    drive phase the torque itself.
     """
     rows = []
     for over in OVER:

@@ -97,7 +97,9 @@ class Trial:
             By which sums of squares are divided, so that noise that is coloured or stronger than
             stated counts as noise.
         """
-        count = len(self.fit.names) + sum(c.count - len(c.free) - len(c.adapted) for c in self.chosen)
+        count = len(self.fit.names) + sum(
+            c.count - len(c.free) - len(c.adapted) for c in self.chosen
+        )
         return self.chi2 / level + count * math.log(max(self.fit.samples / level, 2.0))
 
 
@@ -170,7 +172,10 @@ def with_candidates(
 
 
 def tried(evidence: Evidence, trial: Trial) -> Held:
-    """Try a model on the records held back, with fresh initial states.
+    """Try a model on what was held back.
+
+    Whole runs have fresh initial states; stretches within a fitted run are passed through by the
+    motion that was fitted to the rest of it.
 
     Parameters
     ----------
@@ -179,9 +184,18 @@ def tried(evidence: Evidence, trial: Trial) -> Held:
     trial : Trial
         The model.
     """
+    model, free = trial.fit.model, trial.free
+    if not evidence.inside:
+        known = {name: value for name, value in trial.start.items() if "[" not in name}
+        fit = fit_runs(evidence.held, model, free, start=known, profiled=(), hold=True)
+        adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
+        return Held(fit.chi2, max(fit.samples - adapted, 1), fit)
+    places = {of: k for k, of in enumerate(evidence.held_of)}
+    windows = tuple((places[w[0]], *w[1:]) for w in trial.fit.windows if w[0] in places)
     known = {name: value for name, value in trial.start.items() if "[" not in name}
+    own = [name for name in free if name in known]
+    # No step: neither parameters nor states are adapted.
     fit = fit_runs(
-        evidence.held, trial.fit.model, trial.free, start=known, profiled=(), hold=True
+        evidence.held, model, own, start=known, windows=windows, profiled=(), hold=True, steps=0
     )
-    adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
-    return Held(fit.chi2, max(fit.samples - adapted, 1), fit)
+    return Held(fit.chi2, max(fit.samples, 1), fit)

@@ -12,6 +12,7 @@ from pendmap.discrepancy.rivals import Standing, standing_of
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.runs import RunByRun
     from pendmap.discrepancy.select import Found, Search
 
 __all__ = ["Judgement", "judge"]
@@ -21,7 +22,11 @@ Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 LEFT: Final = 5.0
 """Standard errors of the slow part of the residuals above which something is left."""
 
-CLOSED: Final = 0.6
+SPREAD: Final = 0.5
+"""How much an effect's size may differ from run to run, over its size, beyond what noise makes:
+more is no effect that is alike in every run."""
+
+CLOSED: Final = 0.75
 """Share of the gap on held-out data that effects must close to be named beside what is left."""
 
 SEVERAL: Final = 1.0
@@ -51,6 +56,9 @@ class Judgement:
     uneven : float
         How differently the runs would have the parameters, over the standard error of that
         (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
+    spread : float
+        How much the effects' sizes differ from run to run beyond noise, over their size: the
+        greatest of all.
     """
 
     verdict: Verdict
@@ -60,6 +68,7 @@ class Judgement:
     ratio_allowed: float
     closed: float
     uneven: float
+    spread: float
 
     @property
     def approximate(self) -> bool:
@@ -67,7 +76,7 @@ class Judgement:
         return self.verdict == "partial"
 
 
-def judge(evidence: Evidence, search: Search, best: Found, uneven: float) -> Judgement:
+def judge(evidence: Evidence, search: Search, best: Found, runs: RunByRun) -> Judgement:
     """Return the verdict on a search.
 
     Parameters
@@ -78,9 +87,10 @@ def judge(evidence: Evidence, search: Search, best: Found, uneven: float) -> Jud
         After it ran.
     best : Found
         What it found.
-    uneven : float
-        As of :class:`Judgement`.
+    runs : RunByRun
+        Its parameters run by run.
     """
+    uneven = runs.uneven
     trial = best.trial
     degrees = max(trial.fit.degrees, 1)
     # The doubt about the noise as it is seen without a model, run by run.
@@ -90,17 +100,18 @@ def judge(evidence: Evidence, search: Search, best: Found, uneven: float) -> Jud
     left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
     rest = left > LEFT or uneven > LEFT
     closed = _closed(search, best)
+    spread = max((runs.spread(c.free[0]) for c in trial.chosen), default=0.0)
     standings = tuple(standing_of(search, best, candidate) for candidate in trial.chosen)
     verdict: Verdict
     if not trial.chosen:
         verdict = "unknown" if rest else "none"
     elif rest:
-        verdict = "partial" if closed >= CLOSED else "unknown"
+        verdict = "partial" if closed >= CLOSED and spread <= SPREAD else "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
     else:
         verdict = "named"
-    return Judgement(verdict, standings, left, ratio, allowed, closed, uneven)
+    return Judgement(verdict, standings, left, ratio, allowed, closed, uneven, spread)
 
 
 def _closed(search: Search, best: Found) -> float:

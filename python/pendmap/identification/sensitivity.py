@@ -100,9 +100,9 @@ def sensitivities(
         basis = _basis(rows[counted, -STATE:])
         columns -= basis @ (basis.T @ columns)
         parts.append((columns[:, :-1], columns[:, -1]))
-        where = [window[0], window[1], index]
-        labels.append(np.tile(where, (counted.size, 1)) + counted[:, None] * [0, 1, 0])
-    run, sample, of = np.concatenate(labels).T
+        run = np.full(counted.size, window[0], np.int64)
+        labels.append(np.stack([run, window[1] + counted, np.full(counted.size, index)]))
+    run, sample, of = np.concatenate(labels, axis=1)
     return Sensitivities(
         tuple(q.name for q in quantities),
         np.concatenate([columns for columns, _ in parts]),
