@@ -24,11 +24,11 @@ from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.scores import scores_of
 from pendmap.discrepancy.trial import fitted
 from pendmap.errors import InputError
-from pendmap.model import Rig
 from pendmap.model.effects import library
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
+    from pendmap.discrepancy.trial import Trial
     from pendmap.records import Experiment
 
 KINDS = {"mixed": (5, 4), "free": (5, 0), "single": (1, 0)}
@@ -136,7 +136,7 @@ def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment
     return read_experiment(where.experiment), math.hypot(math.radians(case.noise), count)
 
 
-def difficulty(case: Case, folder: Path) -> dict[str, Any]:
+def difficulty(case: Case, folder: Path, base: Trial) -> dict[str, Any]:
     """Return ``G`` and ``s`` of a case on noise-free records; of a pair ``G`` of each alone."""
     gains = []
     separation = 1.0
@@ -144,10 +144,10 @@ def difficulty(case: Case, folder: Path) -> dict[str, Any]:
         alone = dataclasses.replace(case, effects=(effect,), dropouts=0.0, outliers=0.0)
         experiment, sigma = record(alone, folder, clean=True)
         evidence = _with_noise(evidence_of(experiment), sigma)
-        # From the truth: what is measured is the effect, not how well a start is found.
-        rig = tomllib.loads((folder / "clean.truth.toml").read_text(encoding="utf-8"))["pendulum"]
-        start = Rig(w0=rig["w0"], c_over_m=rig["c_over_m"], Tr=rig["Tr"])
-        begin = fitted(evidence, start, ["w0", "c_over_m", "Tr"])
+        # From the noisy fit: what is measured is the effect, not how well a start is found.
+        begin = fitted(
+            evidence, base.fit.model, base.free, start=base.start, windows=base.fit.windows
+        )
         gains.append(begin.chi2)
         own = {effect.split(":")[0], *case.without}
         pool = candidates({"Tr", *own}, driven=evidence.forced)
@@ -169,12 +169,14 @@ def run(case: Case) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         try:
-            hard = {"G": [], "s": 1.0} if case.effects == ("none",) else difficulty(case, folder)
             experiment, _ = record(case, folder)
             begin = time.perf_counter()
             found = diagnose(experiment, without=case.without)
             seconds = time.perf_counter() - begin
             truth = _parameters(folder / "noisy.truth.toml")
+            hard = {"G": [], "s": 1.0}
+            if case.effects != ("none",) and case.dropouts == 0:
+                hard = difficulty(case, folder, found.base.trial)
         except InputError as error:
             return result | {"error": str(error)}
     named = {effect.name: effect for effect in found.effects}

@@ -50,6 +50,9 @@ BENDS: Final = 3
 BENT: Final = 2
 """Of how many refitted candidates."""
 
+STARTS: Final = 3
+"""From so many shapes a candidate is fitted whose shape is adapted."""
+
 KICK: Final = 0.1
 """Part of the score's step from which a candidate is fitted a second time."""
 
@@ -226,6 +229,11 @@ class Search:
     ) -> Found | None:
         start = {n: v for k in places for n, v in scores.scores[k].start.items()}
         found = self._fit(trial, added, start)
+        if len(added) == 1 and added[0].adapted:
+            for other in self._other_shapes(scores, places[0]):
+                bent = scores.scores[other]
+                again = self._fit(trial, [bent.candidate], bent.start)
+                found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
         promised = scores.together(places)
         if found is None or trial.chi2 - found.chi2 < SHORT * promised:
             sizes = {candidate.free[0] for candidate in added}
@@ -238,6 +246,16 @@ class Search:
             return Found(found, tried(self.evidence, found))
         except InputError:
             return None  # what was held back leads out of the range of numbers
+
+    def _other_shapes(self, scores: Scores, place: int) -> list[int]:
+        """Return the next best shapes of a candidate: the score at size 0 is not all there is."""
+        one = scores.scores[place]
+        shapes = [
+            k
+            for k, s in enumerate(scores.scores)
+            if s.candidate.name == one.candidate.name and k != place and s.gain > WORTH * one.gain
+        ]
+        return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: STARTS - 1]
 
     def _bent(self, trial: Trial, found: Found) -> Found:
         """Return a fit whose last effect has its scanned shape brought to its best by parabolas."""
