@@ -2,10 +2,10 @@
 
     python benchmarks/blind.py --count 100 --out blind.jsonl
 
-Of the experiments two in five hide nothing; of the others half hide one effect, a quarter two, and in
-a quarter the true effect is withheld from the search. ``--forms`` and ``--nuisances`` add
-experiments whose form differs from the library's, and spoilt ones, which are scored apart. Intervals
-are those of Wilson (1927), J. Am. Stat. Assoc. 22, 209, 95 %.
+Of the experiments two in five hide nothing; of the others half hide one effect, a quarter two, and
+in a quarter the true effect is withheld from the search. ``--forms`` and ``--nuisances`` add
+experiments whose form differs from the library's, and spoilt ones, which are scored apart.
+Intervals are those of Wilson (1927), J. Am. Stat. Assoc. 22, 209, 95 %.
 """
 
 from __future__ import annotations

@@ -42,6 +42,7 @@ NAME = "diagnose.toml"
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
 @click.option("--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}]")
+@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(  # noqa: PLR0913 (an option each)
@@ -51,6 +52,7 @@ def command(  # noqa: PLR0913 (an option each)
     max_effects: int,
     without: tuple[str, ...],
     out: Path | None,
+    plot: Path | None,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -58,7 +60,8 @@ def command(  # noqa: PLR0913 (an option each)
 
     EXPERIMENT is a file with times and angles, or a folder with an experiment.toml. Every effect of
     the library is scored; the verdict is none, named, partial, ambiguous or unknown. The model with
-    the effects found is written to diagnose.toml, for --model of every other command.
+    the effects found is written to diagnose.toml, for --model of every other command; where no
+    output is named, a figure to diagnose.png too.
     """
     # The matrices are tall and narrow: threads for them cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -68,6 +71,8 @@ def command(  # noqa: PLR0913 (an option each)
 
     for name in without:
         definition(name)
+    if out is None and plot is None and not as_json:
+        plot = OutputFile([".png"]).convert(f"{Path(NAME).stem}.png", None, None)
     out = out or OutputFile([".toml"]).convert(NAME, None, None)
     model = None if model_path is None else _si(model_path)
     experiment = read_experiment(path)
@@ -76,7 +81,7 @@ def command(  # noqa: PLR0913 (an option each)
         found = diagnose(
             experiment, model=model, max_effects=max_effects, without=without, progress=progress
         )
-    written = write_all(_files(found, out, "pendmap " + shlex.join(sys.argv[1:])))
+    written = write_all(_files(found, out, plot, "pendmap " + shlex.join(sys.argv[1:])))
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 
@@ -93,12 +98,16 @@ def _si(path: Path) -> Rig:
 
 
 def _files(
-    found: Discrepancy, out: Path, line: str
+    found: Discrepancy, out: Path, plot: Path | None, line: str
 ) -> Iterator[tuple[Callable[[Path], Path], Path]]:
     from pendmap.discrepancy import diagnosed_model
     from pendmap.model import save_model
 
     yield functools.partial(save_model, diagnosed_model(found, line)), out
+    if plot is not None:
+        from pendmap import figures
+
+        yield functools.partial(figures.draw_discrepancy, found), plot
 
 
 def _say(found: Discrepancy) -> None:

@@ -230,8 +230,8 @@ class Search:
         start = {n: v for k in places for n, v in scores.scores[k].start.items()}
         found = self._fit(trial, added, start)
         if len(added) == 1 and added[0].adapted:
-            for other in self._other_shapes(scores, places[0]):
-                bent = scores.scores[other]
+            for k in self._other_shapes(scores, places[0]):
+                bent = scores.scores[k]
                 again = self._fit(trial, [bent.candidate], bent.start)
                 found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
         promised = scores.together(places)

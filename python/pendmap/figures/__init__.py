@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, experiment, style, trajectory
+from pendmap.figures import basins, discrepancy, experiment, style, trajectory
 from pendmap.figures import runs as runs_figure
 from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from pendmap.discrepancy import Discrepancy
     from pendmap.records import Experiment
 
-__all__ = ["SUFFIXES", "RunPanel", "draw", "draw_record", "draw_runs"]
+__all__ = ["SUFFIXES", "RunPanel", "draw", "draw_discrepancy", "draw_record", "draw_runs"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
@@ -137,6 +138,37 @@ def draw_record(
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         style.write(experiment.figure(records, size=size, dpi=resolution), part)
+    return Path(path)
+
+
+def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
+    """Draw a diagnosis into a file.
+
+    The residuals of the runs that the baseline misses most, before and after, over the noise; the
+    torque that each model lacks over angle and velocity, with 95 % intervals; the scores of the
+    candidates; the first effect's size run by run.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        What ``pendmap.discrepancy.diagnose`` returned.
+    path : str or path
+        As of :func:`draw`.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If the file cannot be written.
+    """
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(discrepancy.figure(found, dpi=style.resolution(None)), part)
     return Path(path)
 
 
