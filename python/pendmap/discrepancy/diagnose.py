@@ -12,7 +12,7 @@ from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
 from pendmap.discrepancy.runs import RunByRun, run_by_run
 from pendmap.discrepancy.select import Attempt, Found, Search
-from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
+from pendmap.discrepancy.torque import residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ class Discrepancy:
         The effects that are named.
     gap : Gap
         Before and after.
-    torque_before, torque_after : Torque
-        What the models lack.
+    torque_before, torque_after : dict of list of dict
+        What the models lack, as of :func:`pendmap.discrepancy.torque.residual_torque`.
     where : list of dict
         Bins in which the torque that the baseline lacks stands out.
     runs : RunByRun
@@ -68,8 +68,8 @@ class Discrepancy:
     judgement: Judgement
     effects: tuple[NamedEffect, ...]
     gap: Gap
-    torque_before: Torque
-    torque_after: Torque
+    torque_before: dict[str, list[dict[str, Any]]]
+    torque_after: dict[str, list[dict[str, Any]]]
     where: list[dict[str, Any]]
     runs: RunByRun
     scores: Scores

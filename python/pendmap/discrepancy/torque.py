@@ -1,17 +1,17 @@
 """Where a model fails: the torque that it lacks, over angle, velocity, amplitude, phase and time.
 
-What a model reads too little, ``e(t)``, obeys for a small lack of torque ``u`` (rad/s^2)
+A small torque ``u(s)`` per inertia that the model lacks moves its readings, to first order, by
 
-``e'' + c_over_m e' + w0^2 (1 + a) cos(theta) e = u``.
+``e(t) = int_0^t (b(t) a(s) - a(t) b(s)) / W(s) u(s) ds``,   ``W = a b' - a' b``,
 
-Multiplied by a bump ``phi(t) = (1 - s^2)^6``, ``s`` from -1 to 1 over ``WIDTH`` of a small swing,
-and integrated by parts, no derivative of the readings is left:
+where ``a`` and ``b`` are the derivatives of the angle by the initial angle and velocity, which a
+fit has anyhow (variation of constants). A torque that is constant while the pendulum is in one bin
+of the angle, say, so has a column like any parameter, at the price of two running integrals; the
+torques of all bins are fitted together, with what the parameters and the initial states can follow
+taken off. Since an error adds up over a record, this sees torques far below what second differences
+of the readings show.
 
-``int phi u dt = int (phi'' - c_over_m phi' + w0^2 (1 + a) cos(theta) phi) e dt``.
-
-References
-----------
-Messenger & Bortz (2021), Multiscale Modeling and Simulation 19, 1474, for the weak form.
+What is shown is therefore the torque beyond what the model's own terms could take up.
 """
 
 from __future__ import annotations
@@ -22,21 +22,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.identification.sensitivity import window_slopes
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.trial import Trial
+    from pendmap.identification.runs import FitRun
+    from pendmap.identification.sensitivity import WindowSlopes
 
     Floats = NDArray[np.float64]
 
-__all__ = ["OVER", "Torque", "binned", "residual_torque", "standing_out"]
-
-WIDTH: Final = 0.6
-"""Width of a bump in periods of small swings."""
-
-POWER: Final = 6
-"""Of the bump: so smooth at its ends that sampling adds no error."""
+__all__ = ["OVER", "residual_torque", "standing_out"]
 
 OVER: Final = {
     "angle": "rad",
@@ -47,39 +45,24 @@ OVER: Final = {
 }
 """What the torque is shown over, and the units."""
 
-BINS: Final = 12
-"""Bins with equally many values."""
+ALONG: Final = ("amplitude", "lab_time")
+"""Over these it is the torque along the motion, positive where it drives: of the torque itself as
+much goes one way as the other."""
+
+BINS: Final = 10
+"""Bins with equally many samples."""
 
 STANDS_OUT: Final = 4.0
-"""Standard errors from which a bin stands out: of sixty, none does by chance."""
+"""Standard errors from which a bin stands out: of fifty, none does by chance."""
 
-FEWEST: Final = 3
-"""Values in a bin."""
+BLIND: Final = 1e-5
+"""A combination of bins with this part of the greatest information is taken for unseen."""
 
-
-@dataclasses.dataclass(frozen=True)
-class Torque:
-    """What a model lacks, per moment of inertia.
-
-    Parameters
-    ----------
-    torque, stderr : ndarray of float, shape (n,)
-        rad/s^2, each over a bump.
-    over : mapping of str to ndarray of float, shape (n,)
-        Angle (rad, within half a turn), velocity (rad/s), amplitude (rad: of the swing with that
-        energy, pi and more in rotation), phase of the drive (rad; no numbers in free runs) and time
-        in the laboratory (s) in the middle of the bumps.
-    run : ndarray of int, shape (n,)
-        Which run.
-    """
-
-    torque: Floats
-    stderr: Floats
-    over: dict[str, Floats]
-    run: NDArray[np.int64]
+LOST: Final = 1e-6
+"""Where ``W`` has fallen to this part of its start the motion has forgotten how it began."""
 
 
-def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
+def residual_torque(evidence: Evidence, trial: Trial) -> dict[str, list[dict[str, Any]]]:
     """Return the torque that a fitted model lacks in the runs that it was fitted to.
 
     Parameters
@@ -88,129 +71,141 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
         The records.
     trial : Trial
         The model.
+
+    Returns
+    -------
+    dict of list of dict
+        For each of :data:`OVER` a row a bin: ``from`` and ``to``, ``torque`` and ``stderr`` in
+        rad/s^2, ``z`` their ratio, whether it is the torque along the motion. Empty where the
+        records do not show it.
     """
-    parts = [p for w in trial.fit.windows if (p := _of_window(evidence, trial, w)) is not None]
-    if not parts:
-        empty = np.zeros(0)
-        return Torque(empty, empty, dict.fromkeys(OVER, empty), np.zeros(0, np.int64))
-    return Torque(
-        np.concatenate([p.torque for p in parts]),
-        np.concatenate([p.stderr for p in parts]),
-        {name: np.concatenate([p.over[name] for p in parts]) for name in OVER},
-        np.concatenate([p.run for p in parts]),
-    )
-
-
-def _of_window(
-    evidence: Evidence, trial: Trial, window: tuple[int, int, int, float, float]
-) -> Torque | None:
-    run, first, last = window[:3]
-    record, model = evidence.fitted[run], trial.fit.model
-    time = record.time[first:last]
-    interval = float(np.median(np.diff(time))) if time.size > 1 else math.inf
-    half = round(WIDTH * math.pi / (model.w0 * interval)) if math.isfinite(interval) else 0
-    if half < POWER or time.size < 2 * half + 1:
-        return None
-    theta, velocity = (row[first:last] for row in trial.fit.curves[run])
-    residual = trial.fit.residuals[run][first:last]
-    good = np.isfinite(residual)
-    if record.trusted is not None:
-        good &= record.trusted[first:last]
-    sigma = np.broadcast_to(np.asarray(record.sigma, np.float64), record.time.shape)[first:last]
-    drive = record.drive or {}
-    omega = float(drive.get("Omega") or 0.0)
-    phase = drive.get("phi")
-    own = f"phi[{run}]" if f"phi[{run}]" in trial.fit.estimates else "phi"
-    offset = trial.fit[own] if phase is None and own in trial.fit.estimates else float(phase or 0.0)
-    turned = omega * time + offset
-    pull = model.w0**2 * (1 + float(drive.get("p") or 0.0) * np.cos(turned)) * np.cos(theta)
-    s = np.arange(-half, half + 1) / (half + 1)
-    span = (half + 1) * interval
-    bump = (1 - s**2) ** POWER
-    slope = -2 * POWER * s * (1 - s**2) ** (POWER - 1) / span
-    bend = (
-        -2 * POWER * (1 - s**2) ** (POWER - 1)
-        + 4 * POWER * (POWER - 1) * s**2 * (1 - s**2) ** (POWER - 2)
-    ) / span**2
-    fixed = bend - (trial.fit["c_over_m"] if "c_over_m" in trial.fit.estimates else 0.0) * slope
-    middle = np.arange(half, time.size - half, half)
-    around = middle[:, None] + np.arange(-half, half + 1)
-    kernel = (fixed + pull[around] * bump) / float(np.sum(bump))
-    whole = good[around].all(axis=1) & (time[around[:, -1]] - time[around[:, 0]] < 1.5 * 2 * span)
-    middle, around, kernel = middle[whole], around[whole], kernel[whole]
-    energy = 1 - np.cos(theta[middle]) + 0.5 * (velocity[middle] / model.w0) ** 2
-    turning = energy > 2  # noqa: PLR2004 (that of the upright rest)
-    amplitude = np.where(
-        turning, math.pi * np.sqrt(energy / 2), np.arccos(np.clip(1 - energy, -1, 1))
-    )
-    return Torque(
-        np.sum(kernel * residual[around], axis=1),
-        np.sqrt(np.sum((kernel * sigma[around]) ** 2, axis=1)),
-        {
-            "angle": np.angle(np.exp(1j * theta[middle])),
-            "velocity": velocity[middle],
-            "amplitude": amplitude,
-            "drive_phase": np.angle(np.exp(1j * turned[middle]))
-            if record.drive
-            else np.full(middle.size, math.nan),
-            "lab_time": record.lab_time_s + time[middle],
-        },
-        np.full(middle.size, run),
-    )
-
-
-def binned(torque: Torque, over: str, *, signed: bool = False) -> list[dict[str, Any]]:
-    """Return the mean torque in bins with equally many values.
-
-    Parameters
-    ----------
-    torque : Torque
-        As of :func:`residual_torque`.
-    over : str
-        One of :data:`OVER`.
-    signed : bool
-        Whether torque along the motion is meant: positive where it drives.
-    """
-    place, values = torque.over[over], torque.torque
-    if signed:
-        values = values * np.sign(torque.over["velocity"])
-    known = np.isfinite(place)
-    place, values, weight = place[known], values[known], 1 / torque.stderr[known] ** 2
-    if place.size < BINS * FEWEST:
-        return []
-    edges = np.quantile(place, np.linspace(0, 1, BINS + 1))
-    which = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, BINS - 1)
-    rows = []
-    for k in range(BINS):
-        own = which == k
-        if np.count_nonzero(own) < FEWEST:
-            continue
-        total = float(np.sum(weight[own]))
-        mean = float(np.sum(weight[own] * values[own])) / total
-        # Neighbouring bumps overlap by half: each says about two thirds of its own.
-        error = 1.5**0.5 / math.sqrt(total)
-        rows.append(
-            {
-                "over": over,
-                "unit": OVER[over],
-                "along_motion": signed,
-                "from": float(edges[k]),
-                "to": float(edges[k + 1]),
-                "torque": mean,
-                "stderr": error,
-                "z": mean / error,
-            }
+    # All samples: the integrals run through those that do not count.
+    whole = [dataclasses.replace(run, trusted=None) for run in evidence.fitted]
+    _, windows = window_slopes(trial.fit, whole, (), trial.fit.model)
+    places = [_places(evidence.fitted[w.run], trial, w) for w in windows]
+    names = [name for name in OVER if any(np.isfinite(p[name]).any() for p in places)]
+    edges = {
+        name: np.unique(
+            np.nanquantile(np.concatenate([p[name] for p in places]), np.linspace(0, 1, BINS + 1))
         )
-    return rows
+        for name in names
+    }
+    names = [name for name in names if edges[name].size > 2]  # noqa: PLR2004 (two bins at least)
+    parts = []
+    for window, place in zip(windows, places, strict=True):
+        run = evidence.fitted[window.run]
+        columns = _columns(run, window, place, {name: edges[name] for name in names})
+        if run.trusted is not None:
+            lost = ~run.trusted[window.first : window.first + len(window.residual)]
+            columns[lost] = 0.0
+            for values in (window.columns, window.states, window.residual):
+                values[lost] = 0.0
+        parts.append(window.freed(columns))
+    base, further, residual = (np.concatenate([p[k] for p in parts]) for k in range(3))
+    sizes = np.linalg.norm(base, axis=0)
+    u, s, _ = np.linalg.svd(base[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
+    u = u[:, s > BLIND * s[0]] if s.size else u
+    further = further - u @ (u.T @ further)
+    residual = residual - u @ (u.T @ residual)
+    found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
+    first = 0
+    for name in names:
+        count = edges[name].size - 1
+        found[name] = _solved(
+            further[:, first : first + count], residual, name, edges[name], trial.remainder.level
+        )
+        first += count
+    return found
 
 
-def standing_out(torque: Torque) -> list[dict[str, Any]]:
-    """Return the bins in which the torque stands out of the noise, the clearest first.
+def standing_out(torque: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
+    """Return the bins in which a torque stands out of the noise, the clearest first."""
+    rows = [row for rows in torque.values() for row in rows if abs(row["z"]) > STANDS_OUT]
+    return sorted(rows, key=lambda row: -abs(row["z"]))
 
-    Over amplitude and laboratory time it is the torque along the motion, over angle, velocity and
-    drive phase the torque itself.
-    """
-    rows = []
-    for over in OVER:
-        rows += binned(torque, over, signed=over in {"amplitude", "lab_time"})
-    return sorted((r for r in rows if abs(r["z"]) > STANDS_OUT), key=lambda r: -abs(r["z"]))
+
+def _places(run: FitRun, trial: Trial, window: WindowSlopes) -> dict[str, Floats]:
+    """Return where the motion is at each sample of a window."""
+    own = slice(window.first, window.first + len(window.residual))
+    theta, velocity = (row[own] for row in trial.fit.curves[window.run])
+    energy = 1 - np.cos(theta) + 0.5 * (velocity / trial.fit.model.w0) ** 2
+    amplitude = np.where(
+        energy > 2,  # noqa: PLR2004 (that of the upright rest)
+        math.pi * np.sqrt(energy / 2),
+        np.arccos(np.clip(1 - energy, -1, 1)),
+    )
+    phase = np.full(theta.shape, math.nan)
+    if run.drive:
+        names = (f"phi[{window.run}]", "phi")
+        fitted = next((trial.fit[n] for n in names if n in trial.fit.estimates), 0.0)
+        known = run.drive.get("phi")
+        turned = float(run.drive.get("Omega") or 0.0) * run.time[own]
+        phase = np.angle(np.exp(1j * (turned + (fitted if known is None else known))))
+    return {
+        "angle": np.angle(np.exp(1j * theta)),
+        "velocity": velocity,
+        "amplitude": amplitude,
+        "drive_phase": phase,
+        "lab_time": run.lab_time_s + run.time[own],
+    }
+
+
+def _columns(
+    run: FitRun, window: WindowSlopes, place: dict[str, Floats], edges: dict[str, Floats]
+) -> Floats:
+    """Return what a torque of 1 rad/s^2 in each bin does to the readings over their errors."""
+    own = slice(window.first, window.first + len(window.residual))
+    time = run.time[own]
+    sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)[own]
+    count = sum(e.size - 1 for e in edges.values())
+    if time.size < 3:  # noqa: PLR2004 (no slope)
+        return np.zeros((time.size, count))
+    a, b = (window.states * sigma[:, None]).T
+    wronskian = a * np.gradient(b, time) - np.gradient(a, time) * b
+    sound = np.abs(wronskian) > LOST * float(np.max(np.abs(wronskian)))
+    inverse = np.where(sound, 1.0 / np.where(sound, wronskian, 1.0), 0.0)
+    torques = []
+    for name, edge in edges.items():
+        which = np.clip(np.searchsorted(edge, place[name], side="right") - 1, 0, edge.size - 2)
+        weight = np.sign(place["velocity"]) if name in ALONG else np.ones(time.size)
+        weight = np.where(np.isfinite(place[name]), weight, 0.0)
+        torques += [np.where(which == k, weight, 0.0) for k in range(edge.size - 1)]
+    u = np.stack(torques, axis=1)
+    steps = np.diff(time, append=time[-1:])[:, None]
+
+    def integral(kernel: Floats) -> Floats:
+        rate = (kernel * inverse)[:, None] * u
+        summed = np.cumsum(steps * rate, axis=0)
+        return np.asarray(summed - 0.5 * steps * rate, np.float64)
+
+    return np.asarray(
+        (b[:, None] * integral(a) - a[:, None] * integral(b)) / sigma[:, None], np.float64
+    )
+
+
+def _solved(
+    columns: Floats, residual: Floats, name: str, edges: Floats, level: float
+) -> list[dict[str, Any]]:
+    gram = columns.T @ columns
+    scale = np.sqrt(np.diag(gram))
+    if not np.all(scale > 0):
+        return []
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    seen = values > BLIND * values[-1]
+    spread = vectors[:, seen] / np.sqrt(values[seen])
+    inverse = (spread @ spread.T) / np.outer(scale, scale)
+    torque = inverse @ (columns.T @ residual)
+    stderr = np.sqrt(level * np.diag(inverse))
+    return [
+        {
+            "over": name,
+            "unit": OVER[name],
+            "along_motion": name in ALONG,
+            "from": float(edges[k]),
+            "to": float(edges[k + 1]),
+            "torque": float(torque[k]),
+            "stderr": float(stderr[k]),
+            "z": float(torque[k] / stderr[k]) if stderr[k] > 0 else 0.0,
+        }
+        for k in range(len(torque))
+    ]

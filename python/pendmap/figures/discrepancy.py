@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.discrepancy.torque import binned
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
 
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pendmap.discrepancy import Discrepancy
-    from pendmap.discrepancy.torque import Torque
 
 __all__ = ["figure"]
 
@@ -109,7 +107,7 @@ def _torque(axes: Axes, found: Discrepancy, over: str, label: str, *, named: boo
         ("before", BEFORE, "o", found.torque_before),
         ("after", AFTER, "s", found.torque_after),
     ):
-        _bins(axes, torque, over, (name, colour, mark))
+        _bins(axes, torque[over], (name, colour, mark))
     axes.axhline(0, color=style.QUIET, lw=0.7)
     axes.set_xlabel(label)
     axes.set_title(f"Torque that the model lacks, over {over}")
@@ -118,8 +116,7 @@ def _torque(axes: Axes, found: Discrepancy, over: str, label: str, *, named: boo
         axes.legend(loc="best", ncols=2, columnspacing=1.0, handletextpad=0.3)
 
 
-def _bins(axes: Axes, torque: Torque, over: str, how: tuple[str, str, str]) -> None:
-    rows = binned(torque, over)
+def _bins(axes: Axes, rows: list[dict[str, Any]], how: tuple[str, str, str]) -> None:
     name, colour, mark = how
     axes.errorbar(
         [0.5 * (row["from"] + row["to"]) for row in rows],

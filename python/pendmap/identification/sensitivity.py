@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
-__all__ = ["Sensitivities", "sensitivities"]
+__all__ = ["Sensitivities", "WindowSlopes", "sensitivities", "window_slopes"]
 
 STATE: Final = 2
 """Columns of an initial state."""
@@ -55,6 +55,73 @@ class Sensitivities:
     window: NDArray[np.int64]
 
 
+@dataclasses.dataclass(frozen=True)
+class WindowSlopes:
+    """Derivatives in one window, over the standard errors; rows of zeros do not count.
+
+    Parameters
+    ----------
+    run, first : int
+        Which run, and its first sample.
+    columns : ndarray of float, shape (n, k)
+        By the parameters, in SI.
+    states : ndarray of float, shape (n, 2)
+        By the initial angle, and by the initial velocity in rad per ``1 / w0``.
+    residual : ndarray of float, shape (n,)
+        Reading less model.
+    """
+
+    run: int
+    first: int
+    columns: NDArray[np.float64]
+    states: NDArray[np.float64]
+    residual: NDArray[np.float64]
+
+    def freed(
+        self, further: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        """Return parameters' columns, further ones, residual and place of the samples that count.
+
+        What the initial state can follow is taken off.
+        """
+        counted = self.states.any(axis=1) | self.columns.any(axis=1)
+        basis = _basis(self.states[counted])
+
+        def free(values: NDArray[np.float64]) -> NDArray[np.float64]:
+            kept = values[counted]
+            return np.asarray(kept - basis @ (basis.T @ kept), np.float64)
+
+        places = np.flatnonzero(counted).astype(np.int64)
+        return free(self.columns), free(further), free(self.residual), places
+
+
+def window_slopes(
+    fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
+) -> tuple[tuple[str, ...], list[WindowSlopes]]:
+    """Return the parameters' names and the derivatives window by window.
+
+    Parameters and errors are those of :func:`sensitivities`.
+    """
+    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+
+    units = Units(model.w0, si=True)
+    base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
+    start = {name: fit.estimates[name].value for name in fit.names}
+    quantities, given = prepared(runs, model, [*base, *candidates], start, units)
+    bare = [(q.places, q.bare(q.start, units)) for q in quantities]
+    try:
+        found = _core.fit_rows(given, bare, tolerance_of(runs), bare_windows(fit.windows, units))
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    slopes = np.array([q.slope(b, units) for q, (_, b) in zip(quantities, bare, strict=True)])
+    all_slopes = []
+    for (places, rows, residual), window in zip(found, fit.windows, strict=True):
+        columns = np.zeros((len(rows), len(quantities)))
+        columns[:, places] = rows[:, :-STATE] / slopes[places]
+        all_slopes.append(WindowSlopes(window[0], window[1], columns, rows[:, -STATE:], residual))
+    return tuple(q.name for q in quantities), all_slopes
+
+
 def sensitivities(
     fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
 ) -> Sensitivities:
@@ -76,41 +143,16 @@ def sensitivities(
     InputError
         If a name is not known, or the motion is lost.
     """
-    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
-
-    units = Units(model.w0, si=True)
-    base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
-    start = {name: fit.estimates[name].value for name in fit.names}
-    quantities, given = prepared(runs, model, [*base, *candidates], start, units)
-    bare = [(q.places, q.bare(q.start, units)) for q in quantities]
-    try:
-        found = _core.fit_rows(given, bare, tolerance_of(runs), bare_windows(fit.windows, units))
-    except ValueError as error:
-        raise InputError(str(error)) from None
-    slopes = np.array([q.slope(b, units) for q, (_, b) in zip(quantities, bare, strict=True)])
-    parts: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
-    labels: list[NDArray[np.int64]] = []
-    for index, ((places, rows, residual), window) in enumerate(
-        zip(found, fit.windows, strict=True)
-    ):
-        counted = np.flatnonzero(rows.any(axis=1))
-        columns = np.zeros((counted.size, len(quantities) + 1))
-        columns[:, places] = rows[counted, :-STATE] / slopes[places]
-        columns[:, -1] = residual[counted]
-        basis = _basis(rows[counted, -STATE:])
-        columns -= basis @ (basis.T @ columns)
-        parts.append((columns[:, :-1], columns[:, -1]))
-        run = np.full(counted.size, window[0], np.int64)
-        labels.append(np.stack([run, window[1] + counted, np.full(counted.size, index)]))
+    names, windows = window_slopes(fit, runs, candidates, model)
+    columns, residuals, labels = [], [], []
+    for index, window in enumerate(windows):
+        own, _, residual, counted = window.freed(np.zeros((len(window.residual), 0)))
+        columns.append(own)
+        residuals.append(residual)
+        run = np.full(counted.size, window.run, np.int64)
+        labels.append(np.stack([run, window.first + counted, np.full(counted.size, index)]))
     run, sample, of = np.concatenate(labels, axis=1)
-    return Sensitivities(
-        tuple(q.name for q in quantities),
-        np.concatenate([columns for columns, _ in parts]),
-        np.concatenate([residual for _, residual in parts]),
-        run,
-        sample,
-        of,
-    )
+    return Sensitivities(names, np.concatenate(columns), np.concatenate(residuals), run, sample, of)
 
 
 def _basis(states: NDArray[np.float64]) -> NDArray[np.float64]:
