@@ -196,6 +196,7 @@ def run(case: Case) -> dict[str, Any]:
             "left": found.judgement.left,
             "uneven": found.judgement.uneven,
             "closed": found.judgement.closed,
+            "chance": found.judgement.chance,
             "ratio": [found.judgement.ratio, found.judgement.ratio_allowed],
             "attempts": [
                 [a.names, a.score, a.gain, a.held_gain, a.accepted] for a in found.attempts

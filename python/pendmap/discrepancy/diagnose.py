@@ -12,7 +12,7 @@ from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
 from pendmap.discrepancy.runs import RunByRun, run_by_run
 from pendmap.discrepancy.select import Attempt, Found, Search
-from pendmap.discrepancy.torque import residual_torque, standing_out
+from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ class Discrepancy:
         The effects that are named.
     gap : Gap
         Before and after.
-    torque_before, torque_after : dict of list of dict
-        What the models lack, as of :func:`pendmap.discrepancy.torque.residual_torque`.
+    torque_before, torque_after : Torque
+        What the models lack.
     where : list of dict
         Bins in which the torque that the baseline lacks stands out.
     runs : RunByRun
@@ -68,8 +68,8 @@ class Discrepancy:
     judgement: Judgement
     effects: tuple[NamedEffect, ...]
     gap: Gap
-    torque_before: dict[str, list[dict[str, Any]]]
-    torque_after: dict[str, list[dict[str, Any]]]
+    torque_before: Torque
+    torque_after: Torque
     where: list[dict[str, Any]]
     runs: RunByRun
     scores: Scores
@@ -136,10 +136,11 @@ def diagnose(
     nearest = search.run()
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial, nearest.trial.remainder.level)
-    judgement = judge(evidence, search, nearest, runs)
+    after = residual_torque(evidence, nearest.trial)
+    judgement = judge(evidence, search, nearest, runs, after.chance)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else search.base
-    before = residual_torque(evidence, search.base.trial)
+    before = residual_torque(evidence, search.base.trial) if nearest.trial.chosen else after
     scores = search.first or search.scores(begin)
     return Discrepancy(
         evidence,
@@ -150,7 +151,7 @@ def diagnose(
         named_effects(evidence, best, judgement) if claimed else (),
         gap_of(evidence, search.base, best),
         before,
-        residual_torque(evidence, best.trial) if claimed else before,
+        after if claimed else before,
         standing_out(before),
         runs,
         scores,

@@ -29,6 +29,10 @@ CONTAINS: Final = 0.99
 special case: it is no other explanation."""
 
 
+BETTER: Final = 2.7
+"""Unless its shape gains more than this, the 90 % point of chi-squared: then it may be the truth."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Rival:
     """Another effect in the place of one that was found.
@@ -139,7 +143,7 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
                 1.0 - reached / gain if gain > 0 else 0.0,
                 likeness,
                 refitted,
-                contains=more and likeness > CONTAINS,
+                contains=more and likeness > CONTAINS and reached - gain < BETTER,
             )
         )
     rivals.sort(key=lambda r: r.behind)

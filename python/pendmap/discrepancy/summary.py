@@ -67,6 +67,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             "z": judgement.left,
             "uneven": judgement.uneven,
             "spread": judgement.spread,
+            "torque_by_chance": judgement.chance,
             "chi2_per_degree": judgement.ratio,
             "allowed": judgement.ratio_allowed,
         },

@@ -62,7 +62,34 @@ LOST: Final = 1e-6
 """Where ``W`` has fallen to this part of its start the motion has forgotten how it began."""
 
 
-def residual_torque(evidence: Evidence, trial: Trial) -> dict[str, list[dict[str, Any]]]:
+@dataclasses.dataclass(frozen=True)
+class Torque:
+    """The torque that a model lacks.
+
+    Parameters
+    ----------
+    rows : dict of list of dict
+        For each of :data:`OVER` a row a bin: ``from`` and ``to``, ``torque`` and ``stderr`` in
+        rad/s^2, ``z`` their ratio, whether it is the torque along the motion. Empty where the
+        records do not show it.
+    gains : dict of (float, int)
+        For each what the sum of squares falls by, over the noise's level, if the torques of all its
+        bins are added to the model, and how many numbers that is.
+    """
+
+    rows: dict[str, list[dict[str, Any]]]
+    gains: dict[str, tuple[float, int]]
+
+    @property
+    def chance(self) -> float:
+        """The chance that noise alone gains so much: the least of all, times how many there are."""
+        from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
+
+        tails = [float(chi2.sf(gain, count)) for gain, count in self.gains.values() if count]
+        return min(min(tails, default=1.0) * max(len(tails), 1), 1.0)
+
+
+def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
     """Return the torque that a fitted model lacks in the runs that it was fitted to.
 
     Parameters
@@ -71,13 +98,6 @@ def residual_torque(evidence: Evidence, trial: Trial) -> dict[str, list[dict[str
         The records.
     trial : Trial
         The model.
-
-    Returns
-    -------
-    dict of list of dict
-        For each of :data:`OVER` a row a bin: ``from`` and ``to``, ``torque`` and ``stderr`` in
-        rad/s^2, ``z`` their ratio, whether it is the torque along the motion. Empty where the
-        records do not show it.
     """
     # All samples: the integrals run through those that do not count.
     whole = [dataclasses.replace(run, trusted=None) for run in evidence.fitted]
@@ -108,19 +128,20 @@ def residual_torque(evidence: Evidence, trial: Trial) -> dict[str, list[dict[str
     further = further - u @ (u.T @ further)
     residual = residual - u @ (u.T @ residual)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
+    gains: dict[str, tuple[float, int]] = {}
     first = 0
     for name in names:
         count = edges[name].size - 1
-        found[name] = _solved(
+        found[name], gains[name] = _solved(
             further[:, first : first + count], residual, name, edges[name], trial.remainder.level
         )
         first += count
-    return found
+    return Torque(found, gains)
 
 
-def standing_out(torque: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
+def standing_out(torque: Torque) -> list[dict[str, Any]]:
     """Return the bins in which a torque stands out of the noise, the clearest first."""
-    rows = [row for rows in torque.values() for row in rows if abs(row["z"]) > STANDS_OUT]
+    rows = [row for rows in torque.rows.values() for row in rows if abs(row["z"]) > STANDS_OUT]
     return sorted(rows, key=lambda row: -abs(row["z"]))
 
 
@@ -185,18 +206,20 @@ def _columns(
 
 def _solved(
     columns: Floats, residual: Floats, name: str, edges: Floats, level: float
-) -> list[dict[str, Any]]:
+) -> tuple[list[dict[str, Any]], tuple[float, int]]:
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
     if not np.all(scale > 0):
-        return []
+        return [], (0.0, 0)
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     seen = values > BLIND * values[-1]
     spread = vectors[:, seen] / np.sqrt(values[seen])
     inverse = (spread @ spread.T) / np.outer(scale, scale)
-    torque = inverse @ (columns.T @ residual)
+    pull = columns.T @ residual
+    torque = inverse @ pull
+    gain = float(pull @ torque) / level
     stderr = np.sqrt(level * np.diag(inverse))
-    return [
+    rows = [
         {
             "over": name,
             "unit": OVER[name],
@@ -209,3 +232,4 @@ def _solved(
         }
         for k in range(len(torque))
     ]
+    return rows, (gain, int(np.count_nonzero(seen)))

@@ -29,6 +29,9 @@ more is no effect that is alike in every run."""
 CLOSED: Final = 0.75
 """Share of the gap on held-out data that effects must close to be named beside what is left."""
 
+CHANCE: Final = 1e-5
+"""Chance of a residual torque below which something is left."""
+
 SEVERAL: Final = 1.0
 """Standard errors by which the greatest of several runs counts as less than all together."""
 
@@ -59,6 +62,9 @@ class Judgement:
     spread : float
         How much the effects' sizes differ from run to run beyond noise, over their size: the
         greatest of all.
+    chance : float
+        That noise alone would show such a torque over angle, velocity, amplitude, drive phase or
+        time as is left.
     """
 
     verdict: Verdict
@@ -69,6 +75,7 @@ class Judgement:
     closed: float
     uneven: float
     spread: float
+    chance: float
 
     @property
     def approximate(self) -> bool:
@@ -76,7 +83,9 @@ class Judgement:
         return self.verdict == "partial"
 
 
-def judge(evidence: Evidence, search: Search, best: Found, runs: RunByRun) -> Judgement:
+def judge(
+    evidence: Evidence, search: Search, best: Found, runs: RunByRun, chance: float
+) -> Judgement:
     """Return the verdict on a search.
 
     Parameters
@@ -89,6 +98,8 @@ def judge(evidence: Evidence, search: Search, best: Found, runs: RunByRun) -> Ju
         What it found.
     runs : RunByRun
         Its parameters run by run.
+    chance : float
+        That noise alone would show such a torque over angle, velocity, ... as is left.
     """
     uneven = runs.uneven
     trial = best.trial
@@ -98,7 +109,7 @@ def judge(evidence: Evidence, search: Search, best: Found, runs: RunByRun) -> Ju
     ratio = trial.chi2 / degrees
     # The greatest of several runs is greater by chance.
     left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
-    rest = left > LEFT or uneven > LEFT
+    rest = left > LEFT or uneven > LEFT or chance < CHANCE
     closed = _closed(search, best)
     spread = max((runs.spread(c.free[0]) for c in trial.chosen), default=0.0)
     standings = tuple(standing_of(search, best, candidate) for candidate in trial.chosen)
@@ -111,7 +122,7 @@ def judge(evidence: Evidence, search: Search, best: Found, runs: RunByRun) -> Ju
         verdict = "ambiguous"
     else:
         verdict = "named"
-    return Judgement(verdict, standings, left, ratio, allowed, closed, uneven, spread)
+    return Judgement(verdict, standings, left, ratio, allowed, closed, uneven, spread, chance)
 
 
 def _closed(search: Search, best: Found) -> float:

@@ -107,7 +107,7 @@ def _torque(axes: Axes, found: Discrepancy, over: str, label: str, *, named: boo
         ("before", BEFORE, "o", found.torque_before),
         ("after", AFTER, "s", found.torque_after),
     ):
-        _bins(axes, torque[over], (name, colour, mark))
+        _bins(axes, torque.rows[over], (name, colour, mark))
     axes.axhline(0, color=style.QUIET, lw=0.7)
     axes.set_xlabel(label)
     axes.set_title(f"Torque that the model lacks, over {over}")
