@@ -30,7 +30,7 @@ special case: it is no other explanation."""
 
 
 BETTER: Final = 2.7
-"""Unless its shape gains more than this, the 90 % point of chi-squared: then it may be the truth."""
+"""Unless its shape gains more than this (90 % point of chi-squared): then it may be the truth."""
 
 
 @dataclasses.dataclass(frozen=True)

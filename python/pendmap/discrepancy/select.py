@@ -142,6 +142,13 @@ class Search:
         self._trials: dict[tuple[Key, Key], Found | None] = {}
         self._rests: dict[Key, Trial] = {key_of(base.chosen): base}
 
+    def _begin_again(self, base: Trial) -> None:
+        """Forget everything but a better baseline."""
+        self.base = Found(base, tried(self.evidence, base))
+        self.attempts, self.first = [], None
+        self._scores, self._trials = {}, {}
+        self._rests = {key_of(base.chosen): base}
+
     def run(self) -> Found:
         """Return the best model."""
         best = self.base
@@ -149,10 +156,31 @@ class Search:
             following = self._following(best)
             if following is None:
                 break
+            if not best.trial.chosen:
+                better = self._better_base(following.trial)
+                if better is not None:
+                    self._begin_again(better)
+                    best = self.base
+                    continue
             best = following
             self._rests[key_of(best.trial.chosen)] = best.trial
             self.progress(len(best.trial.chosen))
         return self._without_idle(best) if len(best.trial.chosen) > 1 else best
+
+    def _better_base(self, found: Trial) -> Trial | None:
+        """Return the baseline from where a further effect has led, if it is better there.
+
+        A search may end in the wrong valley, out of which an effect leads that has nothing to do
+        with the pendulum.
+        """
+        rest = found
+        try:
+            for candidate in found.chosen:
+                chosen = tuple(c for c in rest.chosen if c.name != candidate.name)
+                rest = self._less(rest, candidate, chosen)
+        except InputError:
+            return None
+        return rest if rest.chi2 < self.base.trial.chi2 - GATE * self.level() else None
 
     def pool(self, trial: Trial) -> list[list[Candidate]]:
         """Return the candidates that a trial's model does not have yet."""
