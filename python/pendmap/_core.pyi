@@ -13,6 +13,7 @@ __all__ = [
     "default_threads",
     "effects",
     "fit_equations",
+    "fit_rows",
     "fit_runs",
     "period",
     "simd",
@@ -91,3 +92,9 @@ def fit_equations(
     tolerance: float,
     windows: Sequence[_Window],
 ) -> dict[str, Any]: ...
+def fit_rows(
+    runs: Sequence[dict[str, Any]],
+    free: Sequence[_Free],
+    tolerance: float,
+    windows: Sequence[_Window],
+) -> list[tuple[list[int], _Floats, _Floats]]: ...

@@ -21,6 +21,36 @@ const BLIND_STATE: f64 = 1e-11;
 /// Columns of the initial state.
 const STATE: usize = 2;
 
+/// All windows at `values` with their derivatives; none where a value is out of its range or a motion
+/// leaves the range of numbers.
+#[must_use]
+pub fn linearised(problem: &Problem, values: &[f64], windows: &[Window]) -> Option<Vec<Linear>> {
+    over(problem, values, windows, |linear, _| linear)
+}
+
+/// What `make` makes of each window, in their order.
+fn over<T: Send>(
+    problem: &Problem,
+    values: &[f64],
+    windows: &[Window],
+    make: impl Fn(Linear, &Columns) -> T + Sync,
+) -> Option<Vec<T>> {
+    let of_record = |index: usize| Some((problem.shaped(index, values)?, problem.columns(index)));
+    let records: Vec<(Shaped, Columns)> =
+        (0..problem.records.len()).map(of_record).collect::<Option<_>>()?;
+    let each = |window: &Window| {
+        let (shaped, columns) = &records[window.record];
+        let linear = linearise(problem, shaped, columns, window);
+        let sound = linear.rows.iter().all(|slope| slope.is_finite());
+        (sound && linear.chi2().is_finite()).then(|| make(linear, columns))
+    };
+    // A thread costs more than a window of a few samples.
+    match windows {
+        [only] => Some(vec![each(only)?]),
+        _ => windows.par_iter().map(each).collect(),
+    }
+}
+
 /// What one window says.
 #[derive(Clone, Debug)]
 struct Block {
@@ -102,24 +132,11 @@ impl Normal {
     /// of its range or a motion leaves the range of numbers.
     #[must_use]
     pub fn at(problem: &Problem, values: &[f64], windows: &[Window]) -> Option<Self> {
-        let of_record =
-            |index: usize| Some((problem.shaped(index, values)?, problem.columns(index)));
-        let records: Vec<(Shaped, Columns)> =
-            (0..problem.records.len()).map(of_record).collect::<Option<_>>()?;
-        let each = |window: &Window| {
-            let (shaped, columns) = &records[window.record];
-            let linear = linearise(problem, shaped, columns, window);
-            let sound = linear.rows.iter().all(|slope| slope.is_finite());
+        let each = |linear: Linear, columns: &Columns| {
             let (chi2, block) = (linear.chi2(), Block::new(&linear, columns.places().collect()));
-            let Linear { states, residuals, .. } = linear;
-            (sound && chi2.is_finite()).then_some((chi2, states, residuals, block))
+            (chi2, linear.states, linear.residuals, block)
         };
-        // A thread costs more than a window of a few samples.
-        let all: Option<Vec<_>> = match windows {
-            [only] => Some(vec![each(only)?]),
-            _ => windows.par_iter().map(each).collect(),
-        };
-        let all = all?;
+        let all = over(problem, values, windows, each)?;
         let count = problem.free.len();
         let mut normal = Self {
             chi2: 0.0,

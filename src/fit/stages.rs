@@ -32,11 +32,14 @@ pub struct Settings {
     pub steps: usize,
     /// The gain in the sum of squares that is worth no further step.
     pub gain: f64,
+    /// So many parameters, the first ones, stay at their starts: a model is tried on a record that
+    /// it was not fitted to, and the initial states alone are adapted.
+    pub hold: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { shortest: TAU, growth: 4.0, steps: 40, gain: 1e-3 }
+        Self { shortest: TAU, growth: 4.0, steps: 40, gain: 1e-3, hold: 0 }
     }
 }
 
@@ -80,9 +83,15 @@ pub fn fit(
 ) -> Result<Fit, Error> {
     let last = Limit { gain: settings.gain, part: 1e-9, steps: settings.steps };
     let Some(windows) = windows else { return widened(problem, settings, last, cancel) };
+    let held = held(problem, settings);
     let mut point = Point::new(problem, problem.start(), windows)?;
-    let outcome = descend(problem, &mut point, &[], last, cancel)?;
+    let outcome = descend(problem, &mut point, &held, last, cancel)?;
     Ok(Fit { point, steps: outcome.steps, stages: 1, converged: outcome.converged })
+}
+
+/// The parameters that are not adapted.
+fn held(problem: &Problem, settings: Settings) -> Vec<usize> {
+    (0..settings.hold.min(problem.free.len())).collect()
 }
 
 fn widened(
@@ -94,6 +103,7 @@ fn widened(
     let span = |times: &[f64]| times[times.len() - 1] - times[0];
     let most = problem.records.iter().map(|r| span(&r.times).min(r.longest)).fold(0.0, f64::max);
     let rough = Limit { gain: 0.1, part: 1e-3, steps: settings.steps };
+    let held = held(problem, settings);
     let mut length = settings.shortest.min(most);
     let windows = cut(problem, length, |record, at| guess(&problem.records[record], at));
     let windows = settled(problem, &problem.start(), windows, cancel)?;
@@ -101,12 +111,12 @@ fn widened(
     let (mut steps, mut stages) = (0, 0);
     loop {
         let limit = if length < most { rough } else { last };
-        let mut outcome = descend(problem, &mut point, &[], limit, cancel)?;
+        let mut outcome = descend(problem, &mut point, &held, limit, cancel)?;
         (steps, stages) = (steps + outcome.steps, stages + 1);
         for _ in 0..MOST_SPLITS {
             let Some(split) = split(problem, &point, cancel)? else { break };
             point = split;
-            outcome = descend(problem, &mut point, &[], limit, cancel)?;
+            outcome = descend(problem, &mut point, &held, limit, cancel)?;
             steps += outcome.steps;
         }
         if length >= most {

@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use super::watch::watched;
 use super::{Parameters, pendulum};
+use crate::error::Error;
 use crate::fit::descent::Point;
+use crate::fit::normal::linearised;
 use crate::fit::profile::intervals;
 use crate::fit::window::Window;
 use crate::fit::{Free, Problem, Record, Settings, Slot, fit};
@@ -87,6 +89,7 @@ pub struct FitChoices {
     growth: f64,
     steps: usize,
     gain: f64,
+    hold: usize,
     profiled: Vec<usize>,
     level: f64,
     doubt: f64,
@@ -120,8 +123,8 @@ pub fn fit_runs<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let problem = problem(runs, &free, choices.tolerance)?;
     let given = windows.map(self::windows);
-    let FitChoices { shortest, growth, steps, gain, .. } = choices;
-    let settings = Settings { shortest, growth, steps, gain };
+    let FitChoices { shortest, growth, steps, gain, hold, .. } = choices;
+    let settings = Settings { shortest, growth, steps, gain, hold };
     let (found, ends) = watched(py, None, |control| {
         let found = fit(&problem, settings, given, control.flag())?;
         let level = choices.level * found.widening(&problem, choices.doubt);
@@ -151,6 +154,31 @@ pub fn fit_equations<'py>(
     let windows = self::windows(windows);
     let at = watched(py, None, |_| Point::new(&problem, problem.start(), windows))?;
     point(py, &problem, &at)
+}
+
+/// The derivatives behind the equations, window by window: `(free parameters, rows, residuals)`, a
+/// row for each sample with the derivatives of the model over the standard error by these parameters
+/// and by the initial angle and velocity.
+#[pyfunction]
+pub fn fit_rows<'py>(
+    py: Python<'py>,
+    runs: Vec<Run<'py>>,
+    free: Vec<FreeTuple>,
+    tolerance: f64,
+    windows: Vec<WindowTuple>,
+) -> PyResult<Bound<'py, PyList>> {
+    let problem = problem(runs, &free, tolerance)?;
+    let windows = self::windows(windows);
+    let all = watched(py, None, |_| {
+        linearised(&problem, &problem.start(), &windows).ok_or(Error::Diverges)
+    })?;
+    let list = PyList::empty(py);
+    for (linear, window) in all.into_iter().zip(&windows) {
+        let places: Vec<usize> = problem.columns(window.record).places().collect();
+        let rows = linear.rows.into_pyarray(py).reshape([linear.residuals.len(), linear.width])?;
+        list.append((places, rows, linear.residuals.into_pyarray(py)))?;
+    }
+    Ok(list)
 }
 
 fn point<'py>(py: Python<'py>, problem: &Problem, at: &Point) -> PyResult<Bound<'py, PyDict>> {

@@ -26,6 +26,7 @@ _COMMANDS = {
     "look": "Say what a record holds: channels, rate, noise, releases, what is odd about it.",
     "identify": "Find natural frequency, damping and friction in a free decay, by every method.",
     "compare": "Compare a model with records that it was not fitted to.",
+    "diagnose": "Find where model and records disagree, and which effect is missing.",
     "rig": "Write an experiment of a virtual rig, its truth beside it.",
     "paper": "Draw a figure of the paper, by its number.",
     "plot": "Draw a result again, without computing.",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from pendmap.discrepancy import Discrepancy
     from pendmap.identification import Comparison, IdentificationReport
     from pendmap.records import Experiment
 
@@ -31,6 +32,7 @@ __all__ = [
     "RunPanel",
     "draw",
     "draw_comparison",
+    "draw_discrepancy",
     "draw_identification",
     "draw_pendulum",
     "draw_record",
@@ -180,6 +182,39 @@ def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Pat
 
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         style.write(sheet.figure(comparison, dpi=style.resolution(None)), part)
+    return Path(path)
+
+
+def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
+    """Draw a diagnosis into a file.
+
+    The residuals of the runs that the baseline misses most, before and after, over the noise; the
+    torque that each model lacks over angle and velocity, with 95 % intervals; the scores of the
+    candidates; the first effect's size run by run.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        What ``pendmap.discrepancy.diagnose`` returned.
+    path : str or path
+        As of :func:`draw`.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If the file cannot be written.
+    """
+    from pendmap.figures import discrepancy  # noqa: PLC0415 (scipy takes a while)
+
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(discrepancy.figure(found, dpi=style.resolution(None)), part)
     return Path(path)
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from pendmap.model import Rig
 
-__all__ = ["FitRun", "Pivot", "TrajectoryFit", "fit_runs", "score"]
+__all__ = ["FitRun", "Pivot", "TrajectoryFit", "fit_runs", "prepared", "score"]
 
 LEVEL: Final = 3.841458820694124
 """The 95 % point of chi-squared with one degree of freedom."""
@@ -104,6 +104,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     shortest_s: float | None = None,
     windows: Sequence[tuple[int, int, int, float, float]] | None = None,
     sigma_doubt: float = 0.0,
+    hold: bool = False,
+    steps: int = 40,
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
 
@@ -132,6 +134,11 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         Those of a former fit: the search begins with them, without stages.
     sigma_doubt : float
         Relative standard error of ``sigma``.
+    hold : bool
+        Whether the parameters stay at their starts, so that initial states and phases that no run
+        knows are adapted alone: a model is tried on records that it was not fitted to.
+    steps : int
+        The most steps of a stage.
 
     Raises
     ------
@@ -147,7 +154,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
     units = Units(model.w0, si=True)
-    quantities, given = _prepared(runs, model, free, start or {}, units)
+    quantities, given = prepared(runs, model, free, start or {}, units)
     wanted = [q.name for q in quantities] if profiled is None else list(profiled)
     chosen = [k for k, q in enumerate(quantities) if {q.name, q.name.partition("[")[0]} & {*wanted}]
     swing = math.tau / model.w0
@@ -155,8 +162,9 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         "tolerance": tolerance_of(runs),
         "shortest": units.w0 * (swing if shortest_s is None else shortest_s),
         "growth": 4.0,
-        "steps": 40,
+        "steps": steps,
         "gain": 1e-3,
+        "hold": len([q for q in quantities if q.name.partition("[")[0] in free]) if hold else 0,
         "profiled": chosen,
         "level": LEVEL,
         "doubt": sigma_doubt,
@@ -204,7 +212,7 @@ def score(
     units = Units(model.w0, si=True)
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
-    quantities, given = _prepared(runs, model, [*base, *candidates], start, units)
+    quantities, given = prepared(runs, model, [*base, *candidates], start, units)
     bare = [(q.places, q.bare(q.start, units)) for q in quantities]
     try:
         windows = bare_windows(fit.windows, units)
@@ -225,7 +233,7 @@ def score(
     )
 
 
-def _prepared(
+def prepared(
     runs: Sequence[FitRun],
     model: Rig,
     free: Sequence[str],

@@ -1,0 +1,139 @@
+"""The model to begin with: viscous damping and Coulomb friction, or the one that is given."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.discrepancy.candidates import own_name
+from pendmap.discrepancy.trial import Trial, fitted
+from pendmap.errors import InputError
+from pendmap.identification.rough import rough_start
+from pendmap.identification.start import starting_values
+from pendmap.model import Rig
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy.evidence import Evidence
+
+__all__ = ["baseline", "taken_by"]
+
+POOR: Final = 0.1
+"""Residuals above this part of a record's own scatter are no fit: the search went astray."""
+
+
+def baseline(evidence: Evidence, model: Rig | None = None) -> Trial:
+    """Fit the model to begin with.
+
+    ``th'' + c_over_m th' + w0**2 (1 + a(t)) sin th = -Tr sign(th')``. Damping may come out
+    negative, which no pendulum has: a bound would stall the search, and what is missing in the
+    model may drive it there.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    model : Rig, optional
+        One to begin with instead: its natural frequency, viscous damping and effects' sizes are
+        fitted, Coulomb friction and a constant torque only if it has them.
+
+    Raises
+    ------
+    InputError
+        If no free run shows a natural frequency and none is known.
+    """
+    if model is not None:
+        own = _unfolded(model)
+        free = ["w0", "c_over_m", *(n for n in ("Tr", "torque") if getattr(own, n) != 0)]
+        sizes = [f"{effect.name}.{size}" for effect in own.effects for size in effect.sizes]
+        return fitted(evidence, own, [*free, *sizes])
+    free = ["w0", "c_over_m", "Tr"]
+    first = _start(evidence)
+    found = _through_all(evidence, first, free) or fitted(evidence, first, free)
+    if found.fit.converged and not _poor(evidence, found):
+        return found
+    best = found
+    for begin in _other_starts(evidence):
+        again = fitted(evidence, begin, free)
+        best = min((best, again), key=lambda t: t.chi2)
+        if not _poor(evidence, best):
+            break
+    return best
+
+
+def _through_all(evidence: Evidence, start: Rig, free: list[str]) -> Trial | None:
+    """Return the fit from where one to all samples leads, where stretches are held back.
+
+    A search through gaps goes astray more easily. The fit itself does not see what is held back.
+    """
+    if not evidence.inside:
+        return None
+    whole = list(evidence.fitted)
+    for run, k in zip(evidence.held, evidence.held_of, strict=True):
+        place = evidence.fitted_of.index(k)
+        own = whole[place]
+        if own.trusted is not None and run.trusted is not None:
+            whole[place] = dataclasses.replace(own, trusted=own.trusted | run.trusted)
+    try:
+        begin = fitted(dataclasses.replace(evidence, fitted=tuple(whole)), start, free)
+        return fitted(evidence, begin.fit.model, free, start=begin.start, windows=begin.fit.windows)
+    except InputError:
+        return None
+
+
+def taken_by(trial: Trial) -> set[str]:
+    """Return effects that a trial's model has, and parameters of its own that are free."""
+    return {e.name for e in trial.fit.model.effects} | {n.partition("[")[0] for n in trial.free}
+
+
+def _unfolded(model: Rig) -> Rig:
+    """Return a model whose effects that have a parameter of their own stand in that."""
+    own, effects = {}, []
+    for effect in model.effects:
+        name = own_name(effect.name)
+        if name is None:
+            effects.append(dataclasses.replace(effect, ci95={}, probability=None, approximate=None))
+        else:
+            own[name] = effect.values[0]
+    return dataclasses.replace(model, **own, effects=tuple(effects), p=0.0, notes={})
+
+
+def _start(evidence: Evidence) -> Rig:
+    """Return a start from the free runs, the longest first; the natural frequency may be known."""
+    known = evidence.experiment.known.get("w0")
+    free = [(run, k) for run, k in zip(evidence.fitted, evidence.fitted_of, strict=True)]
+    free = [(run, k) for run, k in free if not run.forced]
+    for run, k in sorted(free, key=lambda pair: -float(np.ptp(pair[0].time))):
+        good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
+        rough = rough_start(run.time[good], run.theta[good], evidence.readings[k].sigma)
+        if rough is not None:
+            found = Rig(w0=rough["w0"], c_over_m=rough["c_over_m"], Tr=rough.get("Tr", 0.0))
+            return found if known is None else dataclasses.replace(found, w0=float(known))
+    if known is None:
+        raise InputError(
+            f"{evidence.experiment.path}: no free run shows a natural frequency: allowed is one of "
+            "two half swings or more, or w0 under [rig]"
+        )
+    return Rig(w0=float(known), c_over_m=0.01 * float(known))
+
+
+def _other_starts(evidence: Evidence) -> list[Rig]:
+    found = []
+    for run, k in zip(evidence.fitted, evidence.fitted_of, strict=True):
+        if run.forced:
+            continue
+        good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
+        try:
+            begin = starting_values(
+                run.time[good], run.theta[good], sigma=evidence.readings[k].sigma
+            )
+        except InputError:
+            continue
+        found.append(Rig(w0=begin.w0, c_over_m=begin.c_over_m, Tr=begin.Tr))
+    return found
+
+
+def _poor(evidence: Evidence, trial: Trial) -> bool:
+    scatter = np.mean([float(np.std(run.theta)) for run in evidence.fitted])
+    return trial.fit.rms > POOR * float(scatter)

@@ -1,0 +1,160 @@
+"""``diagnose``: from records to the effect that the model lacks."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap.discrepancy.advice import Advice, advice_of
+from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.evidence import Evidence, evidence_of
+from pendmap.discrepancy.gap import Gap, gap_of
+from pendmap.discrepancy.named import NamedEffect, named_effects
+from pendmap.discrepancy.runs import RunByRun, run_by_run
+from pendmap.discrepancy.select import Attempt, Found, Search
+from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
+from pendmap.discrepancy.verdict import Judgement, judge
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from pendmap.discrepancy.scores import Scores
+    from pendmap.model import Rig
+    from pendmap.records import Experiment
+
+__all__ = ["MOST_EFFECTS", "Discrepancy", "diagnose"]
+
+MOST_EFFECTS: Final = 3
+"""So many effects are added at most."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Discrepancy:
+    """Where model and records disagree, and why.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records: fitted and held back.
+    base, best : Found
+        The model to begin with and the best one; of verdicts ``none`` and ``unknown`` the best one
+        claims no effect.
+    nearest : Found
+        The best that candidates can do, claimed or not.
+    judgement : Judgement
+        Verdict and what it rests on.
+    effects : tuple of NamedEffect
+        The effects that are named.
+    gap : Gap
+        Before and after.
+    torque_before, torque_after : Torque
+        What the models lack.
+    where : list of dict
+        Bins in which the torque that the baseline lacks stands out.
+    runs : RunByRun
+        Parameters run by run.
+    scores : Scores
+        Of all candidates at the baseline.
+    attempts : tuple of Attempt
+        Candidates that were refitted.
+    advice : Advice
+        What to record next, and what these records would have shown.
+    """
+
+    evidence: Evidence
+    base: Found
+    best: Found
+    nearest: Found
+    judgement: Judgement
+    effects: tuple[NamedEffect, ...]
+    gap: Gap
+    torque_before: Torque
+    torque_after: Torque
+    where: list[dict[str, Any]]
+    runs: RunByRun
+    scores: Scores
+    attempts: tuple[Attempt, ...]
+    advice: Advice
+
+    @property
+    def verdict(self) -> str:
+        """``none``, ``named``, ``partial``, ``ambiguous`` or ``unknown``."""
+        return self.judgement.verdict
+
+    @property
+    def equivalent(self) -> list[list[str]]:
+        """Classes of effects that these records do not tell apart, of those that are named."""
+        if not self.effects:
+            return []
+        classes = (standing.equivalent for standing in self.judgement.standings)
+        return [names for names in classes if len(names) > 1]
+
+
+def diagnose(
+    experiment: Experiment,
+    *,
+    model: Rig | None = None,
+    max_effects: int = MOST_EFFECTS,
+    without: Collection[str] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Discrepancy:
+    """Find where a model and an experiment disagree, and which effects it lacks.
+
+    The baseline is fitted by multiple shooting, all effects of the library are scored at its fit,
+    the best refitted, up to ``max_effects`` accepted on the fall of the BIC and on runs that were
+    held back. What is left then decides the verdict.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As of :func:`pendmap.read_experiment`.
+    model : Rig, optional
+        The model to begin with; by default viscous damping and Coulomb friction.
+    max_effects : int
+        How many effects are added at most; the sensor's zero does not count.
+    without : collection of str
+        Effects that are no candidates.
+    progress : callable, optional
+        Called with the steps done and those to do.
+
+    Returns
+    -------
+    Discrepancy
+        Verdict, effects, gap and all that they rest on.
+
+    Raises
+    ------
+    InputError
+        If there is no run with samples, or no start can be found.
+    """
+    report = progress or (lambda _done, _total: None)
+    steps = max_effects + 3
+    evidence = evidence_of(experiment)
+    begin = baseline(evidence, model)
+    report(1, steps)
+    search = Search(evidence, begin, max_effects, without, lambda done: report(1 + done, steps))
+    nearest = search.run()
+    report(steps - 1, steps)
+    runs = run_by_run(evidence, nearest.trial, nearest.trial.remainder.level)
+    after = residual_torque(evidence, nearest.trial)
+    judgement = judge(evidence, search, nearest, runs, after.chance)
+    claimed = judgement.verdict in {"named", "partial", "ambiguous"}
+    best = nearest if claimed else search.base
+    before = residual_torque(evidence, search.base.trial) if nearest.trial.chosen else after
+    scores = search.first or search.scores(begin)
+    return Discrepancy(
+        evidence,
+        search.base,
+        best,
+        nearest,
+        judgement,
+        named_effects(evidence, best, judgement) if claimed else (),
+        gap_of(evidence, search.base, best),
+        before,
+        after if claimed else before,
+        standing_out(before),
+        runs,
+        scores,
+        tuple(search.attempts),
+        advice_of(judgement, scores, search.level()),
+    )

@@ -1,0 +1,162 @@
+"""What a diagnosis has to go by: records to fit, records held back, and what their readings are
+worth.
+"""  # noqa: D205 (one sentence)
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.identification.joint import as_fit_run
+from pendmap.identification.reading import Reading, reading_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.identification.runs import FitRun
+    from pendmap.records import Experiment, Run
+
+__all__ = ["Evidence", "evidence_of"]
+
+HELD: Final = ((0.25, 0.35), (0.65, 0.75))
+"""Parts of a run that are held back where no whole run is: a fifth, at large and small swings."""
+
+FEWEST: Final = 20
+"""Samples that a stretch held back has at least; two are needed for its initial state."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Evidence:
+    """Records to fit and records held back.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Where they come from.
+    runs : tuple of Run
+        All that have samples.
+    readings : tuple of Reading
+        What the readings of each are worth.
+    fitted, held : tuple of FitRun
+        What models are fitted to, and what they are tried on.
+    fitted_of, held_of : tuple of int
+        Which of ``runs`` each belongs to.
+    inside : bool
+        Whether stretches within the fitted runs are held back, which the fitted motion passes
+        through; else what is held back has initial states of its own.
+    """
+
+    experiment: Experiment
+    runs: tuple[Run, ...]
+    readings: tuple[Reading, ...]
+    fitted: tuple[FitRun, ...]
+    held: tuple[FitRun, ...]
+    fitted_of: tuple[int, ...]
+    held_of: tuple[int, ...]
+    inside: bool
+
+    @property
+    def forced(self) -> bool:
+        """Whether a run that is fitted has a harmonic drive."""
+        return any(run.drive is not None for run in self.fitted)
+
+    @property
+    def doubt(self) -> float:
+        """Relative standard error of the noise of all fitted runs together.
+
+        Each run's own is independent of the others'; weights go by samples.
+        """
+        doubts = np.array([self.readings[k].doubt for k in self.fitted_of])
+        sizes = np.array([float(run.time.size) for run in self.fitted])
+        return float(np.sqrt(np.sum((sizes * doubts) ** 2)) / np.sum(sizes))
+
+
+def evidence_of(experiment: Experiment) -> Evidence:
+    """Divide an experiment into what is fitted and what is held back.
+
+    Runs marked ``hold_out`` are held back; where there are none, two stretches of each free decay,
+    which the fitted motion passes through without being drawn to them. Where no run is free either,
+    stretches of the forced ones, with initial states of their own: windows there are too short to
+    pass through.
+
+    Raises
+    ------
+    InputError
+        If no run has samples, or all are held back.
+    """
+    runs = tuple(run for run in experiment.runs if not run.peaks_only)
+    if not runs:
+        raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
+    readings = tuple(
+        reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
+    )
+    every = [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)]
+    marked = [k for k, run in enumerate(runs) if run.hold_out]
+    if marked:
+        others = [k for k in range(len(runs)) if k not in marked]
+        if not others:
+            raise InputError(f"{experiment.path}: all runs are held out: allowed is fewer")
+        fitted, held = [every[k] for k in others], [every[k] for k in marked]
+        return Evidence(
+            experiment,
+            runs,
+            readings,
+            tuple(fitted),
+            tuple(held),
+            tuple(others),
+            tuple(marked),
+            inside=False,
+        )
+    return _stretched(experiment, runs, readings, every)
+
+
+def _stretched(
+    experiment: Experiment,
+    runs: tuple[Run, ...],
+    readings: tuple[Reading, ...],
+    every: Sequence[FitRun],
+) -> Evidence:
+    inside = not all(run.forced for run in every)
+    fitted, held, held_of = [], [], []
+    for k, run in enumerate(every):
+        if inside and run.forced:
+            fitted.append(run)
+            continue
+        good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted.copy()
+        # Parts of the samples that count, not of the time at rest after them.
+        counted = np.flatnonzero(good)
+        back = np.zeros(good.shape, bool)
+        for low, high in HELD:
+            a, b = (int(counted[int(part * (counted.size - 1))]) for part in (low, high))
+            if b - a < FEWEST:
+                continue
+            back[a:b] = good[a:b]
+            if not inside:
+                held.append(_part(run, good, a, b))
+                held_of.append(k)
+        fitted.append(dataclasses.replace(run, trusted=good & ~back))
+        if inside and back.any():
+            held.append(dataclasses.replace(run, trusted=back))
+            held_of.append(k)
+    return Evidence(
+        experiment,
+        runs,
+        readings,
+        tuple(fitted),
+        tuple(held),
+        tuple(range(len(runs))),
+        tuple(held_of),
+        inside=inside,
+    )
+
+
+def _part(run: FitRun, good: NDArray[np.bool_], a: int, b: int) -> FitRun:
+    sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)
+    return dataclasses.replace(
+        run, time=run.time[a:b], theta=run.theta[a:b], sigma=sigma[a:b], trusted=good[a:b]
+    )

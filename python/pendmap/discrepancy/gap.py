@@ -1,0 +1,105 @@
+"""How far model and records are apart, before and after."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.select import Found
+    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+
+__all__ = ["Gap", "RunGap", "gap_of"]
+
+
+@dataclasses.dataclass(frozen=True)
+class RunGap:
+    """Residuals of one run, rms in rad."""
+
+    name: str
+    held_out: bool
+    noise_floor: float
+    before: float
+    after: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Gap:
+    """Root mean squares of the residuals, rad.
+
+    Parameters
+    ----------
+    noise_floor : float
+        Of the noise alone, as it is seen without a model.
+    before, after : float
+        Of the baseline and of the model found, on the runs that both were fitted to.
+    held_out_before, held_out_after : float
+        On what was held back from both, with fresh initial states.
+    by_run : tuple of RunGap
+        Each run, or part of one, by itself.
+    """
+
+    noise_floor: float
+    before: float
+    after: float
+    held_out_before: float
+    held_out_after: float
+    by_run: tuple[RunGap, ...]
+
+
+def gap_of(evidence: Evidence, base: Found, best: Found) -> Gap:
+    """Return the gap that a baseline leaves and that a model leaves."""
+    before, held_before = base.trial.fit, base.held.fit
+    after, held_after = best.trial.fit, best.held.fit
+    rows = [
+        *_rows(evidence.fitted, before, after, held_out=False),
+        *_rows(evidence.held, held_before, held_after, held_out=True),
+    ]
+    return Gap(
+        _together(evidence.fitted, [row.noise_floor for row in rows]),
+        _rms(evidence.fitted, before),
+        _rms(evidence.fitted, after),
+        _rms(evidence.held, held_before),
+        _rms(evidence.held, held_after),
+        tuple(rows),
+    )
+
+
+def _rows(
+    runs: Sequence[FitRun], before: TrajectoryFit, after: TrajectoryFit, *, held_out: bool
+) -> list[RunGap]:
+    return [
+        RunGap(
+            run.name,
+            held_out,
+            float(np.sqrt(np.mean(np.square(np.broadcast_to(run.sigma, run.time.shape))))),
+            _rms([run], before, k),
+            _rms([run], after, k),
+        )
+        for k, run in enumerate(runs)
+    ]
+
+
+def _together(runs: Sequence[FitRun], floors: Sequence[float]) -> float:
+    sizes = [run.time.size for run in runs]
+    squares = [size * floor**2 for size, floor in zip(sizes, floors, strict=False)]
+    return math.sqrt(sum(squares) / sum(sizes))
+
+
+def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:
+    squares, count = 0.0, 0
+    for k, run in enumerate(runs, start=first):
+        residual = fit.residuals[k]
+        good = np.isfinite(residual)
+        if run.trusted is not None:
+            good &= run.trusted
+        squares += float(np.sum(residual[good] ** 2))
+        count += int(np.count_nonzero(good))
+    return math.sqrt(squares / count) if count else math.nan

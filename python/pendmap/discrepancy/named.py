@@ -1,0 +1,166 @@
+"""The effects that a diagnosis names: values, intervals, and the model that has them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.discrepancy.candidates import own_name
+from pendmap.identification.model_file import provenance
+from pendmap.model import Effect
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy.candidates import Candidate
+    from pendmap.discrepancy.diagnose import Discrepancy
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.select import Found
+    from pendmap.discrepancy.verdict import Judgement
+    from pendmap.model import Rig
+
+__all__ = ["NamedEffect", "diagnosed_model", "named_effects"]
+
+Z95: Final = 1.959963984540054
+"""The 97.5 % point of the standard normal distribution."""
+
+
+@dataclasses.dataclass(frozen=True)
+class NamedEffect:
+    """An effect that a diagnosis names.
+
+    Parameters
+    ----------
+    name : str
+        As the library calls it.
+    parameters : mapping of str to float
+        In SI.
+    ci95 : mapping of str to (float, float)
+        Intervals of 95 % of what was fitted; a shape that was scanned has none.
+    probability : float
+        That this name is right, among all names.
+    approximate : bool
+        Whether its form is only nearly right.
+    """
+
+    name: str
+    parameters: dict[str, float]
+    ci95: dict[str, tuple[float, float]]
+    probability: float
+    approximate: bool
+
+    @property
+    def effect(self) -> Effect:
+        """As a model has it."""
+        return Effect(self.name, self.parameters, self.ci95, self.probability, self.approximate)
+
+
+def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tuple[NamedEffect, ...]:
+    """Return the effects of the best model.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    best : Found
+        The model.
+    judgement : Judgement
+        Its standing.
+    """
+    del evidence
+    # Standard errors are wider where noise is stronger than stated, or something is left.
+    widening = math.sqrt(max(best.trial.remainder.level, judgement.ratio, 1.0))
+    named = []
+    for standing in judgement.standings:
+        candidate = standing.candidate
+        parameters, errors = _values(best, candidate)
+        ci95 = {
+            name: (parameters[name] - Z95 * widening * e, parameters[name] + Z95 * widening * e)
+            for name, e in errors.items()
+            if math.isfinite(e)
+        }
+        named.append(
+            NamedEffect(
+                candidate.name, parameters, ci95, standing.probability, judgement.approximate
+            )
+        )
+    return tuple(named)
+
+
+def _values(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:
+    estimates = best.trial.fit.estimates
+    own = own_name(candidate.name)
+    if own is not None:
+        return {candidate.size: estimates[own].value}, {candidate.size: estimates[own].stderr or 0}
+    effect = next(e for e in best.trial.fit.model.effects if e.name == candidate.name)
+    errors = {
+        name: estimates[key].stderr or math.inf
+        for name in effect.parameters
+        if (key := f"{effect.name}.{name}") in estimates
+    }
+    values = dict(effect.parameters)
+    if candidate.phase is not None and values[candidate.size] < 0:
+        # A negative size is a positive one half a turn on.
+        values[candidate.size] = -values[candidate.size]
+        values[candidate.phase] += math.pi
+    if candidate.phase is not None:
+        values[candidate.phase] = math.remainder(values[candidate.phase], math.tau)
+    return values, errors
+
+
+def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
+    """Return the model of a diagnosis with the notes of its file.
+
+    Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
+    fitted, ``[provenance]`` the records with their SHA-256, the version, the command and the
+    verdict. A negative damping is set to 0 in the model, which ``[provenance]`` says.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        As of :func:`pendmap.discrepancy.diagnose`.
+    command : str
+        How it was called.
+    """
+    fit = found.best.trial.fit
+    model = fit.model
+    named = {effect.name: effect.effect for effect in found.effects}
+    own = {own_name(name) for name in named} - {None}
+    kept = tuple(e for e in model.effects if e.name not in named)
+    runs = [found.evidence.runs[k] for k in dict.fromkeys(found.evidence.fitted_of)]
+    sha256 = found.evidence.experiment.sha256
+    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
+    notes: dict[str, Any] = {
+        "covariance": {
+            "names": [_called(name, named) for name in fit.names],
+            "matrix": np.where(np.isfinite(fit.covariance), fit.covariance, 0.0).tolist(),
+        },
+        "provenance": provenance(files, command)
+        | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
+    }
+    unphysical = {
+        name: fit[name] for name in ("c_over_m", "Tr") if name in fit.estimates and fit[name] < 0
+    }
+    if unphysical:
+        notes["provenance"]["unphysical"] = unphysical
+    return dataclasses.replace(
+        model,
+        **{name: 0.0 for name in own if name is not None},
+        effects=(*kept, *named.values()),
+        Omega=0.0
+        if model.p == 0 and not any(e.drives for e in (*kept, *named.values()))
+        else (model.Omega or 1.0),
+        notes=notes,
+    )
+
+
+def _called(name: str, named: dict[str, Effect]) -> str:
+    for effect in named.values():
+        if own_name(effect.name) == name:
+            return f"{effect.name}.{next(iter(effect.parameters))}"
+    return name
+
+
+def _held(found: Discrepancy) -> list[str]:
+    return list(dict.fromkeys(run.name for run in found.evidence.held))

@@ -1,0 +1,150 @@
+"""Which other effects would explain the same: computed from these records, never from a list."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy.candidates import Candidate
+    from pendmap.discrepancy.select import Found, Search
+
+__all__ = ["Rival", "Standing", "standing_of"]
+
+ALIKE: Final = 10.0
+"""Twice the difference of log-likelihoods below which two effects are not told apart."""
+
+NEAR: Final = (30.0, 0.3)
+"""A rival is refitted if its score falls short of the winner's gain by less than the first, or than
+this part of it."""
+
+REFITTED: Final = 4
+"""So many rivals are refitted at most."""
+
+CONTAINS: Final = 0.99
+"""An effect with a shape of its own that does the same to within this cosine has the other one as a
+special case: it is no other explanation."""
+
+
+BETTER: Final = 2.7
+"""Unless its shape gains more than this (90 % point of chi-squared): then it may be the truth."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rival:
+    """Another effect in the place of one that was found.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Effect and shape.
+    gain : float
+        By how much the sum of squares falls with it, over the noise's level.
+    behind : float
+        How much less that is than with the effect that was found: twice the difference of
+        log-likelihoods.
+    separation : float
+        ``s = 1 - gain / gain of the effect found``.
+    likeness : float
+        Cosine of the angle between what both do to the readings.
+    refitted : bool
+        Whether the gain is that of a fit; else it is the score's.
+    contains : bool
+        Whether it has the effect found as a special case.
+    """
+
+    candidate: Candidate
+    gain: float
+    behind: float
+    separation: float
+    likeness: float
+    refitted: bool
+    contains: bool
+
+    @property
+    def alike(self) -> bool:
+        """Whether the records do not tell it from the effect that was found."""
+        return self.behind < ALIKE and not self.contains
+
+
+@dataclasses.dataclass(frozen=True)
+class Standing:
+    """An effect that was found, among its rivals.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        The effect.
+    gain : float
+        By how much the sum of squares falls with it, over the noise's level.
+    rivals : tuple of Rival
+        The nearest first.
+    """
+
+    candidate: Candidate
+    gain: float
+    rivals: tuple[Rival, ...]
+
+    @property
+    def equivalent(self) -> list[str]:
+        """The names that these records do not tell apart, its own first."""
+        return [self.candidate.name, *(r.candidate.name for r in self.rivals if r.alike)]
+
+    @property
+    def probability(self) -> float:
+        """The share of its likelihood among all names, with equal odds for each beforehand."""
+        weights = [math.exp(-0.5 * max(r.behind, 0.0)) for r in self.rivals if not r.contains]
+        return 1.0 / (1.0 + sum(weights))
+
+
+def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
+    """Return an effect of the best model among those that might stand in its place.
+
+    Parameters
+    ----------
+    search : Search
+        That found it.
+    best : Found
+        The best model.
+    candidate : Candidate
+        One of its effects.
+    """
+    level = search.level()
+    try:
+        rest = search.less(best.trial, candidate)
+    except InputError:
+        return Standing(candidate, math.inf, ())  # without it there is no motion to speak of
+    gain = (rest.chi2 - best.trial.chi2) / level
+    scores = search.scores(rest)
+    places = scores.best()
+    own = next((k for k in places if scores.scores[k].candidate.name == candidate.name), None)
+    if own is None:
+        return Standing(candidate, gain, ())
+    others = [k for k in places if k != own and scores.scores[k].gain > 0]
+    reach = max(NEAR[0], NEAR[1] * gain)
+    rivals = []
+    for rank, k in enumerate(others):
+        score = scores.scores[k]
+        reached, refitted = score.gain / level, False
+        if rank < REFITTED and gain - reached < reach:
+            found = search.refit(rest, scores, [k])
+            if found is not None:
+                reached, refitted = (rest.chi2 - found.trial.chi2) / level, True
+        likeness = scores.likeness(own, k)
+        more = score.candidate.count > candidate.count
+        rivals.append(
+            Rival(
+                score.candidate,
+                reached,
+                gain - reached,
+                1.0 - reached / gain if gain > 0 else 0.0,
+                likeness,
+                refitted,
+                contains=more and likeness > CONTAINS and reached - gain < BETTER,
+            )
+        )
+    rivals.sort(key=lambda r: r.behind)
+    return Standing(candidate, gain, tuple(rivals))

@@ -1,0 +1,212 @@
+"""Scores of all candidates at a fit, without fitting any: linear algebra on sensitivities.
+
+With the residuals ``r`` and the derivatives ``x`` of the readings by a candidate's size and phase,
+all over the standard errors and with what the fitted parameters and initial states can follow taken
+off, the sum of squares falls by
+
+``G = r' x (x' x)^-1 x' r``
+
+when the candidate is fitted (Rao's score test). The same matrix says how alike candidates are,
+which pairs belong together, and how weak an effect the records could show.
+
+References
+----------
+Rao (1948), Proceedings of the Cambridge Philosophical Society 44, 50.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.discrepancy.candidates import place
+from pendmap.identification.sensitivity import sensitivities
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.discrepancy.candidates import Candidate
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.trial import Trial
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Score", "Scores", "scores_of"]
+
+UNSEEN: Final = 1e-4
+"""A candidate of which the fitted parameters follow all but this part (of the root of its
+information) does nothing of its own: rounding and the integrator's error are not far below."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """A candidate's score.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Effect and shape.
+    gain : float
+        ``G``: by which the sum of squares is expected to fall.
+    start : mapping of str to float
+        Size and phase where it is expected to be least, SI.
+    information : float
+        ``x' x`` of the size: a size ``a`` gains ``a^2`` times this; of an effect with a phase at
+        the phase where it is least. 0 where the records do not show the effect at all.
+    """
+
+    candidate: Candidate
+    gain: float
+    start: dict[str, float]
+    information: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Scores:
+    """Scores of all candidates in all shapes at one fit.
+
+    Parameters
+    ----------
+    scores : tuple of Score
+        One for each candidate and shape.
+    columns : tuple of list of int
+        The columns of each in what follows.
+    gram : ndarray of float, shape (k, k)
+        Products of what the candidates do to the readings, each of unit length; a row of zeros for
+        what the records do not show.
+    pull : ndarray of float, shape (k,)
+        Its products with the residuals.
+    """
+
+    scores: tuple[Score, ...]
+    columns: tuple[list[int], ...]
+    gram: Floats
+    pull: Floats
+
+    def best(self) -> list[int]:
+        """Return the places of each effect's best shape, the greatest gain first."""
+        chosen: dict[str, int] = {}
+        for k, score in enumerate(self.scores):
+            name = score.candidate.name
+            if name not in chosen or score.gain > self.scores[chosen[name]].gain:
+                chosen[name] = k
+        return sorted(chosen.values(), key=lambda k: -self.scores[k].gain)
+
+    def together(self, places: Sequence[int]) -> float:
+        """Return the gain expected of several candidates at once."""
+        own = [c for k in places for c in self.columns[k]]
+        return _gain(self.gram[np.ix_(own, own)], self.pull[own])
+
+    def likeness(self, one: int, other: int) -> float:
+        """Return the cosine of the angle between what two candidates do to the readings.
+
+        The largest canonical correlation: 1 where the one can do all that the other does.
+        """
+        a, b = self.columns[one], self.columns[other]
+        left = _root_inverse(self.gram[np.ix_(a, a)])
+        right = _root_inverse(self.gram[np.ix_(b, b)])
+        return float(np.linalg.norm(left @ self.gram[np.ix_(a, b)] @ right, 2))
+
+    def pairs(self, places: Sequence[int]) -> list[tuple[float, int, int]]:
+        """Return the joint gains of all pairs among some candidates, the greatest first."""
+        found = [(self.together([a, b]), a, b) for a, b in itertools.combinations(places, 2)]
+        return sorted(found, reverse=True)
+
+
+def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]) -> Scores:
+    """Return the scores of candidates at a fit.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    trial : Trial
+        The fit.
+    pool : sequence of sequence of Candidate
+        By effect, each in its shapes; shapes of different effects are derived together.
+    """
+    every: list[Candidate] = []
+    parts: list[Floats] = []
+    base, residual = np.zeros((0, 0)), np.zeros(0)
+    for batch in itertools.zip_longest(*pool):
+        present = [candidate for candidate in batch if candidate is not None]
+        model = trial.fit.model
+        for candidate in present:
+            model = place(model, candidate)
+        names = [name for candidate in present for name in candidate.free]
+        found = sensitivities(trial.fit, evidence.fitted, names, model)
+        if not every:
+            old = [k for k, name in enumerate(found.names) if name in trial.fit.estimates]
+            base, residual = _orthonormal(found.columns[:, old]), found.residual
+        every += present
+        parts.append(found.columns[:, [found.names.index(name) for name in names]])
+    if not every:
+        return Scores((), (), np.zeros((0, 0)), np.zeros(0))
+    residual = residual - base @ (base.T @ residual)
+    columns = np.hstack(parts)
+    sizes = np.linalg.norm(columns, axis=0)
+    columns /= np.where(sizes > 0, sizes, 1.0)
+    # Twice is enough: what rounding left of the base the first time is gone.
+    for _ in range(2):
+        columns -= base @ (base.T @ columns)
+    gram, pull = columns.T @ columns, columns.T @ residual
+    unseen = np.sqrt(np.diag(gram)) < UNSEEN
+    gram[unseen], gram[:, unseen], pull[unseen] = 0.0, 0.0, 0.0
+    lengths = np.where(unseen, 1.0, np.sqrt(np.diag(gram)))
+    gram, pull, sizes = gram / np.outer(lengths, lengths), pull / lengths, sizes * lengths
+    scores, where, first = [], [], 0
+    for candidate in every:
+        own = list(range(first, first + len(candidate.free)))
+        first += len(own)
+        where.append(own)
+        units = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
+        scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], units))
+    return Scores(tuple(scores), tuple(where), gram, pull)
+
+
+def _scored(candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, faint: float) -> Score:
+    """Score a candidate; ``faint`` is the size at which one with a phase is derived."""
+    if not gram.any():
+        return Score(candidate, 0.0, {}, 0.0)
+    step = np.where(sizes > 0, _inverse(gram) @ pull / np.where(sizes > 0, sizes, 1.0), 0.0)
+    start = {candidate.free[0]: float(step[0])}
+    scale = sizes.copy()
+    if candidate.phase is not None:
+        # The derivative by the phase is the size times that of the same effect a quarter on.
+        quadrature = float(step[1]) * faint
+        start = {
+            candidate.free[0]: math.hypot(step[0], quadrature),
+            candidate.free[1]: math.atan2(quadrature, step[0]),
+        }
+        scale[1] /= faint
+    information = float(np.linalg.eigvalsh(gram * np.outer(scale, scale))[0])
+    return Score(candidate, _gain(gram, pull), start, max(information, 0.0))
+
+
+def _gain(gram: Floats, pull: Floats) -> float:
+    return float(pull @ _inverse(gram) @ pull)
+
+
+def _inverse(gram: Floats) -> Floats:
+    return np.asarray(np.linalg.pinv(gram, rcond=UNSEEN**2, hermitian=True), np.float64)
+
+
+def _root_inverse(gram: Floats) -> Floats:
+    values, vectors = np.linalg.eigh(gram)
+    sound = values > UNSEEN**2 * max(float(values[-1]), 1e-300)
+    return np.asarray(vectors[:, sound] / np.sqrt(values[sound]) @ vectors[:, sound].T, np.float64)
+
+
+def _orthonormal(columns: Floats) -> Floats:
+    sizes = np.linalg.norm(columns, axis=0)
+    kept = columns[:, sizes > 0]
+    if not kept.size:
+        return np.zeros((len(columns), 0))
+    u, s, _ = np.linalg.svd(kept / sizes[sizes > 0], full_matrices=False)
+    return np.asarray(u[:, s > 1e-7 * s[0]], np.float64)  # a direction that is none

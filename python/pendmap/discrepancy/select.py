@@ -1,0 +1,418 @@
+"""Which effects are missing: candidates refitted, accepted, dropped and exchanged."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.discrepancy.baseline import taken_by
+from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.discrepancy.scores import Scores, scores_of
+from pendmap.discrepancy.trial import Held, Trial, fitted, tried, with_candidates
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Sequence
+
+    from pendmap.discrepancy.evidence import Evidence
+
+__all__ = ["GATE", "Attempt", "Found", "Search"]
+
+GATE: Final = 12.0
+"""The least score of a candidate that is refitted: of all candidates together none passes 8.5
+where nothing is missing."""
+
+GAIN: Final = 12.0
+"""The least fall of the BIC for which an effect is accepted."""
+
+REFITTED: Final = 4
+"""So many candidates are refitted, those with the greatest scores."""
+
+WORTH: Final = 0.4
+"""The part of the greatest score that a candidate's must have to be refitted beside it."""
+
+LOSS: Final = 4.0
+"""By so much a model may be worse on what was held back and still be accepted: two standard
+errors of what a parameter that is right, but not exact, does there."""
+
+PAIRED: Final = 8
+"""Pairs are looked for among so many candidates."""
+
+FIRST_BEND: Final = 1.1
+"""Ratio of neighbouring shapes that are tried about the best one of the scan; then its root."""
+
+BENDS: Final = 3
+"""How often."""
+
+BENT: Final = 2
+"""Of how many refitted candidates."""
+
+STARTS: Final = 3
+"""From so many shapes a candidate is fitted whose shape is adapted."""
+
+KICK: Final = 0.1
+"""Part of the score's step from which a candidate is fitted a second time."""
+
+SHORT: Final = 0.8
+"""A first fit that gains less than this part of what the score promised is tried again."""
+
+ZERO: Final = "encoder_offset"
+"""Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
+
+
+Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Attempt:
+    """A candidate that was refitted.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The effects.
+    shape : dict of str to float
+        Of the first, without dimensions.
+    score : float
+        What was expected of it.
+    gain : float
+        By how much the BIC fell.
+    held_gain : float
+        The same of the sum of squares on what was held back.
+    accepted : bool
+        Whether it is in the model from there on.
+    stage : int
+        How many effects the model had before.
+    """
+
+    names: tuple[str, ...]
+    shape: dict[str, float]
+    score: float
+    gain: float
+    held_gain: float
+    accepted: bool
+    stage: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """A trial and how it does on what was held back."""
+
+    trial: Trial
+    held: Held
+
+
+class Search:
+    """The search for the effects that a model lacks.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    base : Trial
+        The model to begin with.
+    most : int
+        How many effects are added at most; the sensor's zero does not count.
+    without : collection of str
+        Effects that are no candidates.
+    progress : callable
+        Called with the number of effects found so far.
+    """
+
+    def __init__(
+        self,
+        evidence: Evidence,
+        base: Trial,
+        most: int,
+        without: Collection[str],
+        progress: Callable[[int], None],
+    ) -> None:
+        self.evidence = evidence
+        self.most = most
+        self.without = without
+        self.progress = progress
+        self.base = Found(base, tried(evidence, base))
+        self.attempts: list[Attempt] = []
+        self.first: Scores | None = None
+        # What was computed once is not again: rivals are often candidates that were tried.
+        self._scores: dict[Key, Scores] = {}
+        self._trials: dict[tuple[Key, Key], Found | None] = {}
+        self._rests: dict[Key, Trial] = {key_of(base.chosen): base}
+
+    def _begin_again(self, base: Trial) -> None:
+        """Forget everything but a better baseline."""
+        self.base = Found(base, tried(self.evidence, base))
+        self.attempts, self.first = [], None
+        self._scores, self._trials = {}, {}
+        self._rests = {key_of(base.chosen): base}
+
+    def run(self) -> Found:
+        """Return the best model."""
+        best = self.base
+        while self._room(best.trial) > 0:
+            following = self._following(best)
+            if following is None:
+                break
+            if not best.trial.chosen:
+                better = self._better_base(following.trial)
+                if better is not None:
+                    self._begin_again(better)
+                    best = self.base
+                    continue
+            best = following
+            self._rests[key_of(best.trial.chosen)] = best.trial
+            self.progress(len(best.trial.chosen))
+        return self._without_idle(best) if len(best.trial.chosen) > 1 else best
+
+    def _better_base(self, found: Trial) -> Trial | None:
+        """Return the baseline from where a further effect has led, if it is better there.
+
+        A search may end in the wrong valley, out of which an effect leads that has nothing to do
+        with the pendulum.
+        """
+        rest = found
+        try:
+            for candidate in found.chosen:
+                chosen = tuple(c for c in rest.chosen if c.name != candidate.name)
+                rest = self._less(rest, candidate, chosen)
+        except InputError:
+            return None
+        return rest if rest.chi2 < self.base.trial.chi2 - GATE * self.level() else None
+
+    def pool(self, trial: Trial) -> list[list[Candidate]]:
+        """Return the candidates that a trial's model does not have yet."""
+        return candidates(taken_by(trial), driven=self.evidence.forced, without=self.without)
+
+    def scores(self, trial: Trial) -> Scores:
+        """Return the scores of all candidates at a trial."""
+        key = key_of(trial.chosen)
+        if key not in self._scores:
+            self._scores[key] = scores_of(self.evidence, trial, self.pool(trial))
+        return self._scores[key]
+
+    def level(self) -> float:
+        """Return by what sums of squares are divided: the noise as the baseline leaves it."""
+        return max(self.base.trial.remainder.level, 0.5)
+
+    def _room(self, trial: Trial) -> int:
+        return self.most - len([name for name in trial.names if name != ZERO])
+
+    def _following(self, current: Found) -> Found | None:
+        """Return the model with the best further effect, or pair of them, that is accepted."""
+        scores = self.scores(current.trial)
+        if self.first is None:
+            self.first = scores
+        level = self.level()
+        ranked = scores.best()
+        least = GATE * level
+        if ranked:
+            least = max(least, WORTH * scores.scores[ranked[0]].gain)
+        wanted = [[k] for k in ranked[:REFITTED] if scores.scores[k].gain >= least]
+        if self._room(current.trial) > 1:
+            wanted += self._promising_pairs(scores, ranked, level)
+        refitted = []
+        for places in wanted:
+            found = self.refit(current.trial, scores, places)
+            if found is not None:
+                refitted.append((found, places))
+        refitted.sort(key=lambda pair: pair[0].trial.bic(level))
+        # A shape that was only scanned may lose to another effect for that reason.
+        refitted[:BENT] = [(self._bent(current.trial, f), places) for f, places in refitted[:BENT]]
+        refitted.sort(key=lambda pair: pair[0].trial.bic(level))
+        accepted = None
+        for found, places in refitted:
+            good = accepted is None and self.accepts(current, found)
+            accepted = found if good else accepted
+            self._note(current, found, scores, places, good=good)
+        return accepted
+
+    def _promising_pairs(
+        self, scores: Scores, ranked: Sequence[int], level: float
+    ) -> list[list[int]]:
+        """Return the best pair, if it promises more than its members one after the other."""
+        pairs = scores.pairs([k for k in ranked[:PAIRED] if scores.scores[k].gain > 0])
+        if not pairs:
+            return []
+        gain, a, b = pairs[0]
+        alone = max(scores.scores[a].gain, scores.scores[b].gain, scores.scores[ranked[0]].gain)
+        return [[a, b]] if gain - alone > 2 * GATE * level else []
+
+    def refit(self, trial: Trial, scores: Scores, places: Sequence[int]) -> Found | None:
+        """Fit candidates from the score's whole step, and from a part of it if that fails."""
+        added = [scores.scores[k].candidate for k in places]
+        key = (key_of(trial.chosen), key_of(added))
+        if key not in self._trials:
+            self._trials[key] = self._refitted(trial, scores, places, added)
+        return self._trials[key]
+
+    def _refitted(
+        self,
+        trial: Trial,
+        scores: Scores,
+        places: Sequence[int],
+        added: Sequence[Candidate],
+    ) -> Found | None:
+        start = {n: v for k in places for n, v in scores.scores[k].start.items()}
+        found = self._fit(trial, added, start)
+        if len(added) == 1 and added[0].adapted:
+            for k in self._other_shapes(scores, places[0]):
+                bent = scores.scores[k]
+                again = self._fit(trial, [bent.candidate], bent.start)
+                found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
+        promised = scores.together(places)
+        if found is None or trial.chi2 - found.chi2 < SHORT * promised:
+            sizes = {candidate.free[0] for candidate in added}
+            kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
+            other = self._fit(trial, added, kick)
+            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+        if found is None:
+            return None
+        try:
+            return Found(found, tried(self.evidence, found))
+        except InputError:
+            return None  # what was held back leads out of the range of numbers
+
+    def _other_shapes(self, scores: Scores, place: int) -> list[int]:
+        """Return the next best shapes of a candidate: the score at size 0 is not all there is."""
+        one = scores.scores[place]
+        shapes = [
+            k
+            for k, s in enumerate(scores.scores)
+            if s.candidate.name == one.candidate.name and k != place and s.gain > WORTH * one.gain
+        ]
+        return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: STARTS - 1]
+
+    def _bent(self, trial: Trial, found: Found) -> Found:
+        """Return a fit whose last effect has its scanned shape brought to its best by parabolas."""
+        candidate = found.trial.chosen[-1]
+        scanned = [n for n in candidate.shape if f"{candidate.name}.{n}" not in candidate.adapted]
+        if not scanned or candidate.counts_turns or len(found.trial.chosen) > len(trial.chosen) + 1:
+            return found
+        name = scanned[0]
+        fits = {candidate.shape[name]: found.trial}
+
+        def fit_at(value: float) -> None:
+            nearest = fits[min(fits, key=lambda x: abs(math.log(x / value)))]
+            bent = dataclasses.replace(candidate, shape={**candidate.shape, name: value})
+            again = self._fit(trial, [bent], nearest.start)
+            if again is not None:
+                fits[value] = again
+
+        width = FIRST_BEND
+        for _ in range(BENDS):
+            best = min(fits, key=lambda x: fits[x].chi2)
+            for other in (best / width, best * width):
+                fit_at(other)
+            vertex = _vertex(fits)
+            if vertex is not None:
+                fit_at(vertex)
+            width = math.sqrt(width)
+        best_trial = min(fits.values(), key=_chi2)
+        try:
+            return Found(best_trial, tried(self.evidence, best_trial))
+        except InputError:
+            return found
+
+    def _fit(
+        self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]
+    ) -> Trial | None:
+        try:
+            return with_candidates(self.evidence, trial, added, start)
+        except InputError:
+            return None  # the start leads out of the range of numbers
+
+    def accepts(self, current: Found, found: Found) -> bool:
+        """Whether a model is better than one with fewer effects, by more than chance."""
+        level = self.level()
+        fall = current.trial.bic(level) - found.trial.bic(level)
+        held = (current.held.chi2 - found.held.chi2) / level
+        return fall >= GAIN and held >= -LOSS
+
+    def _note(
+        self, current: Found, found: Found, scores: Scores, places: Sequence[int], *, good: bool
+    ) -> None:
+        level = self.level()
+        added = [scores.scores[k].candidate for k in places]
+        self.attempts.append(
+            Attempt(
+                tuple(candidate.name for candidate in added),
+                dict(found.trial.chosen[-len(added)].shape),
+                scores.together(places) / level,
+                current.trial.bic(level) - found.trial.bic(level),
+                (current.held.chi2 - found.held.chi2) / level,
+                good,
+                len(current.trial.chosen),
+            )
+        )
+
+    def less(self, trial: Trial, dropped: Candidate) -> Trial:
+        """Fit a trial's model without one of the effects that were added."""
+        chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+        key = key_of(chosen)
+        if key not in self._rests:
+            self._rests[key] = self._less(trial, dropped, chosen)
+        return self._rests[key]
+
+    def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
+        gone = {*dropped.free, *dropped.adapted}
+        free = [name for name in trial.free if name not in gone]
+        model = trial.fit.model
+        effects = tuple(e for e in model.effects if e.name != dropped.name)
+        own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
+        model = dataclasses.replace(model, effects=effects, **own)
+        start = {name: value for name, value in trial.start.items() if name not in gone}
+        try:
+            return fitted(
+                self.evidence, model, free, chosen, start=start, windows=trial.fit.windows
+            )
+        except InputError:
+            # Without it the motion is lost from here: from short windows on, as the baseline began.
+            begin = start | {n: v for n, v in self.base.trial.start.items() if n in free}
+            return fitted(self.evidence, model, free, chosen, start=begin)
+
+    def _without_idle(self, best: Found) -> Found:
+        """Drop effects that a later one made idle, and exchange those that another one beats."""
+        level = self.level()
+        for candidate in best.trial.chosen:
+            try:
+                rest = self.less(best.trial, candidate)
+            except InputError:
+                continue  # without it there is no motion to speak of: it is not idle
+            if rest.bic(level) - best.trial.bic(level) < GAIN:
+                shorter = Found(rest, tried(self.evidence, rest))
+                return self._without_idle(shorter) if len(rest.chosen) > 1 else shorter
+            scores = self.scores(rest)
+            ranked = [k for k in scores.best() if scores.scores[k].candidate.name != candidate.name]
+            rest_gain = rest.chi2 - best.trial.chi2
+            for k in ranked[:2]:
+                if scores.scores[k].gain < rest_gain:
+                    break
+                other = self.refit(rest, scores, [k])
+                if other is not None and other.trial.bic(level) < best.trial.bic(level) - 1:
+                    self._note(Found(rest, best.held), other, scores, [k], good=True)
+                    return self._without_idle(other)
+        return best
+
+
+def _vertex(fits: dict[float, Trial]) -> float | None:
+    """Return where the parabola through the best fit and its neighbours is least."""
+    places = sorted(fits)
+    k = places.index(min(fits, key=lambda x: fits[x].chi2))
+    if not 0 < k < len(places) - 1:
+        return None
+    x = np.log(places[k - 1 : k + 2])
+    y = np.array([fits[p].chi2 for p in places[k - 1 : k + 2]])
+    a, b, _ = np.polyfit(x - x[1], y, 2)
+    return float(math.exp(x[1] - b / (2 * a))) if a > 0 else None
+
+
+def key_of(chosen: Sequence[Candidate]) -> Key:
+    """Return what a set of candidates is known by."""
+    return frozenset((c.name, tuple(sorted(c.shape.items()))) for c in chosen)
+
+
+def _chi2(trial: Trial) -> float:
+    return trial.chi2

@@ -1,0 +1,173 @@
+"""What a diagnosis found, as JSON and as text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pendmap.discrepancy.diagnose import Discrepancy
+
+__all__ = ["as_json", "as_text", "ranking_table"]
+
+SAID: Final = {
+    "none": "none: the baseline describes the records to within their noise",
+    "named": "named: the effects below explain what the baseline lacks",
+    "partial": "partial: the effects below close most of the gap, and something is left",
+    "ambiguous": "ambiguous: these records do not tell the effects of a class apart",
+    "unknown": "unknown: something is missing that no effect of the library explains",
+}
+
+RANKED: Final = 8
+"""Candidates that the table of scores shows."""
+
+
+def as_json(found: Discrepancy) -> dict[str, Any]:
+    """Return the JSON object of ``pendmap diagnose``, without the paths of files."""
+    gap, judgement = found.gap, found.judgement
+    fit, base = found.best.trial.fit, found.base.trial.fit
+    return {
+        "experiment": str(found.evidence.experiment.path),
+        "verdict": found.verdict,
+        "effects": [
+            {
+                "name": effect.name,
+                "parameters": effect.parameters,
+                "ci95": {name: list(bounds) for name, bounds in effect.ci95.items()},
+                "probability": effect.probability,
+                "approximate": effect.approximate,
+            }
+            for effect in found.effects
+        ],
+        "equivalent": found.equivalent,
+        "gap": {
+            "noise_floor": gap.noise_floor,
+            "before": gap.before,
+            "after": gap.after,
+            "held_out_before": gap.held_out_before,
+            "held_out_after": gap.held_out_after,
+            "closed": judgement.closed,
+            "runs": [
+                {
+                    "name": run.name,
+                    "held_out": run.held_out,
+                    "noise_floor": run.noise_floor,
+                    "before": run.before,
+                    "after": run.after,
+                }
+                for run in gap.by_run
+            ],
+        },
+        "where": found.where,
+        "next_experiment": found.advice.next_experiment,
+        "detection_limits": found.advice.limits,
+        "nearest": list(found.nearest.trial.names),
+        "left": {
+            "z": judgement.left,
+            "uneven": judgement.uneven,
+            "spread": judgement.spread,
+            "torque_by_chance": judgement.chance,
+            "chi2_per_degree": judgement.ratio,
+            "allowed": judgement.ratio_allowed,
+        },
+        "baseline": {name: e.value for name, e in base.estimates.items()},
+        "parameters": {
+            name: {"value": e.value, "stderr": e.stderr} for name, e in fit.estimates.items()
+        },
+        "runs": {
+            name: [{"value": value, "stderr": error} for value, error in pairs]
+            for name, pairs in found.runs.coefficients.items()
+        },
+        "ranking": _ranking(found),
+        "attempts": [
+            {
+                "effects": list(a.names),
+                "shape": a.shape,
+                "score": a.score,
+                "bic_gain": a.gain,
+                "held_out_gain": a.held_gain,
+                "accepted": a.accepted,
+                "stage": a.stage,
+            }
+            for a in found.attempts
+        ],
+        "findings": [
+            finding.text
+            for finding in (
+                *found.evidence.experiment.findings,
+                *(finding for run in found.evidence.runs for finding in run.findings),
+            )
+        ],
+    }
+
+
+def _ranking(found: Discrepancy) -> list[dict[str, Any]]:
+    level = found.base.trial.remainder.level
+    rows = []
+    for k in found.scores.best():
+        score = found.scores.scores[k]
+        rows.append(
+            {
+                "name": score.candidate.name,
+                "shape": dict(score.candidate.shape),
+                "score": score.gain / level,
+                "size": next(iter(score.start.values()), None),
+            }
+        )
+    return rows
+
+
+def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
+    """Return heads and rows of the table of candidates at the baseline."""
+    refitted = {a.names[0]: a for a in found.attempts if a.stage == 0 and len(a.names) == 1}
+    rows = []
+    for row in _ranking(found)[:RANKED]:
+        tried = refitted.get(row["name"])
+        shape = ", ".join(f"{name} = {value:.3g}" for name, value in row["shape"].items())
+        rows.append(
+            [
+                row["name"],
+                shape,
+                f"{row['score']:.1f}",
+                "" if tried is None else f"{tried.gain:.1f}",
+                "" if tried is None else f"{tried.held_gain:.1f}",
+            ]
+        )
+    return ["candidate", "shape", "score G", "fall of BIC", "gain held out"], rows
+
+
+def as_text(found: Discrepancy) -> Iterator[str]:
+    """Yield the lines of a summary, the verdict first."""
+    gap, judgement = found.gap, found.judgement
+    yield f"Verdict: {SAID[found.verdict]}"
+    for effect in found.effects:
+        values = ", ".join(
+            f"{name} = {value:.4g}"
+            + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
+            for name, value in effect.parameters.items()
+        )
+        nearly = ", its form only nearly right" if effect.approximate else ""
+        yield f"  {effect.name}: {values}; probability {effect.probability:.3f}{nearly}"
+    for names in found.equivalent:
+        yield f"  not told apart here: {', '.join(names)}"
+    if found.verdict == "unknown" and found.nearest.trial.names:
+        yield f"  nearest, and not claimed: {', '.join(found.nearest.trial.names)}"
+    yield (
+        f"Residual, rms: {gap.before:.4g} rad before, {gap.after:.4g} after, noise "
+        f"{gap.noise_floor:.4g}; held out {gap.held_out_before:.4g} before, "
+        f"{gap.held_out_after:.4g} after"
+    )
+    if judgement.standings:
+        yield f"Share of the held-out gap closed by what is nearest: {judgement.closed:.0%}"
+    for name in ("c_over_m", "Tr"):
+        estimates = found.best.trial.fit.estimates
+        if name in estimates and estimates[name].value < 0:
+            yield f"{name} is {estimates[name].value:.3g}, which no pendulum has"
+    for row in found.where[:3]:
+        what = "torque along the motion" if row["along_motion"] else "torque"
+        yield (
+            f"Where: {what} of {row['torque']:.3g} rad/s^2 lacks at {row['over']} "
+            f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
+        )
+    yield f"Next: {found.advice.next_experiment}"

@@ -1,0 +1,201 @@
+"""A model fitted to the evidence, and tried on what was held back."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+from pendmap.discrepancy.candidates import place
+from pendmap.discrepancy.noise import Remainder, remainder_of
+from pendmap.identification.fitting import TrajectoryFit, fit_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from pendmap.discrepancy.candidates import Candidate
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.model import Rig
+
+__all__ = ["Held", "Trial", "fitted", "tried", "with_candidates"]
+
+Windows = tuple[tuple[int, int, int, float, float], ...]
+
+ASTRAY: Final = 4.0
+"""Above this sum of squares for each degree of freedom a fit may have slipped: windows that begin
+short again may find a better one."""
+
+
+MOST_STEPS: Final = 40
+"""Steps of a fit at most."""
+
+FEW_STEPS: Final = 12
+"""Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Held:
+    """A model on the records held back, its parameters as they were fitted to the others.
+
+    Parameters
+    ----------
+    chi2 : float
+        Sum of squared residuals over standard errors, initial states adapted.
+    degrees : int
+        Samples less what was adapted.
+    fit : TrajectoryFit
+        Curves and residuals.
+    """
+
+    chi2: float
+    degrees: int
+    fit: TrajectoryFit
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """A model fitted to the evidence.
+
+    Parameters
+    ----------
+    fit : TrajectoryFit
+        To the runs that are not held back.
+    free : tuple of str
+        What was fitted, as in :func:`pendmap.identification.fitting.fit_runs`.
+    chosen : tuple of Candidate
+        The effects that were added to the baseline.
+    remainder : Remainder
+        What it leaves.
+    """
+
+    fit: TrajectoryFit
+    free: tuple[str, ...]
+    chosen: tuple[Candidate, ...]
+    remainder: Remainder
+
+    @property
+    def chi2(self) -> float:
+        """The sum of squared residuals over standard errors."""
+        return self.fit.chi2
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects that were added."""
+        return tuple(candidate.name for candidate in self.chosen)
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Where another fit may begin: damping may be negative there, as in no model."""
+        return {name: estimate.value for name, estimate in self.fit.estimates.items()}
+
+    def bic(self, level: float) -> float:
+        """The sum of squares with Schwarz's penalty for each number that was adapted.
+
+        Parameters
+        ----------
+        level : float
+            By which sums of squares are divided, so that noise that is coloured or stronger than
+            stated counts as noise.
+        """
+        count = len(self.fit.names) + sum(
+            c.count - len(c.free) - len(c.adapted) for c in self.chosen
+        )
+        return self.chi2 / level + count * math.log(max(self.fit.samples / level, 2.0))
+
+
+def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
+    evidence: Evidence,
+    model: Rig,
+    free: Sequence[str],
+    chosen: Sequence[Candidate] = (),
+    *,
+    start: Mapping[str, float] | None = None,
+    windows: Windows | None = None,
+    steps: int = MOST_STEPS,
+) -> Trial:
+    """Fit a model to the evidence.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    model : Rig
+        With its effects, where the search begins.
+    free : sequence of str
+        What is fitted.
+    chosen : sequence of Candidate
+        The effects of the model that were added to the baseline.
+    start, windows, steps
+        As of :func:`pendmap.identification.fitting.fit_runs`.
+    """
+    fit = fit_runs(
+        evidence.fitted, model, free, start=start, windows=windows, profiled=(), steps=steps
+    )
+    adapted = len(fit.names)
+    remainder = remainder_of(fit, evidence.fitted, adapted)
+    return Trial(fit, tuple(free), tuple(chosen), remainder)
+
+
+def with_candidates(
+    evidence: Evidence,
+    trial: Trial,
+    added: Sequence[Candidate],
+    start: Mapping[str, float],
+) -> Trial:
+    """Fit a trial's model with further effects, from the trial's parameters and windows on.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    trial : Trial
+        Where the search begins.
+    added : sequence of Candidate
+        The effects.
+    start : mapping of str to float
+        Sizes and phases to begin with.
+    """
+    model = trial.fit.model
+    free = list(trial.free)
+    for candidate in added:
+        model = place(model, candidate)
+        free += [*candidate.free, *candidate.adapted]
+    begin = trial.start | dict(start)
+    chosen = (*trial.chosen, *added)
+    found = fitted(
+        evidence, model, free, chosen, start=begin, windows=trial.fit.windows, steps=FEW_STEPS
+    )
+    if trial.chi2 > ASTRAY * max(trial.fit.degrees, 1):
+        again = fitted(evidence, found.fit.model, free, chosen, start=found.start)
+        return min((found, again), key=lambda t: t.chi2)
+    return found
+
+
+def tried(evidence: Evidence, trial: Trial) -> Held:
+    """Try a model on what was held back.
+
+    Whole runs have fresh initial states; stretches within a fitted run are passed through by the
+    motion that was fitted to the rest of it.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    trial : Trial
+        The model.
+    """
+    model, free = trial.fit.model, trial.free
+    if not evidence.inside:
+        known = {name: value for name, value in trial.start.items() if "[" not in name}
+        fit = fit_runs(evidence.held, model, free, start=known, profiled=(), hold=True)
+        adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
+        return Held(fit.chi2, max(fit.samples - adapted, 1), fit)
+    places = {of: k for k, of in enumerate(evidence.held_of)}
+    windows = tuple((places[w[0]], *w[1:]) for w in trial.fit.windows if w[0] in places)
+    known = {name: value for name, value in trial.start.items() if "[" not in name}
+    own = [name for name in free if name in known]
+    # No step: neither parameters nor states are adapted.
+    fit = fit_runs(
+        evidence.held, model, own, start=known, windows=windows, profiled=(), hold=True, steps=0
+    )
+    return Held(fit.chi2, max(fit.samples, 1), fit)

@@ -1,0 +1,140 @@
+"""The five verdicts, and what they rest on."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from pendmap.discrepancy.rivals import Standing, standing_of
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.runs import RunByRun
+    from pendmap.discrepancy.select import Found, Search
+
+__all__ = ["Judgement", "judge"]
+
+Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
+
+LEFT: Final = 5.0
+"""Standard errors of the slow part of the residuals above which something is left."""
+
+SPREAD: Final = 0.5
+"""How much an effect's size may differ from run to run, over its size, beyond what noise makes:
+more is no effect that is alike in every run."""
+
+CLOSED: Final = 0.75
+"""Share of the gap on held-out data that effects must close to be named beside what is left."""
+
+CHANCE: Final = 1e-5
+"""Chance of a residual torque below which something is left."""
+
+SEVERAL: Final = 1.0
+"""Standard errors by which the greatest of several runs counts as less than all together."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Judgement:
+    """What a search amounts to.
+
+    Parameters
+    ----------
+    verdict : str
+        ``none``: the baseline describes the records; ``named``: effects explain all; ``ambiguous``:
+        a class of effects does, which these records do not tell apart; ``partial``: effects close
+        most of the gap and something is left; ``unknown``: something is missing that no candidate
+        explains.
+    standings : tuple of Standing
+        The effects that were found, among their rivals.
+    left : float
+        The slow part of what is left, over its standard error.
+    ratio, ratio_allowed : float
+        Sum of squares over degrees of freedom, and up to where chance and the doubt about the noise
+        allow it: ``1 + 4 sqrt(2 / N + 4 r^2)``.
+    closed : float
+        Share of the gap that the effects close on held-out data.
+    uneven : float
+        How differently the runs would have the parameters, over the standard error of that
+        (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
+    spread : float
+        How much the effects' sizes differ from run to run beyond noise, over their size: the
+        greatest of all.
+    chance : float
+        That noise alone would show such a torque over angle, velocity, amplitude, drive phase or
+        time as is left.
+    """
+
+    verdict: Verdict
+    standings: tuple[Standing, ...]
+    left: float
+    ratio: float
+    ratio_allowed: float
+    closed: float
+    uneven: float
+    spread: float
+    chance: float
+
+    @property
+    def approximate(self) -> bool:
+        """Whether the form of what was found is only nearly right."""
+        return self.verdict == "partial"
+
+
+def judge(
+    evidence: Evidence, search: Search, best: Found, runs: RunByRun, chance: float
+) -> Judgement:
+    """Return the verdict on a search.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    search : Search
+        After it ran.
+    best : Found
+        What it found.
+    runs : RunByRun
+        Its parameters run by run.
+    chance : float
+        That noise alone would show such a torque over angle, velocity, ... as is left.
+    """
+    uneven = runs.uneven
+    trial = best.trial
+    degrees = max(trial.fit.degrees, 1)
+    # The doubt about the noise as it is seen without a model, run by run.
+    allowed = 1 + 4 * math.sqrt(2 / degrees + 4 * evidence.doubt**2)
+    ratio = trial.chi2 / degrees
+    # The greatest of several runs is greater by chance.
+    left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
+    rest = left > LEFT or uneven > LEFT or chance < CHANCE
+    closed = _closed(search, best)
+    spread = max((runs.spread(c.free[0]) for c in trial.chosen), default=0.0)
+    standings = tuple(standing_of(search, best, candidate) for candidate in trial.chosen)
+    verdict: Verdict
+    if not trial.chosen:
+        verdict = "unknown" if rest else "none"
+    elif rest:
+        verdict = "partial" if closed >= CLOSED and spread <= SPREAD else "unknown"
+    elif any(len(standing.equivalent) > 1 for standing in standings):
+        verdict = "ambiguous"
+    else:
+        verdict = "named"
+    return Judgement(verdict, standings, left, ratio, allowed, closed, uneven, spread, chance)
+
+
+def _closed(search: Search, best: Found) -> float:
+    """Return the share of the gap closed on what was held back.
+
+    The gap is the sum of squares above that of noise, as the best model's spectrum shows it.
+    """
+    level = best.trial.remainder.level
+    before = search.base.held.chi2 / level - search.base.held.degrees
+    after = best.held.chi2 / level - best.held.degrees
+    # Noise alone scatters by this much: a gap below it cannot be divided.
+    scatter = math.sqrt(2 * best.held.degrees)
+    if before < scatter:
+        return 1.0 if after < 2 * scatter else 0.0
+    return float(np.clip(1 - after / before, -1.0, 1.0))

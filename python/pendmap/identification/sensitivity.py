@@ -1,0 +1,165 @@
+"""What each reading says about parameters: derivatives sample by sample, initial states aside."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.identification.fitting import prepared
+from pendmap.identification.runs import bare_windows, tolerance_of
+from pendmap.model.units import Units
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+    from pendmap.model import Rig
+
+__all__ = ["Sensitivities", "WindowSlopes", "sensitivities", "window_slopes"]
+
+STATE: Final = 2
+"""Columns of an initial state."""
+
+BLIND: Final = 1e-11
+"""A direction of the state that changes readings by less than this part of the other is unseen."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensitivities:
+    """Derivatives of the model's readings over their standard errors.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The parameters, as in a fit.
+    columns : ndarray of float, shape (n, k)
+        One row a sample that counts, by the parameters in SI, what each window's initial state can
+        follow taken off.
+    residual : ndarray of float, shape (n,)
+        Reading less model over the standard error, the same taken off.
+    run, sample, window : ndarray of int, shape (n,)
+        Which run, sample and window each row is of.
+    """
+
+    names: tuple[str, ...]
+    columns: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    run: NDArray[np.int64]
+    sample: NDArray[np.int64]
+    window: NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True)
+class WindowSlopes:
+    """Derivatives in one window, over the standard errors; rows of zeros do not count.
+
+    Parameters
+    ----------
+    run, first : int
+        Which run, and its first sample.
+    columns : ndarray of float, shape (n, k)
+        By the parameters, in SI.
+    states : ndarray of float, shape (n, 2)
+        By the initial angle, and by the initial velocity in rad per ``1 / w0``.
+    residual : ndarray of float, shape (n,)
+        Reading less model.
+    """
+
+    run: int
+    first: int
+    columns: NDArray[np.float64]
+    states: NDArray[np.float64]
+    residual: NDArray[np.float64]
+
+    def freed(
+        self, further: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        """Return parameters' columns, further ones, residual and place of the samples that count.
+
+        What the initial state can follow is taken off.
+        """
+        counted = self.states.any(axis=1) | self.columns.any(axis=1)
+        basis = _basis(self.states[counted])
+
+        def free(values: NDArray[np.float64]) -> NDArray[np.float64]:
+            kept = values[counted]
+            return np.asarray(kept - basis @ (basis.T @ kept), np.float64)
+
+        places = np.flatnonzero(counted).astype(np.int64)
+        return free(self.columns), free(further), free(self.residual), places
+
+
+def window_slopes(
+    fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
+) -> tuple[tuple[str, ...], list[WindowSlopes]]:
+    """Return the parameters' names and the derivatives window by window.
+
+    Parameters and errors are those of :func:`sensitivities`.
+    """
+    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+
+    units = Units(model.w0, si=True)
+    base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
+    start = {name: fit.estimates[name].value for name in fit.names}
+    quantities, given = prepared(runs, model, [*base, *candidates], start, units)
+    bare = [(q.places, q.bare(q.start, units)) for q in quantities]
+    try:
+        found = _core.fit_rows(given, bare, tolerance_of(runs), bare_windows(fit.windows, units))
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    slopes = np.array([q.slope(b, units) for q, (_, b) in zip(quantities, bare, strict=True)])
+    all_slopes = []
+    for (places, rows, residual), window in zip(found, fit.windows, strict=True):
+        columns = np.zeros((len(rows), len(quantities)))
+        columns[:, places] = rows[:, :-STATE] / slopes[places]
+        all_slopes.append(WindowSlopes(window[0], window[1], columns, rows[:, -STATE:], residual))
+    return tuple(q.name for q in quantities), all_slopes
+
+
+def sensitivities(
+    fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
+) -> Sensitivities:
+    """Return the derivatives by a fit's parameters and by further ones.
+
+    Parameters
+    ----------
+    fit : TrajectoryFit
+        Where they are taken.
+    runs : sequence of FitRun
+        Its records.
+    candidates : sequence of str
+        Further parameters, as of :func:`pendmap.identification.fitting.score`.
+    model : Rig
+        The fit's model with the candidates' effects in it.
+
+    Raises
+    ------
+    InputError
+        If a name is not known, or the motion is lost.
+    """
+    names, windows = window_slopes(fit, runs, candidates, model)
+    columns, residuals, labels = [], [], []
+    for index, window in enumerate(windows):
+        own, _, residual, counted = window.freed(np.zeros((len(window.residual), 0)))
+        columns.append(own)
+        residuals.append(residual)
+        run = np.full(counted.size, window.run, np.int64)
+        labels.append(np.stack([run, window.first + counted, np.full(counted.size, index)]))
+    run, sample, of = np.concatenate(labels, axis=1)
+    return Sensitivities(names, np.concatenate(columns), np.concatenate(residuals), run, sample, of)
+
+
+def _basis(states: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an orthonormal basis of what the initial state can do."""
+    sizes = np.linalg.norm(states, axis=0)
+    seen = states[:, sizes > BLIND * max(float(sizes.max(initial=0.0)), 1e-300)]
+    if not seen.size:
+        return np.zeros((len(states), 0))
+    q, r = np.linalg.qr(seen / np.linalg.norm(seen, axis=0))
+    return np.asarray(q[:, np.abs(np.diag(r)) > BLIND], np.float64)

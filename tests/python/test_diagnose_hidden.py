@@ -1,0 +1,80 @@
+"""``diagnose`` on experiments whose truth it cannot read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from hidden import diagnosed
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def _names(found: object) -> set[str]:
+    """All names that a diagnosis holds possible."""
+    effects = {effect.name for effect in found.effects}  # type: ignore[attr-defined]
+    return effects | {name for names in found.equivalent for name in names}  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter"),
+    [
+        ("quadratic_drag", "q"),
+        ("bearing_harmonic", "amplitude"),
+        ("encoder_offset", "d"),
+        ("coulomb_drift", "r"),
+    ],
+)
+def test_what_is_hidden_is_named_with_its_size(effect: str, parameter: str, tmp_path: Path) -> None:
+    found, truth = diagnosed(tmp_path, effect)
+    assert found.verdict == "named"
+    assert [e.name for e in found.effects] == [effect]
+    named = found.effects[0]
+    low, high = named.ci95[parameter]
+    wide = high - low
+    assert low - wide < truth[effect][parameter] < high + wide
+    assert named.probability > 0.95
+    assert not named.approximate
+    gap = found.gap
+    assert gap.after < gap.before
+    assert gap.held_out_after < gap.held_out_before
+    assert gap.held_out_after < 1.05 * gap.noise_floor
+
+
+def test_a_friction_that_sticks_is_among_the_names(tmp_path: Path) -> None:
+    found, _ = diagnosed(tmp_path, "stribeck_friction", noise=0.05, size=2.0)
+    assert found.verdict in {"named", "ambiguous"}
+    assert "stribeck_friction" in _names(found)
+
+
+def test_a_pair_is_named_whole(tmp_path: Path) -> None:
+    found, truth = diagnosed(tmp_path, "quadratic_drag", "bearing_harmonic", noise=0.1)
+    assert set(truth) == {"quadratic_drag", "bearing_harmonic"}
+    assert found.verdict == "named"
+    assert {e.name for e in found.effects} == set(truth)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_where_nothing_is_hidden_nothing_is_claimed(seed: int, tmp_path: Path) -> None:
+    found, _ = diagnosed(tmp_path, seed=seed)
+    assert found.verdict == "none"
+    assert found.effects == ()
+    assert found.gap.before == found.gap.after < 1.05 * found.gap.noise_floor
+
+
+def test_what_is_withheld_gets_no_confident_name(tmp_path: Path) -> None:
+    found, _ = diagnosed(tmp_path, "bearing_harmonic", size=3.0, without=("bearing_harmonic",))
+    assert found.verdict in {"unknown", "partial"}
+    assert found.verdict == "unknown" or all(effect.approximate for effect in found.effects)
+
+
+def test_what_no_library_has_is_unknown(tmp_path: Path) -> None:
+    found, _ = diagnosed(tmp_path, "base_sway", seed=1)
+    assert found.verdict == "unknown"
+    assert found.effects == ()
+    assert found.equivalent == []
+    assert found.judgement.left > 5
+    # The model that is given out is the baseline: nothing is added that is not claimed.
+    assert found.best.trial.chosen == ()
