@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
+from pendmap.identification.clock import from_first
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 from pendmap.identification.from_start import OFFSET
 from pendmap.identification.joint import as_fit_run
@@ -115,7 +116,9 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
 
 
 def _compared(model: Rig, run: Run) -> RunComparison:
-    reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
+    reading = reading_of(
+        from_first(run.time)[0], run.theta, trusted=run.trusted, count=run.count_rad
+    )
     fit: TrajectoryFit = fit_runs([as_fit_run(run, reading)], model, free=())
     first = fit.windows[0]
     peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)

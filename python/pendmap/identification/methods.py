@@ -15,6 +15,7 @@ from pendmap.identification import (
     repair,
     trajectory,
 )
+from pendmap.identification.clock import from_first
 from pendmap.identification.result import Identification
 
 if TYPE_CHECKING:
@@ -107,9 +108,14 @@ def identify(
     InputError
         If a method is not known or the arrays are not a record.
     """
+    names = check_names(methods)
+    elapsed, _ = from_first(time)
+    # The trajectory method names the times that it used, and counts from the first one itself.
     return {
-        name: METHODS[name].identify(time, theta, sigma=sigma, trusted=trusted)
-        for name in check_names(methods)
+        name: METHODS[name].identify(
+            time if name == trajectory.METHOD else elapsed, theta, sigma=sigma, trusted=trusted
+        )
+        for name in names
     }
 
 
@@ -119,6 +125,7 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
     Methods that need every sample say that they are not applicable.
     """
     found = {}
+    peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
     for name in check_names(methods):
         from_peaks = METHODS[name].from_peaks
         text = "not applicable: the record holds peaks alone, and this method needs every sample"

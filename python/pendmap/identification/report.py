@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
+from pendmap.identification.clock import span
 from pendmap.identification.from_start import TooShortError
 from pendmap.identification.joint import JointFit, fit_together
 from pendmap.identification.methods import check_names, identify, identify_peaks
@@ -145,7 +146,5 @@ def _best(
         joint = fit_together(runs, start=start, known=known, effects=effects)
     except TooShortError as error:
         return None, Identification(BEST, warnings=(str(error),), applicable=False)
-    span = f"{run.time[0]:g} to {run.time[-1]:g} s"
-    if len(runs) > 1:
-        span = f"{counted(len(runs), 'free run')}"
-    return joint, identification_of(joint.fit, joint.readings, span)
+    part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
+    return joint, identification_of(joint.fit, joint.readings, part)
