@@ -73,12 +73,16 @@ def runs_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
                 f"{one.rms:.4g}",
                 f"{one.sigma:.3g}",
                 f"{one.rms / one.sigma:.3g}",
-                "" if errors is None else f"{errors.period_rms:.3g} %",
-                "" if errors is None else f"{errors.peak_rms:.3g} %",
+                "" if errors is None else _percent(errors.period_rms),
+                "" if errors is None else _percent(errors.peak_rms),
             ]
         )
     head = ["run", "rms (rad)", "noise (rad)", "rms / noise", "periods, rms", "peaks, rms"]
     return head, rows
+
+
+def _percent(value: float) -> str:
+    return f"{value:.3g} %" if math.isfinite(value) else ""
 
 
 def as_text(comparison: Comparison) -> Iterator[str]:

@@ -55,18 +55,34 @@ class IdentificationReport:
 
     @property
     def best(self) -> Identification:
-        """The first method that could be applied.
+        """The first method that could be applied and whose search converged.
 
         Raises
         ------
         InputError
-            If none could.
+            If there is none.
         """
         for found in self.methods.values():
-            if found.applicable and "w0" in found.estimates:
+            if found.sound:
                 return found
+        lost = [name for name, found in self.methods.items() if not found.converged]
+        if lost:
+            raise InputError(
+                f"{self.run.name}: no model: {lost[0]} did not converge, and no other method can "
+                "be applied"
+            )
         reasons = "; ".join(self.methods[next(iter(self.methods))].warnings)
         raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
+
+    @property
+    def passed_over(self) -> str:
+        """Which better method the best one stands in for, and why, in words; empty if for none."""
+        for found in self.methods.values():
+            if found.sound:
+                return ""
+            if not found.converged:
+                return f"{found.method} did not converge: the model is that of {self.best.method}"
+        return ""
 
     @property
     def model(self) -> Rig:

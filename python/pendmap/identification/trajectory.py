@@ -144,6 +144,7 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
         covariance=(names, fit.widening * fit.covariance),
         misfit=fit.chi2 / max(fit.degrees, 1),
         model=fit.model,
+        converged=fit.converged,
     )
 
 
