@@ -117,5 +117,8 @@ def _said(report: IdentificationReport) -> str:
     if run.peaks_only:
         return f"{len(peaks)} peaks, {span(run.time)}"
     noise = f"noise {peaks.sigma:.2g} rad" if peaks.sigma else "no noise seen"
+    if len(report.runs) > 1:
+        fitted = f"fitted to {len(report.runs)} runs; drawn: {run.name}, the longest"
+        return f"{fitted};   {span(run.time)}, {len(peaks)} peaks, {noise}"
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
     return f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {len(peaks)} peaks, {noise}"

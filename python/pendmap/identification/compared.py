@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.identification.left_out import left_out
 from pendmap.records.summary import findings_said
 
 if TYPE_CHECKING:
@@ -98,4 +99,7 @@ def as_text(comparison: Comparison) -> Iterator[str]:
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "
                 "something is missing in the model"
             )
+    said = left_out(comparison.experiment, [one.run for one in comparison.runs])
+    if said:
+        yield said
     yield from findings_said(comparison.experiment, *(one.run for one in comparison.runs))

@@ -75,6 +75,11 @@ class IdentificationReport:
         raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
 
     @property
+    def runs(self) -> tuple[Run, ...]:
+        """Every run that a method read."""
+        return (self.run,) if self.joint is None else self.joint.runs
+
+    @property
     def passed_over(self) -> str:
         """Which better method the best one stands in for, and why, in words; empty if for none."""
         for found in self.methods.values():

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
+from pendmap.identification.left_out import left_out
 from pendmap.records.summary import findings_said
 
 if TYPE_CHECKING:
@@ -80,6 +81,9 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
                 yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
         if report.passed_over:
             yield report.passed_over
+    said = left_out(report.experiment, report.runs)
+    if said:
+        yield said
     for name, found in report.methods.items():
         for warning in found.warnings:
             yield f"{name}: {warning}"

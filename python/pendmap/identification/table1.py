@@ -243,8 +243,11 @@ def table_of(
     rows = [_row("period", asked, errors) for asked in periods]
     rows += [_row("peak", asked, errors) for asked in peaks]
     # Several asked ones may have the same nearest measured one.
-    told = {(row.what, row.measured): row for row in reversed(rows) if row is not None}
-    return Table1(tuple(row for row in rows if row in told.values()), errors)
+    told: dict[tuple[str, float], Row] = {}
+    for row in rows:
+        if row is not None:
+            told.setdefault((row.what, row.measured), row)
+    return Table1(tuple(told.values()), errors)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:

@@ -9,7 +9,7 @@ from pendmap.identification.summary import with_error
 from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:
-    from pendmap.identification import Estimate, IdentificationReport, Row
+    from pendmap.identification import Estimate, IdentificationReport
 
 __all__ = ["QUANTITIES", "RESTS", "columns", "estimate", "refused", "rows"]
 
