@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.identification.clock import from_first
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
@@ -14,13 +15,14 @@ from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.reading import reading_of
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.table1 import PeakErrors, Table1, table_of
+from pendmap.model import Rig
+from pendmap.records.experiment import Experiment
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from pendmap.model import Rig
-    from pendmap.records import Experiment, Run
+    from pendmap.records import Run
 
     Floats = NDArray[np.float64]
 
@@ -107,6 +109,8 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
     InputError
         If no run is a free decay of samples.
     """
+    checks.of_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
+    checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
     free = [run for run in experiment.runs if run.kind == "free" and not run.peaks_only]
     if not free:
         raise InputError(

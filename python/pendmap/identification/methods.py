@@ -16,6 +16,7 @@ from pendmap.identification import (
     trajectory,
 )
 from pendmap.identification.clock import from_first
+from pendmap.identification.peaks import samples
 from pendmap.identification.result import Identification
 
 if TYPE_CHECKING:
@@ -70,6 +71,8 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
     InputError
         If one is not known.
     """
+    if isinstance(methods, str):
+        raise InputError(f"methods is {methods!r}: allowed is a list of names, like [{methods!r}]")
     names = list(METHODS) if methods is None else list(dict.fromkeys(methods))
     unknown = [name for name in names if name not in METHODS]
     if unknown:
@@ -109,6 +112,8 @@ def identify(
         If a method is not known or the arrays are not a record.
     """
     names = check_names(methods)
+    if samples(time, theta, trusted)[0].size == 0:
+        raise InputError("time has no sample that may be used: allowed is a record of a decay")
     elapsed, _ = from_first(time)
     # The trajectory method names the times that it used, and counts from the first one itself.
     return {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.identification.clock import span
 from pendmap.identification.from_start import TooShortError
@@ -15,13 +16,15 @@ from pendmap.identification.result import Identification
 from pendmap.identification.table1 import Table1, table_of
 from pendmap.identification.trajectory import METHOD as BEST
 from pendmap.identification.trajectory import identification_of
+from pendmap.model import Rig
+from pendmap.records.experiment import Experiment
 from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from pendmap.model import Effect, Rig
-    from pendmap.records import Experiment, Run
+    from pendmap.model import Effect
+    from pendmap.records import Run
 
 __all__ = ["BEST", "IdentificationReport", "decay_of", "identify_experiment"]
 
@@ -140,6 +143,9 @@ def identify_experiment(
     InputError
         If a method is not known, or there is no free decay.
     """
+    checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    if start is not None:
+        checks.of_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
     names = check_names(methods)
     run = decay_of(experiment)
     if run.peaks_only:
