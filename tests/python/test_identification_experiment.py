@@ -13,6 +13,7 @@ from decays import decay, record
 from driven_decays import motion
 from pendmap import InputError
 from pendmap.identification import find_peaks, identify, identify_experiment
+from pendmap.identification.left_out import left_out
 from pendmap.records import Experiment, Run
 
 WIDE = decay()
@@ -94,3 +95,17 @@ def test_a_decay_that_begins_with_rotations(tmp_path: Path) -> None:
         found = report.best.estimates[name]
         assert found.stderr is not None
         assert abs(found.value - true) < 5 * found.stderr
+
+
+def test_what_is_left_out_is_said() -> None:
+    def run(kind: Literal["free", "forced"] = "free", *, hold_out: bool = False) -> Run:
+        time = np.arange(10.0)
+        good = np.ones(10, bool)
+        return Run("a", "a.csv", kind, time, time, good, hold_out=hold_out)
+
+    runs = run(), run("forced"), run("forced"), run(hold_out=True)
+    there = Experiment(Path("there"), runs)
+    said = left_out(there, runs[:1])
+    assert said == "1 run read; 2 forced runs and 1 run held out are not used"
+    assert left_out(there, [runs[0], runs[3]]) == "2 runs read; 2 forced runs are not used"
+    assert not left_out(there, runs)

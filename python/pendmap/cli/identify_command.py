@@ -54,22 +54,21 @@ def command(
     other command, identify.png and identify.rrd if no output is named. --json alone writes no file.
     """
     outputs = Outputs.take(given, "identify", SUFFIX)
+    from pendmap.errors import InputError
     from pendmap.identification import identified_model, identify_experiment
     from pendmap.records import read_experiment
 
     experiment = read_experiment(path)
     report = identify_experiment(experiment, methods=methods or None, effects=effects)
-    model = identified_model(report, "pendmap " + shlex.join(sys.argv[1:]))
+    try:
+        model = identified_model(report, "pendmap " + shlex.join(sys.argv[1:]))
+    except InputError:
+        _show(report, outputs)
+        raise
     written = write_all(_files(outputs, report, model))
-    if outputs.as_json:
-        from pendmap.identification.summary import as_json
-
-        fields = as_json(report) | {"model": None if outputs.out is None else str(outputs.out)}
-        click.echo(json.dumps(plain(fields), allow_nan=False))
-    elif not outputs.quiet:
-        _say(report)
-        if written:
-            click.echo("Written: " + ", ".join(written))
+    _show(report, outputs, outputs.out)
+    if written and not outputs.as_json and not outputs.quiet:
+        click.echo("Written: " + ", ".join(written))
     open_viewer(outputs)
 
 
@@ -88,6 +87,16 @@ def _files(
         from pendmap import viewer
 
         yield functools.partial(viewer.record_identification, report), outputs.rerun
+
+
+def _show(report: IdentificationReport, outputs: Outputs, model: Path | None = None) -> None:
+    if outputs.as_json:
+        from pendmap.identification.summary import as_json
+
+        fields = as_json(report) | {"model": None if model is None else str(model)}
+        click.echo(json.dumps(plain(fields), allow_nan=False))
+    elif not outputs.quiet:
+        _say(report)
 
 
 def _say(report: IdentificationReport) -> None:

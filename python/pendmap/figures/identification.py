@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from pendmap.errors import InputError
 from pendmap.figures import blocks, decays, decrements, errors, half_cycles, results_table
 from pendmap.figures import sheet as sheets
+from pendmap.identification.clock import span
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,9 +114,11 @@ def _high(column: Sequence[Block], report: IdentificationReport) -> float:
 def _said(report: IdentificationReport) -> str:
     """What was measured, in a line."""
     run, peaks = report.run, report.peaks
-    span = f"{run.time[0]:.6g} to {run.time[-1]:.6g} s"
     if run.peaks_only:
-        return f"{len(peaks)} peaks, {span}"
+        return f"{len(peaks)} peaks, {span(run.time)}"
     noise = f"noise {peaks.sigma:.2g} rad" if peaks.sigma else "no noise seen"
+    if len(report.runs) > 1:
+        fitted = f"fitted to {len(report.runs)} runs; drawn: {run.name}, the longest"
+        return f"{fitted};   {span(run.time)}, {len(peaks)} peaks, {noise}"
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
-    return f"{run.rate_hz:.5g} Hz, {span}, {used};   {len(peaks)} peaks, {noise}"
+    return f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {len(peaks)} peaks, {noise}"

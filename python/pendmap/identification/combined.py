@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.identification.decrement import Reading, from_amplitudes
-from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.result import Identification
 from pendmap.identification.uncertainty import bootstrap, estimates, jacobian
 
@@ -54,8 +54,13 @@ def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
     return small, warnings
 
 
-def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> Identification:
-    """Identify damping from peaks; see :func:`identify`."""
+def from_peaks(
+    peaks: Peaks, *, reading: Reading = "all", cut: float = CUT, why: str = ""
+) -> Identification:
+    """Identify damping from peaks; see :func:`identify`.
+
+    ``why`` says what else than the record's end there is, where no peaks are below the cut.
+    """
     name = _NAMES[reading]
     small, warnings = small_peaks(peaks, cut)
     size = np.abs(small.amplitude)
@@ -67,7 +72,8 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> I
         small = small.select(np.arange(len(small)) < size.size)
     least = _FEWEST + (reading != "all") * 2
     if size.size < least:
-        known = "the record ends above it" if len(peaks) and not len(small) else "too few peaks"
+        none = len(peaks) and not len(small)
+        known = (why or "the record ends above it") if none else "too few peaks"
         text = (
             f"not applicable: {size.size} peaks under {math.degrees(cut):.3g} degrees, {least} are "
             f"needed: {known}"
@@ -166,7 +172,21 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
     """
     peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    return from_peaks(peaks, reading=reading, cut=cut)
+    why = _unresolved(*samples(time, theta, trusted), cut)
+    return from_peaks(peaks, reading=reading, cut=cut, why=why)
+
+
+def _unresolved(time: Floats, theta: Floats, cut: float) -> str:
+    """Return that peaks were lost, in words, where a record goes on below a cut."""
+    if time.size < _FEWEST:
+        return ""
+    size = np.abs(theta - np.median(theta[-(theta.size // 4) :]))
+    above = np.flatnonzero(size >= cut)
+    late = theta[(above[-1] + 1 if above.size else 0) :]
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(late))))
+    if turns < _FEWEST:
+        return ""
+    return f"peaks are not resolved by {2 * late.size / turns:.2g} samples a period"
 
 
 def identify_odd_ends(

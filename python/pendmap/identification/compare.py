@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.identification.clock import from_first
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 from pendmap.identification.from_start import OFFSET
 from pendmap.identification.joint import as_fit_run
@@ -13,13 +15,14 @@ from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.reading import reading_of
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.table1 import PeakErrors, Table1, table_of
+from pendmap.model import Rig
+from pendmap.records.experiment import Experiment
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from pendmap.model import Rig
-    from pendmap.records import Experiment, Run
+    from pendmap.records import Run
 
     Floats = NDArray[np.float64]
 
@@ -106,6 +109,8 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
     InputError
         If no run is a free decay of samples.
     """
+    checks.of_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
+    checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
     free = [run for run in experiment.runs if run.kind == "free" and not run.peaks_only]
     if not free:
         raise InputError(
@@ -115,7 +120,9 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
 
 
 def _compared(model: Rig, run: Run) -> RunComparison:
-    reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
+    reading = reading_of(
+        from_first(run.time)[0], run.theta, trusted=run.trusted, count=run.count_rad
+    )
     fit: TrajectoryFit = fit_runs([as_fit_run(run, reading)], model, free=())
     first = fit.windows[0]
     peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)

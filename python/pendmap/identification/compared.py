@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.identification.left_out import left_out
 from pendmap.records.summary import findings_said
 
 if TYPE_CHECKING:
@@ -73,12 +74,16 @@ def runs_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
                 f"{one.rms:.4g}",
                 f"{one.sigma:.3g}",
                 f"{one.rms / one.sigma:.3g}",
-                "" if errors is None else f"{errors.period_rms:.3g} %",
-                "" if errors is None else f"{errors.peak_rms:.3g} %",
+                "" if errors is None else _percent(errors.period_rms),
+                "" if errors is None else _percent(errors.peak_rms),
             ]
         )
     head = ["run", "rms (rad)", "noise (rad)", "rms / noise", "periods, rms", "peaks, rms"]
     return head, rows
+
+
+def _percent(value: float) -> str:
+    return f"{value:.3g} %" if math.isfinite(value) else ""
 
 
 def as_text(comparison: Comparison) -> Iterator[str]:
@@ -94,4 +99,7 @@ def as_text(comparison: Comparison) -> Iterator[str]:
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "
                 "something is missing in the model"
             )
+    said = left_out(comparison.experiment, [one.run for one in comparison.runs])
+    if said:
+        yield said
     yield from findings_said(comparison.experiment, *(one.run for one in comparison.runs))

@@ -30,6 +30,10 @@ _LARGEST = 2.0
 """Peaks below this give w0, rad: above, damping itself changes the half cycle's time."""
 _PHASE = 0.5
 """Half width of the windows in which the velocity is fitted, in radians of phase w0 t."""
+_SAMPLES = 25
+"""Samples a period below which a warning comes: the nine that a quartic is fitted to then reach 1
+rad of phase each way, twice as far as meant, and the velocity is smoothed by more than its error.
+"""
 
 
 def identify(
@@ -95,6 +99,12 @@ def identify(
     lever = np.array([1.0, 2 * found[1] / period.w0, 2 * found[2] / period.w0, 0.0])
     full += np.outer(lever, lever) * period.stderr**2
     warnings = unphysical(dict(zip(names, found, strict=True)))
+    period_samples = 2 * math.pi / w0 / float(np.median(np.diff(t)))
+    if period_samples < _SAMPLES:
+        warnings.append(
+            f"{period_samples:.3g} samples a period: below {_SAMPLES} velocities are smoothed, and "
+            "the errors are too small"
+        )
     if misfit > _MISFIT:
         warnings.append(
             f"the balance does not close: chi^2 per degree of freedom is {misfit:.3g}; the errors "

@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
+from pendmap.identification.clock import from_first
 from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit
 from pendmap.identification.from_start import fit_from_start
 from pendmap.identification.reading import Reading, reading_of
@@ -42,21 +43,25 @@ class JointFit:
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:
-    """Return a run as the fit takes it."""
+    """Return a run as the fit takes it.
+
+    Times count from the first sample, but for the phase of a drive, which counts from 0.
+    """
+    time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
     pivot = None
     if run.pivot is not None:
         quantity = QUANTITIES[run.pivot_unit or "m/s2"]
         pivot = Pivot(
-            run.time, run.pivot.get("vertical"), run.pivot.get("horizontal"), quantity=quantity
+            time, run.pivot.get("vertical"), run.pivot.get("horizontal"), quantity=quantity
         )
     return FitRun(
-        run.time,
+        time,
         run.theta,
         reading.each,
         trusted=run.trusted,
         drive=run.drive,
         pivot=pivot,
-        lab_time_s=run.lab_time_s,
+        lab_time_s=run.lab_time_s + first,
         name=run.name,
     )
 
@@ -91,7 +96,8 @@ def fit_together(
     if not runs:
         raise InputError("runs is empty: allowed is one record or more")
     readings = [
-        reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
+        reading_of(from_first(run.time)[0], run.theta, trusted=run.trusted, count=run.count_rad)
+        for run in runs
     ]
     fit = fit_from_start(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],

@@ -15,6 +15,8 @@ from pendmap.identification import (
     repair,
     trajectory,
 )
+from pendmap.identification.clock import from_first
+from pendmap.identification.peaks import samples
 from pendmap.identification.result import Identification
 
 if TYPE_CHECKING:
@@ -69,6 +71,8 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
     InputError
         If one is not known.
     """
+    if isinstance(methods, str):
+        raise InputError(f"methods is {methods!r}: allowed is a list of names, like [{methods!r}]")
     names = list(METHODS) if methods is None else list(dict.fromkeys(methods))
     unknown = [name for name in names if name not in METHODS]
     if unknown:
@@ -107,9 +111,16 @@ def identify(
     InputError
         If a method is not known or the arrays are not a record.
     """
+    names = check_names(methods)
+    if samples(time, theta, trusted)[0].size == 0:
+        raise InputError("time has no sample that may be used: allowed is a record of a decay")
+    elapsed, _ = from_first(time)
+    # The trajectory method names the times that it used, and counts from the first one itself.
     return {
-        name: METHODS[name].identify(time, theta, sigma=sigma, trusted=trusted)
-        for name in check_names(methods)
+        name: METHODS[name].identify(
+            time if name == trajectory.METHOD else elapsed, theta, sigma=sigma, trusted=trusted
+        )
+        for name in names
     }
 
 
@@ -119,6 +130,7 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
     Methods that need every sample say that they are not applicable.
     """
     found = {}
+    peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
     for name in check_names(methods):
         from_peaks = METHODS[name].from_peaks
         text = "not applicable: the record holds peaks alone, and this method needs every sample"

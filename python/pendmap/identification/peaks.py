@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.errors import InputError
+from pendmap.identification.clock import from_first
 from pendmap.identification.finder import Finder
 from pendmap.identification.reading import reading_of
 from pendmap.identification.turning import outline
@@ -108,6 +109,12 @@ class Peaks:
         """Only those at which the pendulum turned and was seen: no stop, nothing clipped."""
         return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
 
+    def later(self, seconds: float) -> Peaks:
+        """Return the same on a clock that shows so much more."""
+        return dataclasses.replace(
+            self, time=self.time + seconds, crossing_time=self.crossing_time + seconds
+        )
+
     def select(self, which: NDArray[np.bool_]) -> Peaks:
         """Return some of the peaks, and all crossings."""
         names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index", "window")
@@ -181,6 +188,7 @@ def find_peaks(
     standard errors count three samples for each count that the window sees.
     """
     t, x = samples(time, theta, trusted)
+    t, first = from_first(t)
     noise = reading_of(t, x, sigma).sigma
     course = outline(t, x, noise)
     if course is None:
@@ -195,7 +203,7 @@ def find_peaks(
     crossings = finder.crossings(ends, index)
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
     instant, amplitude, stderr_time, stderr_amplitude = columns.reshape(-1, 4).T.copy()
-    return Peaks(
+    found = Peaks(
         instant,
         amplitude,
         stderr_time,
@@ -208,6 +216,7 @@ def find_peaks(
         sigma=noise,
         window=np.array([e.window for e in ends]),
     )
+    return found.later(first)
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.identification.clock import span
 from pendmap.identification.from_start import TooShortError
 from pendmap.identification.joint import JointFit, fit_together
 from pendmap.identification.methods import check_names, identify, identify_peaks
@@ -14,13 +16,15 @@ from pendmap.identification.result import Identification
 from pendmap.identification.table1 import Table1, table_of
 from pendmap.identification.trajectory import METHOD as BEST
 from pendmap.identification.trajectory import identification_of
+from pendmap.model import Rig
+from pendmap.records.experiment import Experiment
 from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from pendmap.model import Effect, Rig
-    from pendmap.records import Experiment, Run
+    from pendmap.model import Effect
+    from pendmap.records import Run
 
 __all__ = ["BEST", "IdentificationReport", "decay_of", "identify_experiment"]
 
@@ -54,18 +58,39 @@ class IdentificationReport:
 
     @property
     def best(self) -> Identification:
-        """The first method that could be applied.
+        """The first method that could be applied and whose search converged.
 
         Raises
         ------
         InputError
-            If none could.
+            If there is none.
         """
         for found in self.methods.values():
-            if found.applicable and "w0" in found.estimates:
+            if found.sound:
                 return found
+        lost = [name for name, found in self.methods.items() if not found.converged]
+        if lost:
+            raise InputError(
+                f"{self.run.name}: no model: {lost[0]} did not converge, and no other method can "
+                "be applied"
+            )
         reasons = "; ".join(self.methods[next(iter(self.methods))].warnings)
         raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """Every run that a method read."""
+        return (self.run,) if self.joint is None else self.joint.runs
+
+    @property
+    def passed_over(self) -> str:
+        """Which better method the best one stands in for, and why, in words; empty if for none."""
+        for found in self.methods.values():
+            if found.sound:
+                return ""
+            if not found.converged:
+                return f"{found.method} did not converge: the model is that of {self.best.method}"
+        return ""
 
     @property
     def model(self) -> Rig:
@@ -118,6 +143,9 @@ def identify_experiment(
     InputError
         If a method is not known, or there is no free decay.
     """
+    checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    if start is not None:
+        checks.of_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
     names = check_names(methods)
     run = decay_of(experiment)
     if run.peaks_only:
@@ -145,7 +173,5 @@ def _best(
         joint = fit_together(runs, start=start, known=known, effects=effects)
     except TooShortError as error:
         return None, Identification(BEST, warnings=(str(error),), applicable=False)
-    span = f"{run.time[0]:g} to {run.time[-1]:g} s"
-    if len(runs) > 1:
-        span = f"{counted(len(runs), 'free run')}"
-    return joint, identification_of(joint.fit, joint.readings, span)
+    part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
+    return joint, identification_of(joint.fit, joint.readings, part)

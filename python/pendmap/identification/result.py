@@ -63,6 +63,8 @@ class Identification:
         chi^2 per degree of freedom of the method's own model, where it has one.
     model : Rig or None
         The pendulum, where the method finds more of it than ``estimates`` tell: effects.
+    converged : bool
+        Whether its search came to an end; a model is made of no other.
     """
 
     method: str
@@ -73,6 +75,13 @@ class Identification:
     covariance: tuple[tuple[str, ...], NDArray[np.float64]] | None = None
     misfit: float | None = None
     model: Rig | None = None
+    converged: bool = True
+
+    @property
+    def sound(self) -> bool:
+        """Whether a model can be made of it: it converged, to a w0 that a pendulum may have."""
+        w0 = self.estimates["w0"].value if "w0" in self.estimates else math.nan
+        return self.applicable and self.converged and 0 < w0 < math.inf
 
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.errors import InputError
+from pendmap.identification.left_out import left_out
 from pendmap.records.summary import findings_said
 
 if TYPE_CHECKING:
@@ -13,7 +15,15 @@ if TYPE_CHECKING:
     from pendmap.identification.report import IdentificationReport
     from pendmap.identification.result import Estimate, Identification
 
-__all__ = ["COLUMNS", "as_json", "as_text", "methods_table", "table1_table", "with_error"]
+__all__ = [
+    "COLUMNS",
+    "as_json",
+    "as_text",
+    "interval",
+    "methods_table",
+    "table1_table",
+    "with_error",
+]
 
 COLUMNS: Final = {
     "w0": "w0 (rad/s)",
@@ -31,12 +41,12 @@ DIGITS: Final = 2
 
 def as_json(report: IdentificationReport) -> dict[str, Any]:
     """Return the JSON object of ``pendmap identify``, without the paths of files."""
-    run = report.run
+    run, best = report.run, _best(report)
     return {
         "experiment": str(report.experiment.path),
         "run": run.name,
         "noise": report.peaks.sigma,
-        "best": report.best.method,
+        "best": None if best is None else best.method,
         "methods": {name: _method(found) for name, found in report.methods.items()},
         "table1": [
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
@@ -63,12 +73,17 @@ def _method(found: Identification) -> dict[str, Any]:
 
 def as_text(report: IdentificationReport) -> Iterator[str]:
     """Yield the lines below the tables: intervals, warnings, what was found in the record."""
-    best = report.best
-    yield f"{best.method}: {best.used}"
-    for name, estimate in {**best.estimates, **best.derived}.items():
-        if estimate.ci95 is not None:
-            low, high = estimate.ci95
-            yield f"  {name} = {with_error(estimate)}, 95 % in [{low:.6g}, {high:.6g}]"
+    best = _best(report)
+    if best is not None:
+        yield f"{best.method}: {best.used}"
+        for name, estimate in {**best.estimates, **best.derived}.items():
+            if estimate.ci95 is not None:
+                yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
+        if report.passed_over:
+            yield report.passed_over
+    said = left_out(report.experiment, report.runs)
+    if said:
+        yield said
     for name, found in report.methods.items():
         for warning in found.warnings:
             yield f"{name}: {warning}"
@@ -77,7 +92,8 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of methods."""
-    extra = [n for n in report.best.estimates if n not in COLUMNS]
+    best = _best(report)
+    extra = [] if best is None else [n for n in best.estimates if n not in COLUMNS]
     names = [*COLUMNS, *extra]
     rows = []
     for method, found in report.methods.items():
@@ -104,6 +120,30 @@ def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str
     units = {"period": "s", "peak": "rad"}
     measured = [f"{r.what} {r.measured:.4g} {units[r.what]}" for r in report.table.rows]
     return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows
+
+
+def interval(estimate: Estimate) -> str:
+    """Return the 95 % interval with the digits that the standard error has: ``[6.2022, 6.2071]``.
+
+    Empty where there is none.
+    """
+    if estimate.ci95 is None:
+        return ""
+    low, high = estimate.ci95
+    error = estimate.stderr
+    if error is None or not math.isfinite(error) or error <= 0:
+        error = (high - low) / 4
+    places = DIGITS - 1 - math.floor(math.log10(error)) if 0 < error < math.inf else 0
+    if places <= 0 or places > 15:  # noqa: PLR2004 (no digits left, or none needed)
+        return f"[{low:.6g}, {high:.6g}]"
+    return f"[{low:.{places}f}, {high:.{places}f}]"
+
+
+def _best(report: IdentificationReport) -> Identification | None:
+    try:
+        return report.best
+    except InputError:
+        return None
 
 
 def with_error(estimate: Estimate) -> str:

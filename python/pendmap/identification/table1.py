@@ -107,7 +107,11 @@ class Row:
 
 @dataclasses.dataclass(frozen=True)
 class Table1:
-    """Table 1 of a record, and figure 7 behind it."""
+    """Table 1 of a record, and figure 7 behind it.
+
+    Rows that fall on the same measured value are one, and none falls on the peak that simulations
+    start from.
+    """
 
     rows: tuple[Row, ...]
     errors: Mapping[str, PeakErrors]
@@ -238,7 +242,12 @@ def table_of(
     }
     rows = [_row("period", asked, errors) for asked in periods]
     rows += [_row("peak", asked, errors) for asked in peaks]
-    return Table1(tuple(row for row in rows if row is not None), errors)
+    # Several asked ones may have the same nearest measured one.
+    told: dict[tuple[str, float], Row] = {}
+    for row in rows:
+        if row is not None:
+            told.setdefault((row.what, row.measured), row)
+    return Table1(tuple(told.values()), errors)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:
@@ -256,5 +265,7 @@ def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | Non
         )
         if what == "peak":
             near = int(np.argmin(np.abs(there - asked)))
+            if near == 0:  # where the simulation starts: it has no error there
+                return None
         measured, column[name] = float(there[near]), abs(float(wrong[near]))
     return Row(what, asked, measured, column) if column else None

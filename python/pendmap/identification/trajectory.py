@@ -15,6 +15,7 @@ import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.identification.clock import from_first, span
 from pendmap.identification.from_start import OFFSET, TooShortError, fit_from_start
 from pendmap.identification.reading import Reading, reading_of
 from pendmap.identification.result import Estimate, Identification
@@ -104,10 +105,10 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
         )
     except TooShortError as error:
         return Identification(METHOD, warnings=(str(error),), applicable=False)
-    return identification_of(fit, [reading], f"{time[0]:g} to {time[-1]:g} s")
+    return identification_of(fit, [reading], span(np.asarray(time)))
 
 
-def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str) -> Identification:
+def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str) -> Identification:
     """Return a fit as every method gives its result.
 
     Parameters
@@ -116,7 +117,7 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str
         To one record or more.
     readings : sequence of Reading
         Of each record.
-    span : str
+    part : str
         Which part of them, in words.
     """
     renamed = {f"{OFFSET}.d": "offset"}
@@ -138,11 +139,12 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], span: str
     return Identification(
         METHOD,
         estimates=estimates,
-        used=f"{fit.samples} readings of {total}, {span}, {how}; noise {noise} rad",
+        used=f"{fit.samples} readings of {total}, {part}, {how}; noise {noise} rad",
         warnings=tuple(_warnings(fit, estimates, readings)),
         covariance=(names, fit.widening * fit.covariance),
         misfit=fit.chi2 / max(fit.degrees, 1),
         model=fit.model,
+        converged=fit.converged,
     )
 
 
@@ -179,8 +181,9 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if good.shape != time.shape:
         raise InputError("trusted and time differ in length: they must be as many")
-    reading = reading_of(time, theta, sigma, trusted=good)
-    run = FitRun(time, theta, reading.each, trusted=good)
+    elapsed, first = from_first(time)
+    reading = reading_of(elapsed, theta, sigma, trusted=good)
+    run = FitRun(elapsed, theta, reading.each, trusted=good, lab_time_s=first)
     found = fit_from_start(
         [run],
         [reading],

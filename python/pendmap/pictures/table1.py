@@ -9,7 +9,7 @@ from pendmap.identification.summary import with_error
 from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:
-    from pendmap.identification import Estimate, IdentificationReport, Row
+    from pendmap.identification import Estimate, IdentificationReport
 
 __all__ = ["QUANTITIES", "RESTS", "columns", "estimate", "refused", "rows"]
 
@@ -24,7 +24,7 @@ def columns(report: IdentificationReport) -> list[str]:
     """Return the names of the columns."""
     errors = [
         f"period {row.measured:.3g} s" if row.what == "period" else f"peak {row.measured:.3g} rad"
-        for row in _different(report)
+        for row in report.table.rows
     ]
     return ["method", *(said for _, said in QUANTITIES), *errors, "periods, rms", "peaks, rms"]
 
@@ -40,18 +40,13 @@ def rows(report: IdentificationReport) -> list[list[str]]:
             estimate(found.estimates[key]) if key in found.estimates else "\N{EN DASH}"
             for key, _ in QUANTITIES
         ]
-        cells += [_percent(row.errors.get(name, math.nan)) for row in _different(report)]
+        cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
         errors = report.table.errors.get(name)
         cells += ["\N{EN DASH}"] * 2 if errors is None else [
             _percent(errors.period_rms), _percent(errors.peak_rms),
         ]  # fmt: skip
         made.append(cells)
     return made
-
-
-def _different(report: IdentificationReport) -> list[Row]:
-    """The rows of table 1 that show something of their own; a short record has fewer."""
-    return list({(row.what, row.measured): row for row in report.table.rows}.values())
 
 
 def refused(report: IdentificationReport) -> list[tuple[str, str]]:

@@ -1,0 +1,51 @@
+"""Which method the model is of, and how its intervals are printed."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from decays import decay, record
+from pendmap import InputError
+from pendmap.identification import Estimate, identified_model, identify_experiment
+from pendmap.identification.summary import as_json, as_text, interval
+from pendmap.records import Experiment, Run
+
+
+def test_a_search_that_did_not_converge_gives_no_model() -> None:
+    time, angle = record(decay(release=0.5, until=40.0), seconds=30)
+    run = Run("a", "a.csv", "free", time, angle, np.ones(time.size, bool))
+    names = ["trajectory", "combined_repaired"]
+    report = identify_experiment(Experiment(Path("there"), (run,)), methods=names)
+    assert report.best.converged
+    assert not report.passed_over
+    lost = dataclasses.replace(report.best, converged=False)
+    other = dataclasses.replace(report, methods=report.methods | {"trajectory": lost})
+    assert other.best.method == "combined_repaired"
+    line = "trajectory did not converge: the model is that of combined_repaired"
+    assert line in list(as_text(other))
+    model = identified_model(other)
+    assert model.w0 == report.methods["combined_repaired"]["w0"]
+    assert model.notes["provenance"]["method"] == "combined_repaired"
+    alone = dataclasses.replace(report, methods={"trajectory": lost})
+    with pytest.raises(InputError, match="no model: trajectory did not converge"):
+        identified_model(alone)
+    assert as_json(alone)["best"] is None
+    assert not any(text.startswith("trajectory: 3001") for text in as_text(alone))
+
+
+@pytest.mark.parametrize(
+    ("estimate", "shown"),
+    [
+        (Estimate(6.2, 1.2e-7, (6.19999976, 6.20000024)), "[6.19999976, 6.20000024]"),
+        (Estimate(6.2047, 0.0012, (6.20234, 6.20706)), "[6.2023, 6.2071]"),
+        (Estimate(6.2, None, (6.1, 6.3)), "[6.100, 6.300]"),
+        (Estimate(1234.0, 120.0, (1000.0, 1468.0)), "[1000, 1468]"),
+        (Estimate(6.2, 0.1), ""),
+    ],
+)
+def test_intervals_have_the_digits_of_the_error(estimate: Estimate, shown: str) -> None:
+    assert interval(estimate) == shown

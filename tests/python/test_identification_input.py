@@ -1,0 +1,50 @@
+"""What identification refuses, in a line, and what it warns of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from decays import decay, record
+from pendmap import InputError, Pendulum, Rig
+from pendmap.identification import compare, identify, identify_experiment
+from pendmap.records import Experiment
+
+THERE = Experiment(Path("there"), ())
+TIME = np.arange(50) / 10
+
+
+@pytest.mark.parametrize(
+    ("call", "given", "complaint"),
+    [
+        (identify_experiment, ("folder",), "experiment is 'folder': allowed is an Experiment"),
+        (compare, ("model.toml", THERE), "model is 'model.toml': allowed is a Rig"),
+        (compare, (Pendulum(), THERE), "allowed is a Rig"),
+        (compare, (Rig(w0=6.2), "folder"), "experiment is 'folder'"),
+        (identify, ([], []), "time has no sample"),
+        (identify, (TIME[::-1], np.cos(TIME)), "time does not increase"),
+    ],
+)
+def test_refused_in_a_line(call: Any, given: tuple[Any, ...], complaint: str) -> None:  # noqa: ANN401
+    with pytest.raises(InputError, match=complaint) as error:
+        call(*given)
+    assert "\n" not in str(error.value)
+
+
+def test_methods_are_a_list() -> None:
+    with pytest.raises(InputError, match="methods is 'trajectory': allowed is a list"):
+        identify(TIME, np.cos(TIME), methods="trajectory")
+
+
+def test_few_samples_a_period_are_said() -> None:
+    names = ["energy_balance", "combined"]
+    coarse = identify(*record(decay(), seconds=60, rate=16), methods=names)
+    assert any("samples a period" in text for text in coarse["energy_balance"].warnings)
+    fine = identify(*record(decay(), seconds=60), methods=names)
+    assert not any("samples a period" in text for text in fine["energy_balance"].warnings)
+    lost = identify(*record(decay(), seconds=90, rate=4), methods=names)["combined"]
+    assert not lost.applicable
+    assert "the record ends above it" not in lost.warnings[-1]
