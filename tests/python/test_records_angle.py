@@ -161,3 +161,18 @@ def test_counts_are_seen(tmp_path: Path, counts: int) -> None:
     count = 2 * math.pi / counts
     run = read(tmp_path, text((time, count * np.round(theta / count))))
     assert run.count_rad == pytest.approx(count, rel=1e-3)
+
+
+@pytest.mark.parametrize("duration", [0.4, 1.0, 3.0])
+def test_a_few_swings_do_not_tell_the_zero(tmp_path: Path, duration: float) -> None:
+    time, theta = clean(start=2.4, duration=duration)
+    run = read(tmp_path, text((time, theta)))
+    np.testing.assert_allclose(run.theta, theta, atol=1e-6)
+    assert not any(f.mended for f in run.findings if f.what.startswith(("zero", "gauge")))
+
+
+def test_a_rest_that_is_seen_tells_the_zero(tmp_path: Path) -> None:
+    time, theta = clean(start=0.1, duration=20.0)
+    run = read(tmp_path, text((time, theta + 0.5)))
+    assert found(run)["zero-offset"].mended
+    np.testing.assert_allclose(run.theta, theta, atol=0.01)
