@@ -58,6 +58,8 @@ def _finite(work: Work, what: str, *values: Floats) -> None:
     """Leave out rows where a channel that is needed has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     missing = np.flatnonzero(~good)
+    if missing.size and missing.size == good.size:
+        raise InputError(f"{work.where}: no row has a number for the {what}: allowed are numbers")
     if missing.size:
         text = f"{counted(missing.size, 'row')} without a number for the {what} left out"
         work.say("angle-missing", text, mended=True, at=missing)
