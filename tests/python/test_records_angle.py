@@ -176,3 +176,37 @@ def test_a_rest_that_is_seen_tells_the_zero(tmp_path: Path) -> None:
     run = read(tmp_path, text((time, theta + 0.5)))
     assert found(run)["zero-offset"].mended
     np.testing.assert_allclose(run.theta, theta, atol=0.01)
+
+
+def test_angles_too_large_are_said_to_be(tmp_path: Path) -> None:
+    time, theta = clean()
+    theta[-200:] = 0
+    with pytest.raises(pendmap.InputError, match="too large"):
+        read(tmp_path, text((time, 3e9 * theta)))
+
+
+@pytest.mark.parametrize("known", ["", "[rig]\nencoder_counts = 4096\n"])
+def test_steps_are_those_of_the_angle_in_radians(tmp_path: Path, known: str) -> None:
+    time, theta = clean()
+    described = known + '[[run]]\nfile = "run.csv"\n'
+    (run,) = experiment(tmp_path, described, run=text((time, np.degrees(theta)))).runs
+    assert run.count_rad == pytest.approx(COUNT, rel=1e-3)
+    assert "counts-differ" not in found(run)
+    assert known or "4096" in found(run)["counts-seen"].text
+
+
+@pytest.mark.parametrize("velocity", [20.0, 30.0])
+def test_swings_after_turns_are_counted(tmp_path: Path, velocity: float) -> None:
+    time, theta = clean(start=0.0, velocity=velocity, duration=80.0)
+    assert theta[-1] > 30
+    run = read(tmp_path, text((time, theta)))
+    assert "no-swing" not in found(run)
+    np.testing.assert_allclose(run.theta, theta, atol=1e-5)
+    assert run.trusted.mean() > 0.7
+
+
+def test_noise_alone_is_not_for_fitting(tmp_path: Path) -> None:
+    time = np.arange(2000) / 100
+    run = read(tmp_path, text((time, noisy(0 * time, 1e-3, 0))))
+    assert [segment.used for segment in run.segments] == [False]
+    assert not run.trusted.any()

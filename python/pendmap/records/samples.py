@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["check", "step_of"]
+__all__ = ["check", "say_steps", "step_of"]
 
 SAME: Final = 5
 """Equal readings in a row that may be a clipped or frozen sensor."""
@@ -32,6 +32,7 @@ FINEST: Final = 3e-5
 
 def check(work: Work) -> None:
     """Mark what is not for fitting, mend missed counts that are certain, and say so."""
+    work.seen = step_of(work.theta)
     work.count = _count(work)
     _clipped(work)
     _frozen(work)
@@ -41,22 +42,27 @@ def check(work: Work) -> None:
 def _count(work: Work) -> float:
     """Return the step of the readings: as it is known, or as it can be seen."""
     counts = work.known.get("encoder_counts")
-    seen = step_of(work.theta)
+    if counts is None:
+        return work.seen
+    count = 2 * math.pi / float(counts)
+    return work.seen if work.seen > 1.5 * count and work.theta.size > 200 else count
+
+
+def say_steps(work: Work) -> None:
+    """Say what steps the readings come in, once their unit is certain."""
+    counts, seen = work.known.get("encoder_counts"), work.seen
+    work.count = _count(work)
     if counts is None:
         if seen > FINEST:
             turn = 2 * math.pi / seen
             text = f"the readings come in steps of {seen:.4g} rad ({turn:.5g} a turn)"
             work.say("counts-seen", text)
-        return seen
-    count = 2 * math.pi / float(counts)
-    if seen > 1.5 * count and work.theta.size > 200:
+    elif work.count == seen > 0 and seen > 3 * math.pi / float(counts):
         text = (
             f"the readings come in steps of {seen:.4g} rad, {2 * math.pi / seen:.5g} a turn:"
             f" encoder_counts says {counts}"
         )
         work.say("counts-differ", text)
-        return seen
-    return count
 
 
 def step_of(theta: Floats) -> float:
