@@ -210,3 +210,19 @@ def test_noise_alone_is_not_for_fitting(tmp_path: Path) -> None:
     run = read(tmp_path, text((time, noisy(0 * time, 1e-3, 0))))
     assert [segment.used for segment in run.segments] == [False]
     assert not run.trusted.any()
+
+
+@pytest.mark.parametrize("form", ["%.6f", "%.4f"])
+def test_slow_turns_between_lines_are_not_clipped(tmp_path: Path, form: str) -> None:
+    time, theta, _ = motion(start=3.0, duration=12.0)
+    dense = np.linspace(0.0, 12.0, 24001)
+    readings = np.interp(dense, time, noisy(theta, 0.0))
+    run = read(tmp_path, text((dense, readings), form=form))
+    assert "clipped" not in found(run)
+
+
+@pytest.mark.parametrize("limit", [0.3, 1.0, 2.0])
+def test_one_end_of_a_sensor_is_said_once(tmp_path: Path, limit: float) -> None:
+    time, theta = clean(start=3.0, duration=12.0)
+    run = read(tmp_path, text((time, np.minimum(theta, limit))))
+    assert found(run)["clipped"].text.startswith(f"the sensor ends at {limit:.4g} rad: ")

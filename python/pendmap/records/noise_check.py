@@ -25,7 +25,7 @@ def check(work: Work) -> None:
         return
     slow, fast = floor.by_speed[0], floor.by_speed[-1]
     certain = fast.sigma - GROWS * slow.sigma > 4 * (fast.stderr + GROWS * slow.stderr)
-    if certain and fast.sigma > 2 * work.count:
+    if certain and fast.speed_from > 0 and fast.sigma > 2 * work.count:
         extra = math.sqrt(fast.sigma**2 - slow.sigma**2)
         late = extra / ((fast.speed_from + min(fast.speed_to, 2 * fast.speed_from)) / 2)
         interval = float(np.median(np.diff(work.time)))
