@@ -114,7 +114,7 @@ TEXTS = {
     "one row": bad(lambda s: "\n".join(s.splitlines()[:2]), "1 samples"),
     "two rows": bad(lambda s: "\n".join(s.splitlines()[:3]), "2 samples"),
     "four rows": bad(lambda s: "\n".join(s.splitlines()[:5]), "4 samples"),
-    "one column": bad(lambda s: "\n".join(r.split(",")[0] for r in s.splitlines()), "no rows"),
+    "one column": bad(lambda s: "\n".join(r.split(",")[0] for r in s.splitlines()), "one column of numbers"),
     "random bytes": bad(lambda _: RNG.bytes(5000), ""),
     "a picture": bad(lambda _: b"\x89PNG\r\n\x1a\n" + RNG.bytes(3000), ""),
     "a workbook": bad(lambda _: b"PK\x03\x04" + RNG.bytes(3000), "Excel"),
@@ -178,7 +178,7 @@ TEXTS = {
         suffix=".parquet",
     ),
     "parquet with words": bad(
-        parquet(lambda f: f.assign(theta_rad="x")), "0 samples", ".parquet"
+        parquet(lambda f: f.assign(theta_rad="x")), "no row has a number", ".parquet"
     ),
     "parquet without rows": bad(parquet(lambda f: f.iloc[:0]), "is empty", ".parquet"),
     "parquet cut": bad(lambda s: parquet(lambda f: f)(s)[:900], "Parquet", ".parquet"),
@@ -186,7 +186,7 @@ TEXTS = {
 }  # fmt: skip
 
 TIMES = {
-    "times not there": bad(arrays(lambda t, a: (t * np.nan, a)), "no rows of numbers"),
+    "times not there": bad(arrays(lambda t, a: (t * np.nan, a)), "no row with a time"),
     "times all equal": bad(arrays(lambda t, a: (t * 0, a)), "do not increase"),
     "some times missing": said(arrays(lambda t, a: (at(t, slice(50, 60), np.nan), a)), "time-missing"),
     "times backwards": said(arrays(lambda t, a: (t[::-1], a[::-1])), "time-backwards"),
@@ -213,7 +213,7 @@ TIMES = {
 }  # fmt: skip
 
 ANGLES = {
-    "no angles": bad(arrays(lambda t, a: (t, a * np.nan)), "no rows of numbers"),
+    "no angles": bad(arrays(lambda t, a: (t, a * np.nan)), "no row has a number for the angle"),
     "an angle that never changes": bad(arrays(lambda t, a: (t, a * 0 + 0.3)), "never changes"),
     "noise alone": said(arrays(lambda t, a: (t, RNG.normal(0, 1e-3, t.size))), "no-motion"),
     "huge": bad(arrays(lambda t, a: (t, a * 1e200)), "samples"),

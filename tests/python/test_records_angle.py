@@ -161,3 +161,68 @@ def test_counts_are_seen(tmp_path: Path, counts: int) -> None:
     count = 2 * math.pi / counts
     run = read(tmp_path, text((time, count * np.round(theta / count))))
     assert run.count_rad == pytest.approx(count, rel=1e-3)
+
+
+@pytest.mark.parametrize("duration", [0.4, 1.0, 3.0])
+def test_a_few_swings_do_not_tell_the_zero(tmp_path: Path, duration: float) -> None:
+    time, theta = clean(start=2.4, duration=duration)
+    run = read(tmp_path, text((time, theta)))
+    np.testing.assert_allclose(run.theta, theta, atol=1e-6)
+    assert not any(f.mended for f in run.findings if f.what.startswith(("zero", "gauge")))
+
+
+def test_a_rest_that_is_seen_tells_the_zero(tmp_path: Path) -> None:
+    time, theta = clean(start=0.1, duration=20.0)
+    run = read(tmp_path, text((time, theta + 0.5)))
+    assert found(run)["zero-offset"].mended
+    np.testing.assert_allclose(run.theta, theta, atol=0.01)
+
+
+def test_angles_too_large_are_said_to_be(tmp_path: Path) -> None:
+    time, theta = clean()
+    theta[-200:] = 0
+    with pytest.raises(pendmap.InputError, match="too large"):
+        read(tmp_path, text((time, 3e9 * theta)))
+
+
+@pytest.mark.parametrize("known", ["", "[rig]\nencoder_counts = 4096\n"])
+def test_steps_are_those_of_the_angle_in_radians(tmp_path: Path, known: str) -> None:
+    time, theta = clean()
+    described = known + '[[run]]\nfile = "run.csv"\n'
+    (run,) = experiment(tmp_path, described, run=text((time, np.degrees(theta)))).runs
+    assert run.count_rad == pytest.approx(COUNT, rel=1e-3)
+    assert "counts-differ" not in found(run)
+    assert known or "4096" in found(run)["counts-seen"].text
+
+
+@pytest.mark.parametrize("velocity", [20.0, 30.0])
+def test_swings_after_turns_are_counted(tmp_path: Path, velocity: float) -> None:
+    time, theta = clean(start=0.0, velocity=velocity, duration=80.0)
+    assert theta[-1] > 30
+    run = read(tmp_path, text((time, theta)))
+    assert "no-swing" not in found(run)
+    np.testing.assert_allclose(run.theta, theta, atol=1e-5)
+    assert run.trusted.mean() > 0.7
+
+
+def test_noise_alone_is_not_for_fitting(tmp_path: Path) -> None:
+    time = np.arange(2000) / 100
+    run = read(tmp_path, text((time, noisy(0 * time, 1e-3, 0))))
+    assert [segment.used for segment in run.segments] == [False]
+    assert not run.trusted.any()
+
+
+@pytest.mark.parametrize("form", ["%.6f", "%.4f"])
+def test_slow_turns_between_lines_are_not_clipped(tmp_path: Path, form: str) -> None:
+    time, theta, _ = motion(start=3.0, duration=12.0)
+    dense = np.linspace(0.0, 12.0, 24001)
+    readings = np.interp(dense, time, noisy(theta, 0.0))
+    run = read(tmp_path, text((dense, readings), form=form))
+    assert "clipped" not in found(run)
+
+
+@pytest.mark.parametrize("limit", [0.3, 1.0, 2.0])
+def test_one_end_of_a_sensor_is_said_once(tmp_path: Path, limit: float) -> None:
+    time, theta = clean(start=3.0, duration=12.0)
+    run = read(tmp_path, text((time, np.minimum(theta, limit))))
+    assert found(run)["clipped"].text.startswith(f"the sensor ends at {limit:.4g} rad: ")

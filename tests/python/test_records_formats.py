@@ -197,3 +197,20 @@ def test_peaks_alone(tmp_path: Path) -> None:
 def test_a_folder_without_a_description(tmp_path: Path) -> None:
     with pytest.raises(pendmap.InputError, match=r"has no experiment\.toml"):
         pendmap.read_experiment(tmp_path)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("seconds", [20.0, 84.02])
+def test_every_second_row_may_be_of_another_sensor(
+    tmp_path: Path, first: int, seconds: float
+) -> None:
+    time, theta = clean(duration=seconds)
+    theta[first::2] = np.nan
+    run = read(tmp_path, text((time, theta)))
+    assert run.time.size == np.isfinite(theta).sum()
+    assert found(run)["angle-missing"].mended
+
+
+def test_one_column_is_said_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(pendmap.InputError, match="one column of numbers"):
+        read(tmp_path, text((clean()[1],), "theta_rad"))

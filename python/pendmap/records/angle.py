@@ -33,6 +33,9 @@ not be told from it anyway."""
 LARGEST: Final = 1e5
 """Radians beyond which a number is no pendulum's angle: ten thousand turns."""
 
+MOST: Final = 0.5
+"""Share of such numbers from which the column is no angle, or in another unit."""
+
 
 def make(work: Work) -> None:
     """Make the angle from the channels that there are; leave out rows without one.
@@ -58,6 +61,8 @@ def _finite(work: Work, what: str, *values: Floats) -> None:
     """Leave out rows where a channel that is needed has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     missing = np.flatnonzero(~good)
+    if missing.size and missing.size == good.size:
+        raise InputError(f"{work.where}: no row has a number for the {what}: allowed are numbers")
     if missing.size:
         text = f"{counted(missing.size, 'row')} without a number for the {what} left out"
         work.say("angle-missing", text, mended=True, at=missing)
@@ -68,6 +73,12 @@ def _finite(work: Work, what: str, *values: Floats) -> None:
 def _sane(work: Work) -> None:
     """Leave out numbers that no angle has."""
     huge = np.abs(work.theta) > LARGEST
+    if np.mean(huge) > MOST:
+        largest = float(np.max(np.abs(work.theta)))
+        raise InputError(
+            f"{work.where}: angles of up to {largest:.3g} rad are too large for a pendulum: allowed"
+            f" are {LARGEST:g} rad; a scale may stand in [columns] of experiment.toml"
+        )
     if huge.any():
         text = f"{counted(int(huge.sum()), 'number')} beyond {LARGEST:g} rad left out"
         work.say("angle-huge", text, mended=True, at=np.flatnonzero(huge))

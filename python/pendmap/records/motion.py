@@ -13,7 +13,7 @@ from pendmap.records.local_fit import local_fit
 from pendmap.records.noise import normal_scale
 from pendmap.records.runs_of import true_runs
 from pendmap.records.scale import periods_of
-from pendmap.records.swings import swings
+from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ def moves(work: Work) -> bool:
     spread = float(np.ptp(good)) if good.size else 0.0
     work.say("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
     work.segments = [Segment("rest", low, high, used=False)]
+    work.trusted[:] = False
     return False
 
 
@@ -152,6 +153,7 @@ def _releases(
     good = np.flatnonzero(work.trusted[low:high]) + low
     if good.size < 5:
         return []
+    good = good[after_turns(work.theta[good] - middle) :]
     half = swings(work.time[good], work.theta[good] - middle, least=limit)
     size = np.abs(half.peak)
     if size.size < 4:
@@ -261,8 +263,11 @@ def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
         low, high = max(parts, key=lambda part: part[1] - part[0])
         good = np.flatnonzero(work.trusted[low:high]) + low
         theta = work.theta[good]
-        turns = 2 * math.pi * round(float(np.median(theta[theta.size // 2 :])) / (2 * math.pi))
-        peaks = swings(work.time[good], theta - turns, least=limit).peak
+        middle = middle_of(work.time[good], theta)
+        middle = float(np.median(theta[theta.size // 2 :])) if middle is None else middle
+        theta = theta - 2 * math.pi * round(middle / (2 * math.pi))
+        start = after_turns(theta)
+        peaks = swings(work.time[good][start:], theta[start:], least=limit).peak
         if peaks.size < 8:
             return
         middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4

@@ -100,8 +100,11 @@ def _run(
     angle.make(work)
     if not work.peaks_only:
         samples.check(work)
-        if motion.moves(work):
+        moves = motion.moves(work)
+        if moves:
             scale.check(work)
+        samples.say_steps(work)
+        if moves:
             motion.check(work)
             signs.check(work)
             noise_check.check(work)

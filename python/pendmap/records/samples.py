@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["check", "step_of"]
+__all__ = ["check", "say_steps", "step_of"]
 
 SAME: Final = 5
 """Equal readings in a row that may be a clipped or frozen sensor."""
@@ -29,9 +29,16 @@ LATTICE: Final = 0.12
 FINEST: Final = 3e-5
 """A step under this, in rad, says nothing: it is how many digits were written."""
 
+FIT: Final = 3.0
+"""What is left over by a parabola, times which a motion must go beyond a plateau."""
+
+PLAIN: Final = 0.05
+"""Share of the whole way that no step of readings hides: what goes beyond is cut off."""
+
 
 def check(work: Work) -> None:
     """Mark what is not for fitting, mend missed counts that are certain, and say so."""
+    work.seen = step_of(work.theta)
     work.count = _count(work)
     _clipped(work)
     _frozen(work)
@@ -41,22 +48,27 @@ def check(work: Work) -> None:
 def _count(work: Work) -> float:
     """Return the step of the readings: as it is known, or as it can be seen."""
     counts = work.known.get("encoder_counts")
-    seen = step_of(work.theta)
+    if counts is None:
+        return work.seen
+    count = 2 * math.pi / float(counts)
+    return work.seen if work.seen > 1.5 * count and work.theta.size > 200 else count
+
+
+def say_steps(work: Work) -> None:
+    """Say what steps the readings come in, once their unit is certain."""
+    counts, seen = work.known.get("encoder_counts"), work.seen
+    work.count = _count(work)
     if counts is None:
         if seen > FINEST:
             turn = 2 * math.pi / seen
             text = f"the readings come in steps of {seen:.4g} rad ({turn:.5g} a turn)"
             work.say("counts-seen", text)
-        return seen
-    count = 2 * math.pi / float(counts)
-    if seen > 1.5 * count and work.theta.size > 200:
+    elif work.count == seen > 0 and seen > 3 * math.pi / float(counts):
         text = (
             f"the readings come in steps of {seen:.4g} rad, {2 * math.pi / seen:.5g} a turn:"
             f" encoder_counts says {counts}"
         )
         work.say("counts-differ", text)
-        return seen
-    return count
 
 
 def step_of(theta: Floats) -> float:
@@ -89,25 +101,67 @@ def step_of(theta: Floats) -> float:
 def _clipped(work: Work) -> None:
     """Mark plateaus at the ends of the range that the motion runs into at speed."""
     marked = np.zeros(work.theta.size, bool)
+    share, count = _as_read(work.theta)
+    count = max(count, work.count)
+    ends = []
     for end in (float(work.theta.max()), float(work.theta.min())):
         low, high = equal_runs(work.theta, SAME)
         at_end = np.abs(work.theta[low] - end) <= 1e-9 * max(abs(end), 1.0)
         hits = [
             (a, b)
             for a, b in zip(low[at_end], high[at_end], strict=True)
-            if _abrupt(work, a, b) and a > 0 and b < work.theta.size
+            if a > 0 and b < work.theta.size and (b - a - 1) * share + 1 > SAME - 0.5
+            if _abrupt(work, a, b) and _cut_off(work, a, b, count)
         ]
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * SAME):
+            ends.append(f"{end:.4g}")
             for a, b in hits:
                 marked[a:b] = True
     if marked.any():
         at = np.flatnonzero(marked)
         work.trusted[at] = False
         text = (
-            f"the sensor ends at {work.theta[at].min():.4g} or {work.theta[at].max():.4g} rad:"
+            f"the sensor ends at {' and '.join(ends[::-1])} rad:"
             f" {counted(at.size, 'clipped sample')} not for fitting"
         )
         work.say("clipped", text, at=at)
+
+
+def _as_read(theta: Floats) -> tuple[float, float]:
+    """Return the readings a sample, 1 unless lines were drawn between readings, and their step."""
+    bend = np.abs(np.diff(theta, 2))
+    if bend.size < 100:
+        return 1.0, 0.0
+    knees = np.flatnonzero(bend > 4 * float(np.quantile(bend, 0.6)) + 1e-9) + 1
+    if knees.size < 20:
+        return 1.0, 0.0
+    apart = np.diff(knees)
+    usual = float(np.quantile(apart, 0.25))
+    even = np.abs(apart / usual - np.round(apart / usual)) * usual < 0.5
+    if usual < 3 or np.mean(even) < 0.9:
+        return 1.0, 0.0
+    return 1 / usual, step_of(theta[knees])
+
+
+def _cut_off(work: Work, low: int, high: int, count: float) -> bool:
+    """Whether the motion on both sides goes on beyond a plateau, by a parabola through them."""
+    if low < 3 or work.theta.size - high < 3:
+        return False
+    if _missed(work, low, high) > PLAIN * float(np.ptp(work.theta)):
+        return True
+    begin, end = equal_runs(work.theta, SAME)
+    reach = max(high - low, 4)
+    first = max(low - reach, int(np.max(end[end < low], initial=0)))
+    last = min(high + reach, int(np.min(begin[begin > high], initial=work.theta.size)))
+    places = np.r_[min(first, max(low - 4, 0)) : low, high : max(last, high + 4)]
+    places = places[places < work.theta.size]
+    level = float(work.theta[low])
+    time = work.time[places] - (work.time[low] + work.time[high - 1]) / 2
+    away = work.theta[places] - level
+    answer = np.polyfit(time, away, 2)
+    noise = float(np.sqrt(np.mean((away - np.polyval(answer, time)) ** 2)))
+    beyond = float(answer[2]) * -math.copysign(1, float(np.median(away)))
+    return beyond > 2 * count + FIT * noise
 
 
 def _frozen(work: Work) -> None:
@@ -135,6 +189,12 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
     Before a turn with velocity v and after a time tau the angle is within v tau/2 of its extreme:
     a sensor with steps shows a plateau where that is a step or so.
     """
+    noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
+    return _missed(work, low, high) > 2 * work.count + 3 * min(noise, 0.01)
+
+
+def _missed(work: Work, low: int, high: int) -> float:
+    """Return how far a motion goes during a plateau, by its speed beside it, rad."""
     before = slice(max(low - 4, 0), low)
     after = slice(high, high + 4)
     slopes = [
@@ -143,7 +203,6 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
         if work.theta[part].size > 1
     ]
     if not slopes:
-        return False
-    half = (work.time[high - 1] - work.time[low]) / 2
-    noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
-    return bool(min(slopes) * half / 2 > 2 * work.count + 3 * min(noise, 0.01))
+        return -1.0
+    half = float(work.time[high - 1] - work.time[low]) / 2
+    return min(slopes) * half / 2

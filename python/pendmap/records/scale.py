@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.records.noise import normal_scale
-from pendmap.records.swings import swings
-from pendmap.records.zero import turn_to_rest
+from pendmap.records.swings import after_turns, swings
+from pendmap.records.zero import middle_of, turn_to_rest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,7 +73,10 @@ def check(work: Work) -> None:
     if work.plan.kind != "free":
         _slow_sampling(work, None)
         return
-    middle = float(np.median(work.theta[work.theta.size // 2 :]))
+    good = work.trusted
+    middle = middle_of(work.time[good], work.theta[good])
+    if middle is None:
+        middle = float(np.median(work.theta[work.theta.size // 2 :]))
     found = periods_of(work, middle)
     if found is not None:
         found = _seconds(work, found)
@@ -87,6 +90,8 @@ def periods_of(work: Work, middle: float) -> Periods | None:
     """Return the periods of a record about its middle; none where there are too few."""
     good = work.trusted
     time, theta = work.time[good], work.theta[good] - middle
+    start = after_turns(theta)
+    time, theta = time[start:], theta[start:]
     if time.size < 4 * FEWEST:
         return None
     noise = float(np.median(np.abs(np.diff(theta, 2)))) if theta.size > 2 else 0.0
@@ -148,6 +153,7 @@ def _radians(work: Work, found: Periods) -> Periods:
 def _rescale(work: Work, factor: float) -> None:
     work.theta *= factor
     work.count *= factor
+    work.seen *= factor
 
 
 def _curvature(work: Work, found: Periods, largest: float) -> None:

@@ -7,6 +7,7 @@ own, with standard errors.
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Swings", "swings"]
+__all__ = ["Swings", "after_turns", "swings"]
 
 DEAD: Final = 0.05
 """Share of the amplitude nearby within which noise may cross the middle without being counted."""
@@ -43,6 +44,14 @@ class Swings:
         """Whole periods around the peaks but the first and last, s, shape (M - 2,)."""
         halves = np.diff(self.crossing)
         return np.asarray((halves[:-2] + 2 * halves[1:-1] + halves[2:]) / 2)
+
+
+def after_turns(theta: Floats) -> int:
+    """Return where a record about 0 begins to swing: it may go over the top before."""
+    if not theta.size or abs(float(theta[0])) <= math.pi:
+        return 0
+    passed = np.flatnonzero(theta * theta[0] <= 0)
+    return int(passed[0]) if passed.size else 0
 
 
 def swings(time: Floats, theta: Floats, *, least: float = 0.0) -> Swings:

@@ -192,8 +192,31 @@ def _is_row(parts: list[str], decimal: str) -> int:
 def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str, str, int]:
     """Return delimiter, decimal sign and number of columns: whatever makes most lines rows."""
     step = max(len(lines) // LOOKED_AT, 1)
-    sample = [line for _, line in lines[::step]]
-    best: tuple[float, tuple[str, str, int]] = (0.0, (",", ".", 0))
+    # Uneven places: loggers of several sensors write rows of each kind by turns.
+    places = [k * step + int(step * (0.618 * k % 1)) for k in range(len(lines) // step)]
+    sample = [lines[k][1] for k in places]
+    found = _common(sample, reader, 2) or _common(sample, reader, 1)
+    if found is not None:
+        fitting = sum(_fits(line, *found) for line in sample)
+        if fitting >= ENOUGH * len(sample) or fitting >= len(sample) - _HEADS:
+            return found
+    if sum(_alone(line, reader) for line in sample) > ENOUGH * len(sample):
+        raise InputError(f"{where}: has one column of numbers: allowed are a time and an angle")
+    advice = "; what it is separated by may stand in [reader] of experiment.toml" if found else ""
+    raise InputError(
+        f"{where}: has no rows of numbers in two columns or more: allowed is CSV with a time"
+        f" and an angle{advice}"
+    )
+
+
+def _alone(line: str, reader: Reader) -> bool:
+    text = line.strip().strip('"')
+    return _NUMBER.fullmatch(text.replace(reader.decimal or ",", ".", 1)) is not None
+
+
+def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, int] | None:
+    """Return delimiter, decimal sign and columns that most lines have ``least`` numbers by."""
+    best: tuple[int, tuple[str, str, int] | None] = (0, None)
     ways = [
         (reader.delimiter or delimiter, reader.decimal or decimal) for delimiter, decimal in WAYS
     ]
@@ -203,22 +226,12 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
         widths = Counter(
             len(parts)
             for parts in (_split(line, delimiter) for line in sample)
-            if len(parts) > 1 and _is_row(parts, decimal) > 1
+            if len(parts) > 1 and _is_row(parts, decimal) >= least
         )
         if widths:
             width, count = widths.most_common(1)[0]
             if count > best[0]:
-                best = (float(count), (delimiter, decimal, width))
-    if best[0] < ENOUGH * len(sample) and best[0] < len(sample) - _HEADS:
-        raise InputError(
-            f"{where}: has no rows of numbers in two columns or more: allowed is CSV with a time"
-            " and an angle; what it is separated by may stand in [reader] of experiment.toml"
-        )
-    if best[0] == 0:
-        raise InputError(
-            f"{where}: has no rows of numbers in two columns or more: allowed is CSV with a time"
-            " and an angle"
-        )
+                best = (count, (delimiter, decimal, width))
     return best[1]
 
 

@@ -34,6 +34,7 @@ _FEWEST_PEAKS = 3
 class Work:
     """One record while it is read; all arrays have one length.
 
+    ``count`` is the step of the readings as it is known, ``seen`` as they show it, 0 for none.
     ``extra`` holds further channels by name, those of the pivot as ``pivot:vertical`` and
     ``pivot:horizontal``.
     """
@@ -50,6 +51,7 @@ class Work:
     findings: list[Finding]
     segments: list[Segment] = dataclasses.field(default_factory=list)
     count: float = 0.0
+    seen: float = 0.0
     peaks_only: bool = False
 
     @classmethod

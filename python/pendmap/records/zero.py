@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records.swings import after_turns, swings
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -22,6 +24,18 @@ gauge has its zero elsewhere. Less is left to the fit, which estimates the offse
 
 QUARTER: Final = 0.1
 """Radians by which a gauge may miss a multiple of 90 degrees and count as turned by it."""
+
+ENOUGH: Final = 10
+"""Half cycles about one middle that make it certain."""
+
+STILL: Final = 0.02
+"""Share of the whole way that the last tenth of a record stays within at rest."""
+
+CROSSED: Final = 4
+"""Half cycles about a rest, without which the end may be held by hand."""
+
+AGREE: Final = 0.1
+"""Share of the swing within which the middles of a free swing agree."""
 
 
 def middle_of(time: Floats, theta: Floats) -> float | None:
@@ -46,6 +60,10 @@ def turn_to_rest(work: Work) -> None:
     off = middle - turns
     if abs(off) < FAR:
         return
+    if not _certain(work.time[good], work.theta[good] - middle):
+        text = "too few whole swings to tell what it swings about: the zero is left to the fit"
+        work.say("zero-uncertain", text)
+        return
     if "angle" in work.declared and abs(off) < math.pi / 2 - QUARTER:
         work.say("zero-offset", f"it swings about {off:.4g} rad: the zero that is given is off")
         return
@@ -59,3 +77,22 @@ def turn_to_rest(work: Work) -> None:
     work.theta -= turns + off
     text = f"it swings about {off:.4g} rad, the rest is elsewhere than the zero: taken off"
     work.say("zero-offset", text, mended=True)
+
+
+def _certain(time: Floats, theta: Floats) -> bool:
+    """Whether a free swing is seen to have its middle at 0: at its rest, or by many swings."""
+    start = after_turns(theta)
+    time, theta = time[start:], theta[start:]
+    if theta.size < 20:
+        return False
+    reach = float(np.max(np.abs(theta)))
+    peaks = swings(time, theta, least=STILL * reach).peak
+    tail = theta[-max(theta.size // 10, 10) :]
+    if float(np.ptp(tail)) < STILL * reach and float(np.abs(tail).max()) < STILL * reach:
+        return peaks.size >= CROSSED
+    if peaks.size < ENOUGH:
+        return False
+    peaks = peaks[-2 * ENOUGH :]
+    middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
+    size = float(np.median(np.abs(peaks)))
+    return float(np.median(np.abs(middles))) < AGREE * size
