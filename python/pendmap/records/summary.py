@@ -103,6 +103,13 @@ def _lines(run: Run) -> Iterator[str]:
         phi = run.drive["phi"]
         phase = "phi to be fitted" if phi is None else f"phi = {phi:g}"
         yield f"  drive     p = {run.drive['p']:g}, Omega = {run.drive['Omega']:g} rad/s, {phase}"
+    if run.pivot is not None:
+        ways = ", ".join(
+            f"{way} {np.nanmin(values):.4g} to {np.nanmax(values):.4g} {run.pivot_unit}"
+            for way, values in run.pivot.items()
+            if np.isfinite(values).any()
+        )
+        yield f"  pivot     {ways or 'no numbers'}"
     if not run.peaks_only:
         yield f"  noise     {noise_said(noise_floor(run))}"
     for segment in run.segments:
