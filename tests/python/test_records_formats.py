@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import pendmap
+from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, noisy, read, text
 
 if TYPE_CHECKING:
@@ -214,3 +215,30 @@ def test_every_second_row_may_be_of_another_sensor(
 def test_one_column_is_said_to_be_one(tmp_path: Path) -> None:
     with pytest.raises(pendmap.InputError, match="one column of numbers"):
         read(tmp_path, text((clean()[1],), "theta_rad"))
+
+
+def test_a_pivot_without_unit_and_a_drive_that_is_not_there_are_said(tmp_path: Path) -> None:
+    time, theta = clean()
+    content = text((time, theta, np.cos(time)), "t_s,theta_rad,acc_y")
+    described = '[[run]]\nfile = "run.csv"\nkind = "forced"\n'
+    (run,) = experiment(tmp_path, described, run=content).runs
+    assert "neither drive nor pivot" in found(run)["drive-missing"].text
+    described += 'pivot = { vertical = "acc_y" }\n'
+    shown = experiment(tmp_path, described, run=content)
+    keys = found(shown.runs[0])
+    assert "m/s2" in keys["pivot-unit"].text
+    assert "drive-missing" not in keys
+    assert "pivot     vertical -1 to 1 m/s2" in as_text(shown)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("hold_ot = true", "hold_ot is not known, perhaps hold_out is meant: allowed are file"),
+        ('pivot = "pivot_m"', "allowed is a table like pivot = { vertical"),
+        ("from_s = 19.999", "leave 1 sample:"),
+    ],
+)
+def test_a_description_is_refused_in_true_words(tmp_path: Path, line: str, says: str) -> None:
+    with pytest.raises(pendmap.InputError, match=says):
+        experiment(tmp_path, f'[[run]]\nfile = "run.csv"\n{line}\n', run=text(clean()))

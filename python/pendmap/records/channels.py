@@ -88,6 +88,9 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         units[channel] = table.names[place] or f"column {place + 1}"
     declared = {c for c, column in asked.items() if column.unit or column.scale}
     pivot, unit = _pivot(table, plan, where)
+    if plan.pivot and "unit" not in plan.pivot:
+        text = 'the pivot has no unit: taken for an acceleration, unit = "m/s2"'
+        findings.append(Finding("pivot-unit", text))
     return Channels(values, units, frozenset(declared), pivot, unit, tuple(findings))
 
 
@@ -100,9 +103,9 @@ def _place(name: str, table: Table, where: str) -> int:
     if not table.headed:
         raise InputError(f"{where}: {checks.shown(name)}: the file has no line of names")
     near = difflib.get_close_matches(name, table.names, 1, 0.6)
-    perhaps = f"is perhaps {near[0]!r}: " if near else ""
+    perhaps = f", perhaps {near[0]!r} is meant" if near else ""
     raise InputError(
-        f"{where}: no column {checks.shown(name)}: allowed {perhaps}are {_listed(table)}"
+        f"{where}: no column {checks.shown(name)}{perhaps}: allowed are {_listed(table)}"
     )
 
 
@@ -234,7 +237,7 @@ def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
 def _pivot(table: Table, plan: RunPlan, where: str) -> tuple[dict[str, Floats] | None, str | None]:
     if plan.pivot is None:
         return None, None
-    unit, factor = PIVOT_UNITS[plan.pivot["unit"]]
+    unit, factor = PIVOT_UNITS[plan.pivot.get("unit", "m/s2")]
     found = {}
     for way in ("vertical", "horizontal"):
         if way in plan.pivot:

@@ -31,6 +31,8 @@ _RUN: Final = (
 )
 _DRIVE: Final = ("p", "Omega", "phi")
 _PIVOT: Final = ("vertical", "horizontal", "unit")
+_DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
+_PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
 _MOST_SKIPPED: Final = 1_000_000
 _MOST_COUNTS: Final = 10**9
 
@@ -126,17 +128,18 @@ def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, allowed:
             continue
         near = difflib.get_close_matches(key.lower(), [k.lower() for k in known], 1, 0.55)
         meant = next((k for k in known if near and k.lower() == near[0]), None)
-        perhaps = f"is perhaps {meant}: " if meant else ""
+        perhaps = f", perhaps {meant} is meant" if meant else ""
         shown = key if key.isidentifier() else checks.shown(key)
         place = f"{where}: " if where else ""
         raise InputError(
-            f"{place}{shown} is not known: allowed {perhaps}are {allowed or ', '.join(known)}"
+            f"{place}{shown} is not known{perhaps}: allowed are {allowed or ', '.join(known)}"
         )
 
 
-def _table(value: object, where: str) -> dict[str, Any]:
+def _table(value: object, where: str, example: str = "") -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(f"{where} is {checks.shown(value)}: allowed is a table")
+        like = f" like {example}" if example else ""
+        raise InputError(f"{where} is {checks.shown(value)}: allowed is a table{like}")
     return value
 
 
@@ -241,12 +244,11 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
 
 
 def _drive(value: object, where: str) -> dict[str, float | None]:
-    table = _table(value, f"{where}: drive")
+    table = _table(value, f"{where}: drive", _DRIVE_LIKE)
     _keys(table, _DRIVE, f"{where}: drive")
     for name in ("p", "Omega"):
         if name not in table:
-            example = "drive = { p = 0.2, Omega = 12.1 }"
-            raise InputError(f"{where}: drive: {name} is missing: allowed is like {example}")
+            raise InputError(f"{where}: drive: {name} is missing: allowed is like {_DRIVE_LIKE}")
     numbers: dict[str, float | None] = {
         name: checks.number(f"{where}: drive: {name}", value) for name, value in table.items()
     }
@@ -255,14 +257,12 @@ def _drive(value: object, where: str) -> dict[str, float | None]:
 
 
 def _pivot(value: object, where: str) -> dict[str, str]:
-    table = _table(value, f"{where}: pivot")
+    table = _table(value, f"{where}: pivot", _PIVOT_LIKE)
     _keys(table, _PIVOT, f"{where}: pivot")
     if not {"vertical", "horizontal"} & set(table):
-        example = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
-        raise InputError(f"{where}: pivot names no column: allowed is like {example}")
+        raise InputError(f"{where}: pivot names no column: allowed is like {_PIVOT_LIKE}")
     named = {key: _text(f"{where}: pivot: {key}", text) for key, text in table.items()}
-    named.setdefault("unit", "m/s2")
-    if named["unit"] not in PIVOT_UNITS:
+    if named.get("unit", "m/s2") not in PIVOT_UNITS:
         shown = checks.shown(named["unit"])
         known = ", ".join(PIVOT_UNITS)
         raise InputError(f"{where}: pivot: unit is {shown}: allowed are {known}")

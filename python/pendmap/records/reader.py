@@ -95,6 +95,9 @@ def _run(
     table, digest = tables[plan.file]
     channels = channels_of(table, description, plan, str(path))
     work = Work.begin(str(path), plan, description.known, channels, table)
+    if plan.kind == "forced" and plan.drive is None and plan.pivot is None:
+        text = 'kind is "forced" and there is neither drive nor pivot: what drives it is not known'
+        work.say("drive-missing", text)
     clock.mend(work)
     work.cut(plan.from_s, plan.to_s)
     angle.make(work)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.records.local_fit import local_fit
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,7 +48,7 @@ def _velocity(work: Work) -> None:
     velocity = work.extra["velocity"]
     missing = ~np.isfinite(velocity)
     if missing.any():
-        text = f"{np.count_nonzero(missing)} samples without velocity: the channel is left out"
+        text = f"{counted(int(missing.sum()), 'sample')} without velocity: the channel is left out"
         work.say("velocity-missing", text)
         del work.extra["velocity"]
         return

@@ -57,7 +57,7 @@ def _run(run: Run) -> dict[str, Any]:
         "drive": None if run.drive is None else dict(run.drive),
         "channels": dict(run.channels),
         "samples": int(run.time.size),
-        "trusted": int(run.trusted.sum()),
+        "trusted": _used(run),
         "from_s": float(run.time[0]),
         "to_s": float(run.time[-1]),
         "rate_hz": run.rate_hz,
@@ -97,12 +97,19 @@ def _lines(run: Run) -> Iterator[str]:
     span = f"{run.time[0]:.6g} to {run.time[-1]:.6g} s"
     what = "turning point" if run.peaks_only else "sample"
     rate = "" if run.peaks_only else f" at {run.rate_hz:.5g} Hz"
-    yield f"  samples   {run.time.size} {what}s{rate}, {span}; {run.trusted.sum()} for fitting"
+    yield f"  samples   {run.time.size} {what}s{rate}, {span}; {_used(run)} for fitting"
     yield f"  angle     {run.theta.min():.4g} to {run.theta.max():.4g} rad{_steps(run)}"
     if run.drive is not None:
         phi = run.drive["phi"]
         phase = "phi to be fitted" if phi is None else f"phi = {phi:g}"
         yield f"  drive     p = {run.drive['p']:g}, Omega = {run.drive['Omega']:g} rad/s, {phase}"
+    if run.pivot is not None:
+        ways = ", ".join(
+            f"{way} {np.nanmin(values):.4g} to {np.nanmax(values):.4g} {run.pivot_unit}"
+            for way, values in run.pivot.items()
+            if np.isfinite(values).any()
+        )
+        yield f"  pivot     {ways or 'no numbers'}"
     if not run.peaks_only:
         yield f"  noise     {noise_said(noise_floor(run))}"
     for segment in run.segments:
@@ -148,3 +155,9 @@ def noise_said(noise: NoiseFloor) -> str:
     if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
         said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high speed"
     return said
+
+
+def _used(run: Run) -> int:
+    """Return how many samples are for fitting: none where nothing moves."""
+    still = bool(run.segments) and not any(segment.used for segment in run.segments)
+    return 0 if still else int(run.trusted.sum())

@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.records.experiment import Finding, Segment
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -116,8 +117,8 @@ class Work:
         self.keep((self.time >= low) & (self.time <= high))
         if self.time.size < FEWEST:
             raise InputError(
-                f"{self.where}: from_s and to_s leave {self.time.size} samples: allowed are times"
-                f" within {first:g} to {last:g} s"
+                f"{self.where}: from_s and to_s leave {counted(self.time.size, 'sample')}: allowed"
+                f" are times within {first:g} to {last:g} s"
             )
 
     def refuse_short(self) -> None:
@@ -131,8 +132,8 @@ class Work:
         least = _FEWEST_PEAKS if self.peaks_only else FEWEST
         if self.time.size < least:
             raise InputError(
-                f"{self.where}: has {self.time.size} samples with time and angle: allowed are"
-                f" {least} and more"
+                f"{self.where}: has {counted(self.time.size, 'sample')} with time and angle:"
+                f" allowed are {least} and more"
             )
 
     def pivot(self) -> dict[str, Floats] | None:
