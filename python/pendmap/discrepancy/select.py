@@ -53,6 +53,9 @@ BENT: Final = 2
 STARTS: Final = 3
 """From so many shapes a candidate is fitted whose shape is adapted."""
 
+BEGUN: Final = 2
+"""So often a search begins again from a better baseline."""
+
 KICK: Final = 0.1
 """Part of the score's step from which a candidate is fitted a second time."""
 
@@ -137,6 +140,7 @@ class Search:
         self.base = Found(base, tried(evidence, base))
         self.attempts: list[Attempt] = []
         self.first: Scores | None = None
+        self._begun = 0
         # What was computed once is not again: rivals are often candidates that were tried.
         self._scores: dict[Key, Scores] = {}
         self._trials: dict[tuple[Key, Key], Found | None] = {}
@@ -144,6 +148,7 @@ class Search:
 
     def _begin_again(self, base: Trial) -> None:
         """Forget everything but a better baseline."""
+        self._begun += 1
         self.base = Found(base, tried(self.evidence, base))
         self.attempts, self.first = [], None
         self._scores, self._trials = {}, {}
@@ -156,7 +161,7 @@ class Search:
             following = self._following(best)
             if following is None:
                 break
-            if not best.trial.chosen:
+            if not best.trial.chosen and self._begun < BEGUN:
                 better = self._better_base(following.trial)
                 if better is not None:
                     self._begin_again(better)
