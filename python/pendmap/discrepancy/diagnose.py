@@ -11,11 +11,12 @@ from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
 from pendmap.discrepancy.runs import RunByRun, run_by_run
-from pendmap.discrepancy.select import Attempt, Found, Search
+from pendmap.discrepancy.select import Attempt, Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
 
 if TYPE_CHECKING:
+    from pendmap.discrepancy.refit import Found
     from collections.abc import Callable, Collection
 
     from pendmap.discrepancy.scores import Scores

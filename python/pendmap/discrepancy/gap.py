@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pendmap.discrepancy.evidence import Evidence
-    from pendmap.discrepancy.select import Found
+    from pendmap.discrepancy.refit import Found
     from pendmap.identification.fitting import TrajectoryFit
     from pendmap.identification.runs import FitRun
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.candidates import Candidate
     from pendmap.discrepancy.diagnose import Discrepancy
     from pendmap.discrepancy.evidence import Evidence
-    from pendmap.discrepancy.select import Found
+    from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.verdict import Judgement
     from pendmap.model import Rig
 

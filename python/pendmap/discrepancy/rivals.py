@@ -10,7 +10,8 @@ from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.candidates import Candidate
-    from pendmap.discrepancy.select import Found, Search
+    from pendmap.discrepancy.refit import Found
+    from pendmap.discrepancy.select import Search
 
 __all__ = ["Rival", "Standing", "standing_of"]
 

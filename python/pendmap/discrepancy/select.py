@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
 
 from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import Held, Trial, fitted, tried, with_candidates
+from pendmap.discrepancy.trial import Trial, fitted, tried
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +17,7 @@ if TYPE_CHECKING:
 
     from pendmap.discrepancy.evidence import Evidence
 
-__all__ = ["GATE", "Attempt", "Found", "Search"]
+__all__ = ["GATE", "Attempt", "Search"]
 
 GATE: Final = 12.0
 """The least score of a candidate that is refitted: of all candidates together none passes 8.5
@@ -31,9 +29,6 @@ GAIN: Final = 12.0
 REFITTED: Final = 4
 """So many candidates are refitted, those with the greatest scores."""
 
-WORTH: Final = 0.4
-"""The part of the greatest score that a candidate's must have to be refitted beside it."""
-
 LOSS: Final = 4.0
 """By so much a model may be worse on what was held back and still be accepted: two standard
 errors of what a parameter that is right, but not exact, does there."""
@@ -41,29 +36,14 @@ errors of what a parameter that is right, but not exact, does there."""
 PAIRED: Final = 8
 """Pairs are looked for among so many candidates."""
 
-FIRST_BEND: Final = 1.1
-"""Ratio of neighbouring shapes that are tried about the best one of the scan; then its root."""
-
-BENDS: Final = 3
-"""How often."""
-
 BENT: Final = 2
 """Of how many refitted candidates."""
 
-STARTS: Final = 3
-"""From so many shapes a candidate is fitted whose shape is adapted."""
-
-KICK: Final = 0.1
-"""Part of the score's step from which a candidate is fitted a second time."""
-
-SHORT: Final = 0.8
-"""A first fit that gains less than this part of what the score promised is tried again."""
+BEGUN: Final = 2
+"""So often a search begins again from a better baseline."""
 
 ZERO: Final = "encoder_offset"
 """Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
-
-
-Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,14 +75,6 @@ class Attempt:
     held_gain: float
     accepted: bool
     stage: int
-
-
-@dataclasses.dataclass(frozen=True)
-class Found:
-    """A trial and how it does on what was held back."""
-
-    trial: Trial
-    held: Held
 
 
 class Search:
@@ -137,16 +109,18 @@ class Search:
         self.base = Found(base, tried(evidence, base))
         self.attempts: list[Attempt] = []
         self.first: Scores | None = None
+        self._begun = 0
         # What was computed once is not again: rivals are often candidates that were tried.
         self._scores: dict[Key, Scores] = {}
-        self._trials: dict[tuple[Key, Key], Found | None] = {}
+        self._refits = Refits(evidence)
         self._rests: dict[Key, Trial] = {key_of(base.chosen): base}
 
     def _begin_again(self, base: Trial) -> None:
         """Forget everything but a better baseline."""
+        self._begun += 1
         self.base = Found(base, tried(self.evidence, base))
         self.attempts, self.first = [], None
-        self._scores, self._trials = {}, {}
+        self._scores, self._refits = {}, Refits(self.evidence)
         self._rests = {key_of(base.chosen): base}
 
     def run(self) -> Found:
@@ -156,7 +130,7 @@ class Search:
             following = self._following(best)
             if following is None:
                 break
-            if not best.trial.chosen:
+            if not best.trial.chosen and self._begun < BEGUN:
                 better = self._better_base(following.trial)
                 if better is not None:
                     self._begin_again(better)
@@ -220,7 +194,9 @@ class Search:
                 refitted.append((found, places))
         refitted.sort(key=lambda pair: pair[0].trial.bic(level))
         # A shape that was only scanned may lose to another effect for that reason.
-        refitted[:BENT] = [(self._bent(current.trial, f), places) for f, places in refitted[:BENT]]
+        refitted[:BENT] = [
+            (self._refits.bent(current.trial, f), places) for f, places in refitted[:BENT]
+        ]
         refitted.sort(key=lambda pair: pair[0].trial.bic(level))
         accepted = None
         for found, places in refitted:
@@ -241,88 +217,8 @@ class Search:
         return [[a, b]] if gain - alone > 2 * GATE * level else []
 
     def refit(self, trial: Trial, scores: Scores, places: Sequence[int]) -> Found | None:
-        """Fit candidates from the score's whole step, and from a part of it if that fails."""
-        added = [scores.scores[k].candidate for k in places]
-        key = (key_of(trial.chosen), key_of(added))
-        if key not in self._trials:
-            self._trials[key] = self._refitted(trial, scores, places, added)
-        return self._trials[key]
-
-    def _refitted(
-        self,
-        trial: Trial,
-        scores: Scores,
-        places: Sequence[int],
-        added: Sequence[Candidate],
-    ) -> Found | None:
-        start = {n: v for k in places for n, v in scores.scores[k].start.items()}
-        found = self._fit(trial, added, start)
-        if len(added) == 1 and added[0].adapted:
-            for k in self._other_shapes(scores, places[0]):
-                bent = scores.scores[k]
-                again = self._fit(trial, [bent.candidate], bent.start)
-                found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
-        promised = scores.together(places)
-        if found is None or trial.chi2 - found.chi2 < SHORT * promised:
-            sizes = {candidate.free[0] for candidate in added}
-            kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
-            other = self._fit(trial, added, kick)
-            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
-        if found is None:
-            return None
-        try:
-            return Found(found, tried(self.evidence, found))
-        except InputError:
-            return None  # what was held back leads out of the range of numbers
-
-    def _other_shapes(self, scores: Scores, place: int) -> list[int]:
-        """Return the next best shapes of a candidate: the score at size 0 is not all there is."""
-        one = scores.scores[place]
-        shapes = [
-            k
-            for k, s in enumerate(scores.scores)
-            if s.candidate.name == one.candidate.name and k != place and s.gain > WORTH * one.gain
-        ]
-        return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: STARTS - 1]
-
-    def _bent(self, trial: Trial, found: Found) -> Found:
-        """Return a fit whose last effect has its scanned shape brought to its best by parabolas."""
-        candidate = found.trial.chosen[-1]
-        scanned = [n for n in candidate.shape if f"{candidate.name}.{n}" not in candidate.adapted]
-        if not scanned or candidate.counts_turns or len(found.trial.chosen) > len(trial.chosen) + 1:
-            return found
-        name = scanned[0]
-        fits = {candidate.shape[name]: found.trial}
-
-        def fit_at(value: float) -> None:
-            nearest = fits[min(fits, key=lambda x: abs(math.log(x / value)))]
-            bent = dataclasses.replace(candidate, shape={**candidate.shape, name: value})
-            again = self._fit(trial, [bent], nearest.start)
-            if again is not None:
-                fits[value] = again
-
-        width = FIRST_BEND
-        for _ in range(BENDS):
-            best = min(fits, key=lambda x: fits[x].chi2)
-            for other in (best / width, best * width):
-                fit_at(other)
-            vertex = _vertex(fits)
-            if vertex is not None:
-                fit_at(vertex)
-            width = math.sqrt(width)
-        best_trial = min(fits.values(), key=_chi2)
-        try:
-            return Found(best_trial, tried(self.evidence, best_trial))
-        except InputError:
-            return found
-
-    def _fit(
-        self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]
-    ) -> Trial | None:
-        try:
-            return with_candidates(self.evidence, trial, added, start)
-        except InputError:
-            return None  # the start leads out of the range of numbers
+        """Return a trial's model with candidates, those at some places of the scores, fitted."""
+        return self._refits.refit(trial, scores, places)
 
     def accepts(self, current: Found, found: Found) -> bool:
         """Whether a model is better than one with fewer effects, by more than chance."""
@@ -395,24 +291,3 @@ class Search:
                     self._note(Found(rest, best.held), other, scores, [k], good=True)
                     return self._without_idle(other)
         return best
-
-
-def _vertex(fits: dict[float, Trial]) -> float | None:
-    """Return where the parabola through the best fit and its neighbours is least."""
-    places = sorted(fits)
-    k = places.index(min(fits, key=lambda x: fits[x].chi2))
-    if not 0 < k < len(places) - 1:
-        return None
-    x = np.log(places[k - 1 : k + 2])
-    y = np.array([fits[p].chi2 for p in places[k - 1 : k + 2]])
-    a, b, _ = np.polyfit(x - x[1], y, 2)
-    return float(math.exp(x[1] - b / (2 * a))) if a > 0 else None
-
-
-def key_of(chosen: Sequence[Candidate]) -> Key:
-    """Return what a set of candidates is known by."""
-    return frozenset((c.name, tuple(sorted(c.shape.items()))) for c in chosen)
-
-
-def _chi2(trial: Trial) -> float:
-    return trial.chi2

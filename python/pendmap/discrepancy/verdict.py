@@ -12,8 +12,9 @@ from pendmap.discrepancy.rivals import Standing, standing_of
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.runs import RunByRun
-    from pendmap.discrepancy.select import Found, Search
+    from pendmap.discrepancy.select import Search
 
 __all__ = ["Judgement", "judge"]
 

@@ -1,0 +1,168 @@
+"""Candidates fitted, from the score's step, from other shapes, and with their shapes refined."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.discrepancy.trial import Held, Trial, tried, with_candidates
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.discrepancy.candidates import Candidate
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.scores import Scores
+
+__all__ = ["WORTH", "Found", "Key", "Refits", "key_of"]
+
+WORTH: Final = 0.4
+"""The part of the greatest score that a candidate's must have to be refitted beside it."""
+
+STARTS: Final = 3
+"""From so many shapes a candidate is fitted whose shape is adapted."""
+
+FIRST_BEND: Final = 1.1
+"""Ratio of neighbouring shapes that are tried about the best one of the scan; then its root."""
+
+BENDS: Final = 3
+"""How often."""
+
+KICK: Final = 0.1
+"""Part of the score's step from which a candidate is fitted a second time."""
+
+SHORT: Final = 0.8
+"""A first fit that gains less than this part of what the score promised is tried again."""
+
+Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """A trial and how it does on what was held back."""
+
+    trial: Trial
+    held: Held
+
+
+class Refits:
+    """Fits of candidates; what was computed once is not again.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    """
+
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence = evidence
+        self._known: dict[tuple[Key, Key], Found | None] = {}
+
+    def refit(self, trial: Trial, scores: Scores, places: Sequence[int]) -> Found | None:
+        """Fit candidates from the score's whole step, and from a part of it if that fails."""
+        added = [scores.scores[k].candidate for k in places]
+        key = (key_of(trial.chosen), key_of(added))
+        if key not in self._known:
+            self._known[key] = self._refitted(trial, scores, places, added)
+        return self._known[key]
+
+    def _refitted(
+        self,
+        trial: Trial,
+        scores: Scores,
+        places: Sequence[int],
+        added: Sequence[Candidate],
+    ) -> Found | None:
+        start = {n: v for k in places for n, v in scores.scores[k].start.items()}
+        found = self._fit(trial, added, start)
+        if len(added) == 1 and added[0].adapted:
+            for k in self._other_shapes(scores, places[0]):
+                bent = scores.scores[k]
+                again = self._fit(trial, [bent.candidate], bent.start)
+                found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
+        promised = scores.together(places)
+        if found is None or trial.chi2 - found.chi2 < SHORT * promised:
+            sizes = {candidate.free[0] for candidate in added}
+            kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
+            other = self._fit(trial, added, kick)
+            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+        if found is None:
+            return None
+        try:
+            return Found(found, tried(self.evidence, found))
+        except InputError:
+            return None  # what was held back leads out of the range of numbers
+
+    def _other_shapes(self, scores: Scores, place: int) -> list[int]:
+        """Return the next best shapes of a candidate: the score at size 0 is not all there is."""
+        one = scores.scores[place]
+        shapes = [
+            k
+            for k, s in enumerate(scores.scores)
+            if s.candidate.name == one.candidate.name and k != place and s.gain > WORTH * one.gain
+        ]
+        return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: STARTS - 1]
+
+    def bent(self, trial: Trial, found: Found) -> Found:
+        """Return a fit whose last effect has its scanned shape brought to its best by parabolas."""
+        candidate = found.trial.chosen[-1]
+        scanned = [n for n in candidate.shape if f"{candidate.name}.{n}" not in candidate.adapted]
+        if not scanned or candidate.counts_turns or len(found.trial.chosen) > len(trial.chosen) + 1:
+            return found
+        name = scanned[0]
+        fits = {candidate.shape[name]: found.trial}
+
+        def fit_at(value: float) -> None:
+            nearest = fits[min(fits, key=lambda x: abs(math.log(x / value)))]
+            bent = dataclasses.replace(candidate, shape={**candidate.shape, name: value})
+            again = self._fit(trial, [bent], nearest.start)
+            if again is not None:
+                fits[value] = again
+
+        width = FIRST_BEND
+        for _ in range(BENDS):
+            best = min(fits, key=lambda x: fits[x].chi2)
+            for other in (best / width, best * width):
+                fit_at(other)
+            vertex = _vertex(fits)
+            if vertex is not None:
+                fit_at(vertex)
+            width = math.sqrt(width)
+        best_trial = min(fits.values(), key=_chi2)
+        try:
+            return Found(best_trial, tried(self.evidence, best_trial))
+        except InputError:
+            return found
+
+    def _fit(
+        self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]
+    ) -> Trial | None:
+        try:
+            return with_candidates(self.evidence, trial, added, start)
+        except InputError:
+            return None  # the start leads out of the range of numbers
+
+
+def _vertex(fits: dict[float, Trial]) -> float | None:
+    """Return where the parabola through the best fit and its neighbours is least."""
+    places = sorted(fits)
+    k = places.index(min(fits, key=lambda x: fits[x].chi2))
+    if not 0 < k < len(places) - 1:
+        return None
+    x = np.log(places[k - 1 : k + 2])
+    y = np.array([fits[p].chi2 for p in places[k - 1 : k + 2]])
+    a, b, _ = np.polyfit(x - x[1], y, 2)
+    return float(math.exp(x[1] - b / (2 * a))) if a > 0 else None
+
+
+def key_of(chosen: Sequence[Candidate]) -> Key:
+    """Return what a set of candidates is known by."""
+    return frozenset((c.name, tuple(sorted(c.shape.items()))) for c in chosen)
+
+
+def _chi2(trial: Trial) -> float:
+    return trial.chi2
