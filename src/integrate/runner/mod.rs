@@ -180,14 +180,13 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let one = Q::splat(token, 1.0);
         let length = Q::splat(token, table.length);
         let clock = Shared { forcing: &table.steps()[k], length };
-        let corner = match &self.corner {
-            Some(corner) => Some((
-                corner,
-                corner.forcing(Q::splat(token, time[0])),
-                corner.forcing(Q::splat(token, time[1])),
-            )),
-            None => None,
-        };
+        // No closure: it would lose the instruction set.
+        let mut corner = None;
+        if let Some(own) = &self.corner {
+            let begin = own.forcing(Q::splat(token, time[0]));
+            let end = own.forcing(Q::splat(token, time[1]));
+            corner = Some((own, begin, end));
+        }
         let mut at = 0;
         while at < block.kick.len() {
             let half_turns = Q::load(token, &block.half_turns[at..]);
