@@ -48,3 +48,5 @@ def test_few_samples_a_period_are_said() -> None:
     lost = identify(*record(decay(), seconds=90, rate=4), methods=names)["combined"]
     assert not lost.applicable
     assert "the record ends above it" not in lost.warnings[-1]
+    short = identify(*record(decay(), seconds=6, rate=1000), methods=["combined"])["combined"]
+    assert "the record ends above it" in short.warnings[-1]

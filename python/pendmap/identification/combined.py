@@ -172,21 +172,25 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
     """
     peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    why = _unresolved(*samples(time, theta, trusted), cut)
+    why = _unresolved(*samples(time, theta, trusted), peaks, cut)
     return from_peaks(peaks, reading=reading, cut=cut, why=why)
 
 
-def _unresolved(time: Floats, theta: Floats, cut: float) -> str:
+def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> str:
     """Return that peaks were lost, in words, where a record goes on below a cut."""
-    if time.size < _FEWEST:
+    if time.size < _FEWEST or len(peaks) < 2:  # noqa: PLR2004 (one half swing)
         return ""
     size = np.abs(theta - np.median(theta[-(theta.size // 4) :]))
     above = np.flatnonzero(size >= cut)
-    late = theta[(above[-1] + 1 if above.size else 0) :]
+    first = int(above[-1]) + 1 if above.size else 0
+    # Within a half swing after the last large peak nothing is lost; turns are those of noise.
+    if first == time.size or time[-1] - time[first] < 2 * np.diff(peaks.time).min():
+        return ""
+    late = theta[first:]
     turns = np.count_nonzero(np.diff(np.sign(np.diff(late))))
     if turns < _FEWEST:
         return ""
-    return f"peaks are not resolved by {2 * late.size / turns:.2g} samples a period"
+    return "peaks are not resolved: too few samples a period"
 
 
 def identify_odd_ends(
