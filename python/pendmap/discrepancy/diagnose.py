@@ -16,9 +16,9 @@ from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy.refit import Found
     from collections.abc import Callable, Collection
 
+    from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
     from pendmap.model import Rig
     from pendmap.records import Experiment
