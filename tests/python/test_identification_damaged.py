@@ -10,7 +10,7 @@ import pytest
 
 from decays import decay, record
 from pendmap import InputError
-from pendmap.identification import identify, starting_values, table1
+from pendmap.identification import find_peaks, identify, starting_values, table1
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,3 +69,12 @@ def test_a_damaged_record_ends_in_a_result_or_a_line(name: str) -> None:
             assert "\n" not in str(error)  # noqa: PT017 (either is right)
         else:
             assert start.w0 > 0
+
+
+def test_no_peak_lies_beyond_the_readings() -> None:
+    # Lines drawn between readings have no noise of their own, and bends where readings were.
+    time, angle = record(PENDULUMS[0], seconds=84, counts=4096, noise_deg=0.1)
+    dense = np.arange(time[0], time[-1], 2e-4)
+    found = find_peaks(dense, np.interp(dense, time, angle))
+    assert len(found) > 0
+    assert np.abs(found.amplitude).max() < 1.01 * np.abs(angle).max()

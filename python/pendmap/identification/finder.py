@@ -84,7 +84,11 @@ class Finder:
             near, time = time, found
             if abs(time - near) < 0.1 * self.step:
                 break
-        return None if fit is None else self._end(fit, time)
+        if fit is None:
+            return None
+        end = self._end(fit, time)
+        # An instant less certain than the window is wide: no bend is seen, and nothing turns there.
+        return end if end.stderr_time <= 2 * fit.half else None
 
     def _end(self, fit: LocalFit, time: float) -> End:
         (value, gain), (_, slope_gain), (bend, _) = (fit.at(time, j) for j in range(3))
