@@ -51,7 +51,7 @@ def cells(
             dims,
             raw["settle"].reshape(shape),
             {
-                "long_name": "forcing periods until an attractor's trap holds the trajectory",
+                "long_name": "periods until an attractor's trap holds the trajectory",
                 "units": "1",
                 "comment": "-1 where no attractor captured it",
             },

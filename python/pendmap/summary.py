@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from pendmap.model.units import Units
+from pendmap.model.units import TIME, Units
 from pendmap.words import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import xarray as xr
 
@@ -155,9 +155,16 @@ def _settling(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     if a["longest_settle"] < 0:
         return []
+    own = "" if a["p"] != 0 else f" (without drive a period is {_own_period(a)})"
     return [
-        f"Settling takes {a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most."
+        f"Settling takes {a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
+        f"{own}."
     ]
+
+
+def _own_period(attrs: Mapping[Any, Any]) -> str:
+    units = Units.of(attrs)
+    return f"{units.own_period} = {units.given(math.tau, TIME):.4g} s" if units.si else "2 pi"
 
 
 def _texture(dataset: xr.Dataset) -> list[str]:

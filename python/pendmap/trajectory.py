@@ -15,6 +15,7 @@ from pendmap.model import Units, without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -184,13 +185,20 @@ def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> d
     }
 
 
+def _since_start(turns: int) -> str:
+    """Say how many full turns lie between start and end; nothing where there are none."""
+    if turns == 0:
+        return ""
+    return f" ({counted(abs(turns), 'full turn')} {'forward' if turns > 0 else 'backward'})"
+
+
 def _summary(dataset: xr.Dataset, units: Units) -> str:
     a = dataset.attrs
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
     lines = [
         (
-            f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad "
-            f"({a['turns']} net turns), velocity = {units.spoken(format(velocity, '.9g'))}."
+            f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad"
+            f"{_since_start(a['turns'])}, velocity = {units.spoken(format(velocity, '.9g'))}."
         ),
         (
             f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decays import decay, record
-from pendmap.identification import Peaks, combined, decrement, repair
+from pendmap.identification import Peaks, combined, de_paula, decrement, log_decrement, repair
 from pendmap.identification.period import frequency, mean_period
 
 WIDE = decay()
@@ -182,3 +182,21 @@ def test_a_missing_peak_is_not_bridged() -> None:
     assert any("peaks are missing" in text for text in found.warnings)
     whole = combined.identify(time, angle)
     assert not any("peaks are missing" in text for text in whole.warnings)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_short_record_is_told_how_many_peaks_of_how_many_it_lacks(count: int) -> None:
+    """Two peaks lie between 12 and 90 degrees, ``count`` of them below."""
+    small = math.radians(11.0) * 0.9 ** np.arange(count)
+    size = np.concatenate(([1.4, 0.4], small)) * (-1.0) ** np.arange(count + 2)
+    made = Peaks.of(np.arange(count + 2) * 0.5, size)
+    total = count + 2
+    for method, least in ((combined.from_peaks, 4), (repair.from_peaks, 6)):
+        said = method(made).warnings[-1]
+        assert f"{count} of {total} peaks under 12 degrees, {least} are needed" in said
+    if count < 3:
+        said = log_decrement.from_peaks(made).warnings[-1]
+        assert f"{count} of {total} peaks under 12 degrees, 3 are needed" in said
+    found = de_paula.from_peaks(made).warnings
+    assert f"2 of {total} peaks between 12 and 90 degrees, 3 are needed" in found[0]
+    assert len(found) == (2 if count < 3 else 1)

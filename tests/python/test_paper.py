@@ -54,7 +54,6 @@ def test_one_figure(pendmap_command: Run, tmp_path: Path) -> None:
 
 
 def test_all_that_are_there(pendmap_command: Run, tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
     run = pendmap_command("paper", "all", "--out", "out", "--json")
     assert run.returncode == 0, run.stderr
     files = json.loads(run.stdout)["files"]
@@ -72,19 +71,32 @@ def test_all_that_are_there(pendmap_command: Run, tmp_path: Path) -> None:
 def test_the_table_is_printed(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("paper", "table1", "--seed", 1, "--plot", "table.pdf")
     assert run.returncode == 0, run.stderr
-    for words in ("trajectory", "log_decrement", "16.95 %", "Written: table.pdf"):
+    for words in ("trajectory", "log_decrement", "16.95 %", "Written: table.pdf, table.csv"):
         assert words in run.stdout
-    assert [path.name for path in tmp_path.iterdir()] == ["table.pdf"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["table.csv", "table.pdf"]
+    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+        assert [row["what"] for row in csv.DictReader(file)] == ["period", "period", "peak", "peak"]
 
 
 def test_options_that_do_not_go_together(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("paper", "all", "--plot", "a.png")
     assert run.returncode == 2
     assert "--plot is one file" in run.stderr
-    run = pendmap_command("paper", "4", "--out", "nowhere")
+    run = pendmap_command("paper", "3", "--plot", "a.png", "--out", "there")
     assert run.returncode == 2
-    assert "nowhere" in run.stderr
+    assert "--plot and --out: allowed is one of them" in run.stderr
+    run = pendmap_command("paper", "8", "--out", "there")
+    assert run.returncode == 2
     assert not list(tmp_path.iterdir())
+    run = pendmap_command("paper", "3", "--out", "nowhere/there")
+    assert run.returncode == 2
+    assert "nowhere/there: No such file or directory" in run.stderr
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "file").write_text("mine")
+    run = pendmap_command("paper", "3", "--out", "file")
+    assert run.returncode == 2
+    assert "'file' is a file" in run.stderr
+    assert run.stderr.count("\n") == 1
 
 
 def test_the_same_seed_gives_the_same_record() -> None:

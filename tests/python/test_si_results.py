@@ -200,7 +200,7 @@ def test_results_in_si_are_stored_and_drawn(tmp_path: Path, suffix: str) -> None
         assert back.attrs["gamma"] == pytest.approx(0.05 / 6.2)
         effects = json.loads(back.attrs["effects"])
         assert effects[0] == {"name": "quadratic_drag", "parameters": {"q": 0.01}}
-        assert "quadratic_drag (q = 0.01), bearing_harmonic" in back.attrs["title"]
+        assert "quadratic_drag (q = 0.01 1/rad), bearing_harmonic" in back.attrs["title"]
         assert "w0 = 6.2 rad/s" in back.attrs["title"]
         assert figures.draw(back, tmp_path / f"{name}.svg").stat().st_size > 1000
         assert viewer.record(back, tmp_path / f"{name}.rrd").stat().st_size > 1000
@@ -211,7 +211,8 @@ def test_axes_are_named_in_the_units_of_the_result() -> None:
     parameters = layers.parameters(run.attrs)
     assert parameters == (
         "w0 = 6.2 rad/s,  c/m = 0.05 1/s,  p = 0.3,  Ω = 12 rad/s,  phase = 0.4,  "
-        "Tr = 0.08 rad/s²,  quadratic drag,  bearing harmonic"
+        "Tr = 0.08 rad/s²;   quadratic drag (q = 0.01 1/rad),  "
+        "bearing harmonic (amplitude = 1.5 rad/s^2, n = 4, psi = 0.3 rad)"
     )
     for model, clock, speed in ((SWING, "t (s)", "dθ/dt (rad/s)"), (SWING.pendulum, "τ", "dθ/dτ")):
         run = pendmap.simulate(model, 1.0, 3.0, 5.0)
@@ -229,3 +230,44 @@ def test_titles_leave_out_what_is_zero() -> None:
     assert Pendulum(p=0).title == "γ = 0.1, p = 0"
     assert Rig(w0=6.2).title == "w0 = 6.2 rad/s, c/m = 0 1/s, p = 0"
     assert "lab time = 30 s" in Rig(w0=6.2, lab_time_s=30).title
+
+
+def test_effects_are_named_with_units() -> None:
+    effects = (
+        Effect("stribeck_friction", {"a": 0.5, "vs": 2.0}),
+        Effect("power_law_drag", {"q": 0.01, "n": 1.5}),
+        Effect("encoder_offset", {"d": -0.01}),
+    )
+    title = Rig(w0=2.0, effects=effects).title
+    for said in ("a = 0.5 rad/s^2, vs = 2 rad/s", "n = 1.5)", "(d = -0.01 rad)"):
+        assert said in title
+    bare = Rig(w0=2.0, effects=effects).pendulum.title  # over w0^2, over w0; an angle stays one
+    assert "stribeck_friction (a = 0.125, vs = 1)" in bare
+    assert "encoder_offset (d = -0.01 rad)" in bare
+
+
+@pytest.mark.parametrize(
+    ("model", "own", "said"),
+    [
+        (Rig(w0=6.2, c_over_m=0.5), "2π/w0", "a period is 2 pi / w0 = 1.013 s"),
+        (Pendulum(p=0), "2π", "a period is 2 pi)"),
+    ],
+)
+def test_periods_without_drive_are_said_in_the_units_of_the_map(
+    model: Rig | Pendulum, own: str, said: str
+) -> None:
+    result = pendmap.basins(model, Grid.square(8))
+    assert layers.unit(result, "settle") == f"periods of {own} to settle"
+    assert said in result.attrs["summary"]
+    assert "forcing" not in result.settle_periods.attrs["long_name"]
+
+
+@pytest.mark.parametrize(
+    ("velocity", "said"), [(0.0, "rad, velocity"), (-9.0, "full turns backward)")]
+)
+def test_turns_since_the_start_are_said_in_words(velocity: float, said: str) -> None:
+    run = pendmap.simulate(Pendulum(gamma=0.01, p=0), 0.5, velocity, 20.0)
+    line = run.attrs["summary"].splitlines()[0]
+    assert said in line
+    full = (0.5 - float(run.theta[-1])) / math.tau
+    assert str(round(full)) in line or velocity == 0

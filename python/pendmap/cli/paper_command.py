@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.types import OutputFile
-from pendmap.files import held_interrupts
+from pendmap.checks import MOST_SEED
+from pendmap.cli.show import write_all
+from pendmap.cli.types import OutputFile, Whole
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
     from pendmap.identification import IdentificationReport
 
 __all__ = ["command"]
@@ -23,21 +27,25 @@ _PICTURES = (".png", ".svg", ".pdf")
 @click.argument("figure", metavar="FIGURE", nargs=-1, required=True)
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, file_okay=False, exists=True),
-    default=Path(),
+    type=click.Path(path_type=Path, file_okay=False),
+    default=None,
     metavar="DIR",
-    help="Folder for the files.  [default: the current one]",
+    help="Folder for the files, made if it is not there.  [default: the current one]",
 )
-@click.option("--plot", type=OutputFile(_PICTURES), help="File of one figure: .png .svg .pdf.")
 @click.option(
-    "--seed", type=click.IntRange(min=0), default=0, help="Of the rig's noise.  [default: 0]"
+    "--plot",
+    type=OutputFile(_PICTURES),
+    help="File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
+)
+@click.option(
+    "--seed", type=Whole(0, MOST_SEED), default=0, help="Of the rig's noise.  [default: 0]"
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="Do not say what was written.")
 def command(  # noqa: PLR0913 (an option each)
     *,
     figure: tuple[str, ...],
-    out: Path,
+    out: Path | None,
     plot: Path | None,
     seed: int,
     as_json: bool,
@@ -47,31 +55,38 @@ def command(  # noqa: PLR0913 (an option each)
 
     3 is the pendulum. The others are made on a virtual rig like the paper's: 4 a decay with its
     half cycles, 5 the decrements, 6 the decay by each model, 7 and table1 the errors of each.
-    Writes figure_4.png and so on, and table_1.csv.
+    Writes figure_3.png to figure_7.png and table_1.csv, those that are asked for.
     """
     from pendmap import paper_figures
 
     keys = paper_figures.wanted(" ".join(figure))
+    if plot is not None and out is not None:
+        raise click.UsageError("--plot and --out: allowed is one of them")
     if plot is not None and len(keys) > 1:
         raise click.UsageError("--plot is one file: allowed with one figure; --out takes a folder")
-    written: list[str] = []
-    try:
-        for key in keys:
-            with held_interrupts():
-                path = plot or out / _name(key)
-                if path.suffix == ".csv":
-                    paper_figures.write_table(paper_figures.report(seed), path)
-                else:
-                    paper_figures.draw(key, path, seed=seed)
-                written.append(str(path))
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(*written) from None
+    if out is not None:
+        out.mkdir(exist_ok=True)  # the folder above is there, as for every other file
+    written = write_all(_files(keys, out or Path(), plot, seed))
     if as_json:
         click.echo(json.dumps({"files": written}))
     elif not quiet:
         if paper_figures.TABLE in keys:
             _say(paper_figures.report(seed))
         click.echo("Written: " + ", ".join(written))
+
+
+def _files(
+    keys: Sequence[str], out: Path, plot: Path | None, seed: int
+) -> Iterator[tuple[Callable[[Path], Path], Path]]:
+    from pendmap import paper_figures
+
+    for key in keys:
+        path = plot or out / _name(key)
+        if path.suffix != ".csv":
+            yield functools.partial(paper_figures.draw, key, seed=seed), path
+        if key == paper_figures.TABLE:
+            table = functools.partial(paper_figures.write_table, paper_figures.report(seed))
+            yield table, path.with_suffix(".csv")
 
 
 def _say(found: IdentificationReport) -> None:

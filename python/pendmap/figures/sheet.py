@@ -239,7 +239,7 @@ def headed(
     left /= width
     figure.text(left, 1 - 0.27 / height, title, fontsize=12, weight="bold", va="center")
     for k, line in enumerate(lines):
-        down = 0.50 + LINE * (k - 0.25 * (len(lines) - 1))
+        down = 0.50 + LINE * (k - 0.2 * (len(lines) - 1))
         figure.text(left, 1 - down / height, line, color=QUIET, va="center", fontsize=font)
     return figure
 

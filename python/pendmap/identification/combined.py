@@ -10,6 +10,7 @@ import numpy as np
 from pendmap.identification.decrement import Reading, from_amplitudes
 from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.result import Identification
+from pendmap.identification.too_few import too_few
 from pendmap.identification.uncertainty import bootstrap, estimates, jacobian
 
 if TYPE_CHECKING:
@@ -73,12 +74,15 @@ def from_peaks(
     least = _FEWEST + (reading != "all") * 2
     if size.size < least:
         none = len(peaks) and not len(small)
-        known = (why or "the record ends above it") if none else "too few peaks"
-        text = (
-            f"not applicable: {size.size} peaks under {math.degrees(cut):.3g} degrees, {least} are "
-            f"needed: {known}"
+        return too_few(
+            name,
+            size.size,
+            least,
+            of=len(peaks.turned),
+            where=f"under {math.degrees(cut):.3g} degrees",
+            warnings=warnings,
+            because=(why or "the record ends above it") if none else "",
         )
-        return Identification(name, warnings=(*warnings, text), applicable=False)
     parity = int(small.index[0]) % 2
     count = len(small)
 

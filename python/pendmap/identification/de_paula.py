@@ -11,6 +11,7 @@ from pendmap.identification.combined import CUT, unphysical
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.period import frequency
 from pendmap.identification.result import Identification
+from pendmap.identification.too_few import too_few
 from pendmap.identification.uncertainty import estimates, jacobian, least_squares_line
 
 if TYPE_CHECKING:
@@ -80,10 +81,14 @@ def from_peaks(
     size = np.abs(turned.amplitude)
     windows = {"fast": fast, "slow": slow}
     chosen = {n: turned.select((size >= low) & (size < high)) for n, (low, high) in windows.items()}
-    for name, some in chosen.items():
-        if len(some) < _FEWEST:
-            text = f"not applicable: {len(some)} peaks {_between(windows[name])}, 3 are needed"
-            return Identification(_NAME, warnings=(text,), applicable=False)
+    lacking = [
+        too_few(_NAME, len(some), _FEWEST, of=len(turned), where=_between(windows[name]))
+        for name, some in chosen.items()
+        if len(some) < _FEWEST
+    ]
+    if lacking:  # both windows are said where both are wanting
+        texts = tuple(text for each in lacking for text in each.warnings)
+        return Identification(_NAME, warnings=texts, applicable=False)
     quick, slack = chosen["fast"], chosen["slow"]
     warnings = []
     speed = frequency(

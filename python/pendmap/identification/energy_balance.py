@@ -14,6 +14,7 @@ from pendmap.identification.local_fit import smoothed_velocity
 from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.period import frequency
 from pendmap.identification.result import Identification
+from pendmap.identification.too_few import too_few
 from pendmap.identification.uncertainty import estimates
 
 if TYPE_CHECKING:
@@ -73,11 +74,13 @@ def identify(
     t, x = samples(time, theta, trusted)
     turned = peaks.turned
     if len(turned) < _FEWEST:
-        text = f"not applicable: {len(turned)} peaks, {_FEWEST} are needed"
-        return Identification(_NAME, warnings=(text,), applicable=False)
+        return too_few(_NAME, len(turned), _FEWEST)
     pairs = np.flatnonzero(np.diff(turned.index) == 1)
     small = turned.select(np.abs(turned.amplitude) < _LARGEST)
-    if pairs.size < _FEWEST - 1 or len(small) < _FEWEST:
+    if len(small) < _FEWEST:
+        where = f"under {_LARGEST:g} rad"
+        return too_few(_NAME, len(small), _FEWEST, of=len(turned), where=where)
+    if pairs.size < _FEWEST - 1:
         text = f"not applicable: {pairs.size} whole half cycles, {_FEWEST - 1} are needed"
         return Identification(_NAME, warnings=(text,), applicable=False)
     w0 = frequency(small).w0

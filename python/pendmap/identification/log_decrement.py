@@ -11,6 +11,7 @@ from pendmap.identification.combined import CUT, unphysical
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.period import mean_period
 from pendmap.identification.result import Identification
+from pendmap.identification.too_few import too_few
 from pendmap.identification.uncertainty import estimates, jacobian, least_squares_line
 
 if TYPE_CHECKING:
@@ -71,8 +72,8 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     small = small.select(np.abs(small.amplitude) < cut)
     under = "" if math.isinf(cut) else f" under {math.degrees(cut):.3g} degrees"
     if len(small) < _FEWEST:
-        text = f"not applicable: {len(small)} peaks{under}, {_FEWEST} are needed"
-        return Identification(_NAME, warnings=(text,), applicable=False)
+        total = len(peaks.turned)
+        return too_few(_NAME, len(small), _FEWEST, of=total, where=under.strip())
     count, warnings = len(small), []
     half_cycles = (small.index - small.index[0]).astype(float)
     size = np.abs(small.amplitude)

@@ -14,6 +14,7 @@ from pendmap.identification.decrement import recursion
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.period import frequency
 from pendmap.identification.result import Identification
+from pendmap.identification.too_few import too_few
 from pendmap.identification.uncertainty import estimates, jacobian
 
 if TYPE_CHECKING:
@@ -72,11 +73,9 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     small, warnings = small_peaks(peaks, cut)
     count = len(small)
     if count < _FEWEST:
-        text = (
-            f"not applicable: {count} peaks under {math.degrees(cut):.3g} degrees, {_FEWEST} are "
-            "needed"
-        )
-        return Identification(_NAME, warnings=(*warnings, text), applicable=False)
+        under = f"under {math.degrees(cut):.3g} degrees"
+        total = len(peaks.turned)
+        return too_few(_NAME, count, _FEWEST, of=total, where=under, warnings=warnings)
     measured = small.amplitude
     sign = math.copysign(1.0, measured[0]) * (-1.0) ** np.arange(count)
     # Peaks that somebody else measured may come without errors: then all weigh the same.

@@ -162,11 +162,15 @@ class Effect:
         """Whether it changes with the time in the laboratory; maps hold that still."""
         return bool(definition(self.name)["mappable"] == "frozen")
 
-    @property
-    def title(self) -> str:
-        """Name and parameters, short."""
-        values = ", ".join(f"{name} = {value:.4g}" for name, value in self.parameters.items())
-        return f"{self.name} ({values})"
+    def title(self, units: Units) -> str:
+        """Return name and parameters, short: with their units in SI, else with those of angles."""
+        entries = definition(self.name)["parameters"]
+        shown = []
+        for entry in entries:
+            said = units.si or (entry["power_of_w0"] == 0 and entry["power_of_w0_less"] is None)
+            unit = entry["unit"] if said and entry["unit"] != "1" else ""
+            shown.append(f"{entry['name']} = {self.parameters[entry['name']]:.4g} {unit}".rstrip())
+        return f"{self.name} ({', '.join(shown)})"
 
     def given(self, units: Units) -> Effect:
         """Return an effect without dimensions in ``units``."""

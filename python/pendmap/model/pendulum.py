@@ -150,7 +150,7 @@ class Pendulum:
         drifting = "lab time" if any(effect.drifts for effect in self.effects) else ""
         shown += [(name, value) for name, value in others if value != 0 or name == drifting]
         parts = [f"{name} = {value:g}" for name, value in shown]
-        return ", ".join([*parts, *(effect.title for effect in self.effects)])
+        return ", ".join([*parts, *(effect.title(self.units) for effect in self.effects)])
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:

@@ -247,7 +247,7 @@ class Rig:
             ),
         )
         shown += [text for text, value in others if value != 0]
-        return ", ".join([*shown, *(effect.title for effect in self.effects)])
+        return ", ".join([*shown, *(effect.title(self.units) for effect in self.effects)])
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Rig:

@@ -88,10 +88,15 @@ class Units:
         return "per second" if self.si else "per unit of tau"
 
     @property
+    def own_period(self) -> str:
+        """What a period is where there is no drive: that of small swings."""
+        return "2 pi / w0" if self.si else "2 pi"
+
+    @property
     def section(self) -> str:
         """Where the stroboscopic section lies."""
-        period = "2 pi / Omega (2 pi / w0" if self.si else "2 pi / omega (2 pi"
-        return f"{self.clock} = 0 mod T, T = {period} without drive), at the drive's phase"
+        period = f"2 pi / {'Omega' if self.si else 'omega'} ({self.own_period} without drive)"
+        return f"{self.clock} = 0 mod T, T = {period}, at the drive's phase"
 
     @classmethod
     def of(cls, attributes: Mapping[Any, Any]) -> Units:

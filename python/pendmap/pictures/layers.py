@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.model import Effect
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.words import counted
@@ -179,26 +180,26 @@ def what(dataset: xr.Dataset, layer: str) -> str:
 
 
 def unit(dataset: xr.Dataset, layer: str) -> str:
-    """Return what a scalar layer counts, for a colour bar; without drive a period is 2 pi."""
+    """Return what a scalar layer counts, for a colour bar; without drive it says what a period is."""
     driven = float(dataset.attrs.get("p", 1.0)) != 0.0
+    units = Units.of(dataset.attrs)
+    own = units.own_period.replace(" pi", "\N{GREEK SMALL LETTER PI}").replace(" ", "")
     return {
-        "settle": "periods to settle"
-        if driven
-        else "periods of 2\N{GREEK SMALL LETTER PI} to settle",
+        "settle": "periods to settle" if driven else f"periods of {own} to settle",
         "turns": "net turns",
-        "exponent": f"exponent {names.per_time(Units.of(dataset.attrs))}",
+        "exponent": f"exponent {names.per_time(units)}",
     }[layer]
 
 
 def parameters(attrs: Mapping[Any, Any]) -> str:
-    """Return the model's parameters in one line, in its units, and the names of its effects.
+    """Return the model's parameters in one line, in its units, then its effects.
 
     Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
     there is no frequency and no phase.
     """
     driven = float(attrs.get("p", 1.0)) != 0.0
-    si = Units.of(attrs).si
-    symbols = _SI_SYMBOLS if si else {key: (text, "") for key, text in _SYMBOLS.items()}
+    units = Units.of(attrs)
+    symbols = _SI_SYMBOLS if units.si else {key: (text, "") for key, text in _SYMBOLS.items()}
     always = {"w0", "gamma", "c_over_m", "p", *(("omega", "Omega") if driven else ())}
     never = set() if driven else {"omega", "phase", "Omega", "phi"}
     parts = [
@@ -207,4 +208,6 @@ def parameters(attrs: Mapping[Any, Any]) -> str:
         if key in attrs and key not in never and (key in always or float(attrs[key]) != 0.0)
     ]
     effects = json.loads(attrs.get("effects", "[]"))
-    return ",  ".join([*parts, *(str(effect["name"]).replace("_", " ") for effect in effects)])
+    acting = [Effect(entry["name"], entry["parameters"]).title(units) for entry in effects]
+    said = ",  ".join(text.replace("_", " ").replace("-", "\N{MINUS SIGN}") for text in acting)
+    return ";   ".join([",  ".join(parts), *([said] if said else [])])

@@ -76,9 +76,7 @@ def strict() -> Iterator[None]:
 def describe(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     """Log the recording's name and, as properties, all attributes of the dataset."""
     attrs = dataset.attrs
-    stream.send_recording_name(
-        f"{attrs.get('title', attrs['kind'])} ({layering.parameters(attrs)})"
-    )
+    stream.send_recording_name(": ".join(str(attrs[k]) for k in ("kind", "title") if k in attrs))
     plain = {
         str(k): _plain(v) for k, v in attrs.items() if k != "summary" and _plain(v) is not None
     }
