@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from pendmap.store import load, save
     from pendmap.trajectory import advance, simulate
 
+    __version__: str
+
 __all__ = [
     "PRESETS",
     "Axis",
@@ -52,6 +54,7 @@ __all__ = [
     "Rig",
     "Run",
     "Segment",
+    "__version__",
     "advance",
     "basins",
     "basins_of",
@@ -86,6 +89,10 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
     """Import what needs numpy and xarray when it is first used: the command answers sooner."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("pendmap")
     if name in _HOMES:
         import importlib
 

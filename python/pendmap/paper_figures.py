@@ -30,7 +30,7 @@ __all__ = [
 
 TABLE: Final = "table1"
 FIGURES: Final = {
-    "3": "The pendulum",
+    "3": "The parametric pendulum",
     "4": "A decay, its velocity and half cycles",
     "5": "The decrement of each three peaks",
     "6": "The decay by each model",
@@ -110,15 +110,16 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:
         raise InputError(f"key is {key!r}: allowed is one figure")
-    if key == "3":
-        return figures.draw_pendulum(path)
     number = "Table 1" if key == TABLE else f"Figure {key}"
+    title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
+    if key == "3":
+        return figures.draw_pendulum(path, title=title)
     found = report(seed)
     return figures.draw_identification(
         found,
         path,
         parts=(_PARTS[key],),
-        title=f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}",
+        title=title,
         subtitle="virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s\u00b2, "
         "release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1\u00b0, zero off by 0.05\u00b0, "
         f"seed {seed}",

@@ -156,10 +156,8 @@ def _settling(dataset: xr.Dataset) -> list[str]:
     if a["longest_settle"] < 0:
         return []
     own = "" if a["p"] != 0 else f" (without drive a period is {_own_period(a)})"
-    return [
-        f"Settling takes {a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
-        f"{own}."
-    ]
+    times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
+    return [f"Settling takes {times}{own}."]
 
 
 def _own_period(attrs: Mapping[Any, Any]) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from decays import decay, record
 from pendmap.identification import Estimate
-from pendmap.identification.summary import with_error
+from pendmap.identification.digits import with_error
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,6 +14,7 @@ from pendmap.discrepancy.runs import RunByRun, run_by_run
 from pendmap.discrepancy.select import Attempt, Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
+from pendmap.notebook import Readable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -29,8 +30,8 @@ MOST_EFFECTS: Final = 3
 """So many effects are added at most."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Discrepancy:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Discrepancy(Readable):
     """Where model and records disagree, and why.
 
     Parameters
@@ -76,6 +77,19 @@ class Discrepancy:
     scores: Scores
     attempts: tuple[Attempt, ...]
     advice: Advice
+
+    def __repr__(self) -> str:
+        names = ", ".join(effect.name for effect in self.effects)
+        gap = f"rms {self.gap.before:.3g} to {self.gap.after:.3g} rad"
+        said = f"{self.verdict}: {names}" if names else self.verdict
+        path = self.evidence.experiment.path.name
+        return f"<Discrepancy {path}: {said}; {gap}, noise {self.gap.noise_floor:.3g}>"
+
+    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+        """Return the table and the lines that ``pendmap diagnose`` prints."""
+        from pendmap.discrepancy import summary  # noqa: PLC0415 (it is of diagnoses)
+
+        return [summary.ranking_table(self)], list(summary.as_text(self))
 
     @property
     def verdict(self) -> str:

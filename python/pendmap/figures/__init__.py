@@ -315,15 +315,17 @@ def draw_pendulum(
     *,
     size: tuple[float, float] | None = None,
     dpi: float | None = None,
+    title: str | None = None,
 ) -> Path:
     """Draw the pendulum with its moving pivot and its equation (eq. 2.1) into a file: figure 3.
 
-    Parameters, result and errors are those of :func:`draw_record`.
+    Parameters, result and errors are those of :func:`draw_record`; ``title`` stands above, by
+    default what is drawn.
     """
     from pendmap.figures import pendulum  # noqa: PLC0415 (likewise)
 
     resolution = style.resolution(dpi)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
-        style.write(pendulum.figure(size=size, dpi=resolution), part)
+        style.write(pendulum.figure(size=size, dpi=resolution, title=title), part)
     return Path(path)

@@ -2,83 +2,162 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from pendmap.figures import blocks, sides, style
 from pendmap.figures import sheet as sheets
 from pendmap.figures.decays import MOST, draw_residuals
-from pendmap.figures.errors import draw_errors
+from pendmap.figures.errors import draw_panels
 from pendmap.identification.compare import MODEL
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.pictures.methods import MEASURED, look
+from pendmap.words import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from pendmap.figures.blocks import Box
     from pendmap.identification import Comparison, RunComparison
 
-__all__ = ["MOST_RUNS", "figure"]
+__all__ = ["ALL", "CHOSEN", "figure"]
 
-MOST_RUNS: Final = 6
-"""Runs that are drawn: those held out first."""
-WIDTH: Final = 8.6
-"""Inches."""
-HIGH: Final = (2.9, 3.6)
-"""Inches of the record with its residual, and of the errors."""
+ALL: Final = 3
+"""Runs up to which each has a row of its own."""
+CHOSEN: Final = 2
+"""Rows where there are more: those held out first, then those that the model misses most."""
+WIDTH: Final = 11.6
+ROW: Final = 2.35
+ALONE: Final = 3.4
+OVERVIEW: Final = 1.95
+LEGEND: Final = 0.38
+"""Inches: of the sheet, of a run's row, of the only one, of the panel of all runs, of the legend.
+The whole is no higher than a screen is beside its width."""
+GAP: Final = 0.72
+"""Inches between the panels of a row."""
+SPREAD: Final = 10.0
+"""Greatest over least ratio from which on the panel of all runs has powers of ten."""
+HELD: Final = "#d55e00"
 _SI: Final = Units(si=True)
 
 
 def figure(comparison: Comparison, *, dpi: float = 200.0) -> Figure:
-    """Return the figure: each run with the model over it, the residual, figure 7."""
-    runs = sorted(comparison.runs, key=lambda one: not one.run.hold_out)[:MOST_RUNS]
-    high = sum(HIGH) * len(runs)
-    size = (WIDTH, high + sheets.TOP - 0.2)
-    said = f"{len(comparison.runs)} free decays" if len(comparison.runs) > 1 else runs[0].run.name
-    if len(comparison.runs) > len(runs):
-        said += f", {len(runs)} of them drawn"
+    """Return the figure: a row a run, with record and model, the residual, figure 7.
+
+    Where there are more than :data:`ALL` runs, all of them stand in one panel, and
+    :data:`CHOSEN` have rows.
+    """
+    every = comparison.runs
+    many = len(every) > ALL
+    ranked = sorted(every, key=lambda one: (not one.run.hold_out, -ratio(one)))
+    rows = ranked[:CHOSEN] if many else every
+    high = ALONE if len(rows) == 1 else ROW
+    top = high * len(rows) + (OVERVIEW if many else 0.0)
+    size = (WIDTH, top + LEGEND + 0.7)
+    said = counted(len(every), "free decay")
+    if many:
+        said += f"; below, {len(rows)} of them: held out first, then those missed most"
     made = sheets.headed(size, dpi, "Model against record", said, left=0.1)
+    _legend(made, rows, top + LEGEND)
     letters = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
-    top = high
-    for one in runs:
-        top -= HIGH[0]
-        _over_record(made, blocks.Box(0.0, top, WIDTH, HIGH[0]), one, letters)
-        top -= HIGH[1]
-        errors = {} if one.errors is None else {MODEL: one.errors}
-        box = blocks.Box(0.0, top, WIDTH, HIGH[1])
-        draw_errors(made, box, errors, one.peaks, letters, "Simulated periods and peaks")
+    if many:
+        top -= OVERVIEW
+        _overview(made, blocks.Box(0.0, top, WIDTH, OVERVIEW), every, letters)
+    for one in rows:
+        top -= high
+        _row(made, blocks.Box(0.0, top, WIDTH, high), one, letters)
     return made
 
 
-def _over_record(figure: Figure, box: Box, one: RunComparison, letters: Iterator[str]) -> None:
-    held = ", held out" if one.run.hold_out else ""
-    heading = f"{one.run.name}{held}: rms {one.rms:.3g} rad, noise {one.sigma:.2g} rad"
+def ratio(one: RunComparison) -> float:
+    """Return the rms of what a model misses, over the record's noise."""
+    return one.rms / one.sigma if one.sigma > 0 else math.inf
+
+
+def _legend(figure: Figure, rows: Sequence[RunComparison], top: float) -> None:
     style_of = look(MODEL)
-    handles = [
+    handles: list[Artist] = [
         Line2D([], [], color=MEASURED, marker=".", ls="", ms=5),
-        Line2D([], [], color=style_of.colour, lw=1.2),
+        Line2D([], [], color=style_of.colour, lw=1.6),
         Line2D([], [], color=MEASURED, lw=0.8, ls="--"),
     ]
-    room = blocks.named(figure, box, heading, handles, ["record", style_of.label, "its noise"])
-    left, right = (cell.panel(figure) for cell in room.columns(2, 0.85))
+    texts = ["record", style_of.label, "standard deviation of its noise"]
+    if any(one.errors and np.any(one.peaks.turned.stderr_amplitude > 0) for one in rows):
+        handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
+    blocks.named(figure, blocks.Box(0.0, top - 1.0, WIDTH, 1.0), "", handles, texts)
+
+
+def _overview(
+    figure: Figure, box: Box, runs: Sequence[RunComparison], letters: Iterator[str]
+) -> None:
+    """Draw how far the model is from each run, in units of its noise."""
+    axes = blocks.named(figure, box, "").panel(figure)
+    ratios = np.array([min(ratio(one), 1e12) for one in runs])
+    held = np.array([one.run.hold_out for one in runs])
+    axes.axhline(1.0, color=MEASURED, lw=0.8, ls="--")
+    places = np.arange(len(runs))
+    for which, colour in ((~held, look(MODEL).colour), (held, HELD)):
+        axes.plot(places[which], ratios[which], "o", color=colour, ms=5, mew=0)
+    low, high = min(float(ratios.min()), 1.0), max(float(ratios.max()), 1.0)
+    if high > SPREAD * low:
+        sides.log_axis(axes, "y", (low / 1.5, high * 1.5), "rms / noise")
+    else:
+        axes.set_ylim(0, 1.15 * high)
+        style.scale(axes, "y", (0, 1.15 * high), "rms / noise")
+    axes.set_xlim(-0.5, len(runs) - 0.5)
+    _names(axes, [one.run.name for one in runs])
+    held_out = "; orange: held out" if held.any() else ""
+    axes.set_title(next(letters) + f"all runs: the residual over the noise{held_out}")
+
+
+def _names(axes: Axes, texts: Sequence[str]) -> None:
+    """Name as many runs below a panel as there is room for."""
+    room = axes.get_window_extent().width / axes.figure.dpi / len(texts)
+    widest = max(style.inches(text, style.RC["xtick.labelsize"]) for text in texts) + 0.1
+    every = max(1, math.ceil(widest / room))
+    axes.set_xticks(range(0, len(texts), every), list(texts[::every]))
+
+
+def _row(figure: Figure, box: Box, one: RunComparison, letters: Iterator[str]) -> None:
     run = one.run
-    every = max(1, run.time.size // MOST)
-    shown = np.where(run.trusted, run.theta, np.nan)
-    # The reading of the model: what the sensor makes of its angle stands in the residual alone.
-    made = np.where(run.trusted, run.theta - one.residual, np.nan)
-    left.plot(run.time[::every], shown[::every], ".", color=MEASURED, ms=1.5, rasterized=True)
-    left.plot(run.time[::every], made[::every], color=style_of.colour, lw=0.7)
-    sides.angle_axis(left, shown[np.isfinite(shown)])
-    left.set_title(next(letters) + "the record, and the model over it")
+    held = ", held out" if run.hold_out else ""
+    heading = (
+        f"{run.name}{held}: rms {1e3 * one.rms:.3g} mrad, {ratio(one):.3g} times the noise of "
+        f"{1e3 * one.sigma:.3g} mrad"
+    )
+    cells = blocks.named(figure, box, heading).columns(4, GAP)
+    left, right = (cell.panel(figure) for cell in cells[:2])
+    _over_record(left, one)
+    left.set_title(next(letters) + "record and model")
     draw_residuals(right, run, one.residual, one.sigma, MODEL)
     right.set_title(next(letters) + "record less model")
     for axes in (left, right):
         ends = (float(run.time[0]), float(run.time[-1]))
         axes.set_xlim(*ends)
         style.scale(axes, "x", ends, names.clock(_SI))
+    if one.errors is None:
+        blocks.say(figure, cells[2], "Fewer than three peaks:\nno errors of periods and peaks.")
+        return
+    titles = (next(letters) + "error of each period", next(letters) + "error of each peak")
+    periods, peaks = (cell.panel(figure) for cell in cells[2:])
+    draw_panels(periods, peaks, {MODEL: one.errors}, one.peaks, titles)
+
+
+def _over_record(axes: Axes, one: RunComparison) -> None:
+    run = one.run
+    every = max(1, run.time.size // MOST)
+    shown = np.where(run.trusted, run.theta, np.nan)
+    # The reading of the model: what the sensor makes of its angle stands in the residual alone.
+    made = np.where(run.trusted, run.theta - one.residual, np.nan)
+    axes.plot(run.time[::every], shown[::every], ".", color=MEASURED, ms=1.5, rasterized=True)
+    axes.plot(run.time[::every], made[::every], color=look(MODEL).colour, lw=0.7)
+    sides.angle_axis(axes, shown[np.isfinite(shown)])

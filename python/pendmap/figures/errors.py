@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pendmap.figures.blocks import Box
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
 
-__all__ = ["BLOCK", "draw_errors"]
+__all__ = ["BLOCK", "draw_panels"]
 
 PEAK: Final = "measured peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 _SI: Final = Units(si=True)
@@ -36,18 +36,7 @@ def _draw(
     figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
 ) -> None:
     errors = {name: report.table.errors[name] for name in drawn(report.table.errors)}
-    draw_errors(figure, box, errors, report.peaks, letters, title)
-
-
-def draw_errors(  # noqa: PLR0913, PLR0917 (where, what, and how it is named)
-    figure: Figure,
-    box: Box,
-    errors: Mapping[str, PeakErrors],
-    peaks: Peaks,
-    letters: Iterator[str],
-    title: str,
-) -> None:
-    """Draw the errors of periods and peaks by model, with what the noise of the peaks explains."""
+    peaks = report.peaks
     if not errors:
         room = blocks.named(figure, box, title)
         blocks.say(figure, room, NOTHING)
@@ -57,6 +46,21 @@ def draw_errors(  # noqa: PLR0913, PLR0917 (where, what, and how it is named)
         handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
     room = blocks.named(figure, box, title, handles, texts)
     left, right = (cell.panel(figure) for cell in room.columns(2, 0.85))
+    titles = (
+        next(letters) + "of each period",
+        next(letters) + "of each peak; time runs to the left",
+    )
+    draw_panels(left, right, errors, peaks, titles)
+
+
+def draw_panels(
+    left: Axes,
+    right: Axes,
+    errors: Mapping[str, PeakErrors],
+    peaks: Peaks,
+    titles: tuple[str, str],
+) -> None:
+    """Draw the errors of periods and peaks by model, with what the noise of the peaks explains."""
     for name, each in errors.items():
         one = look(name)
         for axes, x, y in (
@@ -68,8 +72,8 @@ def draw_errors(  # noqa: PLR0913, PLR0917 (where, what, and how it is named)
     _noise(left, right, peaks.turned, some)
     sides.signed_log_axis(left, [e.period_error for e in errors.values()], "error (%)")
     sides.signed_log_axis(right, [e.peak_error[1:] for e in errors.values()], "error (%)")
-    left.set_title(next(letters) + "of each period")
-    right.set_title(next(letters) + "of each peak; time runs to the left")
+    left.set_title(titles[0])
+    right.set_title(titles[1])
     if some.period_time.size:
         ends = (float(some.period_time[0]), float(some.period_time[-1]))
         pad = 0.02 * (ends[1] - ends[0]) or 0.5

@@ -15,14 +15,17 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
+TITLE: Final = "The parametric pendulum"
 SIZE: Final = (6.0, 5.6)
 """Inches."""
 THETA: Final = math.radians(38.0)
 """How far it is drawn out."""
 LENGTH: Final = 3.0
 BOB: Final = 0.3
+ASIDE: Final = 0.5
 """Lengths in units of the drawing, of which one is an inch."""
 
+_DRIVE: Final = "cos(\u03a9t + \u03c6)"
 _STEEL: Final = "#3d4f66"
 _DARK: Final = "#1d3557"
 _RAIL: Final = "#b8c2cf"
@@ -31,13 +34,19 @@ _MOTION: Final = "#0072b2"
 _HELP: Final = "#8a8a8a"
 
 
-def figure(*, size: tuple[float, float] | None = None, dpi: float = 200.0) -> Figure:
-    """Return the drawing: pivot, rod, bob, angle, excitation, gravity, torques of friction."""
+def figure(
+    *, size: tuple[float, float] | None = None, dpi: float = 200.0, title: str | None = None
+) -> Figure:
+    """Return the drawing: pivot, rod, bob, angle, excitation, gravity, torques of friction.
+
+    The pivot's acceleration upward, p g cos(Omega t + phi), adds to gravity; so its place is
+    ``-Y cos(Omega t + phi)``, upward, with ``Y = p g / Omega**2``.
+    """
     width, height = size or SIZE
-    equation = "th'' + (c/m) th' + w0\u00b2 (1 + p cos \u03a9t) sin th = \u2212Tr sign(th')"
+    equation = f"th'' + (c/m) th' + w0\u00b2 (1 + p {_DRIVE}) sin th = \u2212Tr sign(th')"
     known = "w0\u00b2 = g/l,   p = Y\u03a9\u00b2/g"
     equation = f"{equation};   {known}".replace("th", "\u03b8").replace("w0", "\u03c9\u2080")
-    made = sheets.headed((width, height), dpi, "The parametric pendulum", equation, left=0.3)
+    made = sheets.headed((width, height), dpi, title or TITLE, equation, left=0.3)
     scale = min((width - 0.2) / 5.8, (height - 0.75) / 4.85)
     wide, high = (width - 0.2) / scale, (height - 0.75) / scale
     axes = sheets.place(made, 0.1, 0.05, width - 0.2, height - 0.75)
@@ -53,21 +62,20 @@ def figure(*, size: tuple[float, float] | None = None, dpi: float = 200.0) -> Fi
 
 
 def _guide(axes: Axes, font: float) -> None:
-    """The slider between its rails, and how it moves."""
-    for side in (-0.42, 0.32):
-        axes.add_patch(Rectangle((side, -0.62), 0.1, 1.6, fc=_RAIL, ec="none", zorder=1))
-    outer = {-1: -0.42, 1: 0.42}
-    for way, x in outer.items():
-        for k in range(9):
-            y = -0.62 + 0.18 * k
-            axes.plot([x, x + 0.12 * way], [y, y + 0.12], color=_HELP, lw=0.7, zorder=1)
+    """The slider on its rail, and how it moves."""
+    axes.add_patch(Rectangle((-0.42, -0.8), 0.1, 1.6, fc=_RAIL, ec="none", zorder=1))
+    for k in range(9):
+        y = -0.8 + 0.18 * k
+        axes.plot([-0.42, -0.54], [y, y + 0.12], color=_HELP, lw=0.7, zorder=1)
     axes.add_patch(Rectangle((-0.3, -0.24), 0.6, 0.48, fc="white", ec=_DARK, lw=1.4, zorder=2))
-    _arrow(axes, (-1.0, -0.6), (-1.0, 0.75), _MOTION, both=True)
-    axes.plot([-1.12, -0.56], [0, 0], color=_HELP, lw=0.8, ls=(0, (6, 3)))
-    axes.text(-1.15, 0.25, "Y cos \u03a9t", ha="right", va="center", color=_MOTION, fontsize=font)
+    _arrow(axes, (-0.82, -0.75), (-0.82, 0.75), _MOTION, both=True)
+    axes.plot([-0.94, -0.6], [0, 0], color=_HELP, lw=0.8, ls=(0, (6, 3)))
     axes.text(
-        -1.15, -0.16, "pivot, up and down", ha="right", va="center", color=_HELP,
-        fontsize=0.78 * font,
+        -0.98, 0.3, f"\u2212Y {_DRIVE}", ha="right", va="center", color=_MOTION, fontsize=font
+    )
+    axes.text(
+        -0.98, -0.02, "the pivot's place,\nupward", ha="right", va="center", color=_HELP,
+        fontsize=0.78 * font, linespacing=1.3,
     )  # fmt: skip
 
 
@@ -108,12 +116,18 @@ def _rod(axes: Axes, font: float) -> None:
         (radius + 0.22) * math.sin(half), -(radius + 0.22) * math.cos(half), "\u03b8",
         ha="center", va="center", fontsize=1.3 * font, color=_DARK,
     )  # fmt: skip
-    # The length stands beside the rod, on the other side of the angle.
-    shift = 0.34
-    move = (shift * math.cos(THETA), shift * math.sin(THETA))
+    # The length stands beside the rod, on the other side of the angle, from pivot to bob.
+    move = (ASIDE * math.cos(THETA), ASIDE * math.sin(THETA))
     _arrow(axes, move, (x + move[0], y + move[1]), _HELP, both=True, thin=True)
+    for (foot_x, foot_y), bare in (((0.0, 0.0), 0.2), ((x, y), BOB + 0.04)):
+        ends = (bare, ASIDE + 0.08)
+        axes.plot(
+            [foot_x + end * math.cos(THETA) for end in ends],
+            [foot_y + end * math.sin(THETA) for end in ends],
+            color=_HELP, lw=0.7, zorder=4,
+        )  # fmt: skip
     axes.text(
-        x / 2 + 1.65 * move[0], y / 2 + 1.65 * move[1], "l", ha="center", va="center",
+        x / 2 + 1.4 * move[0], y / 2 + 1.4 * move[1], "l", ha="center", va="center",
         fontsize=1.1 * font, style="italic",
     )  # fmt: skip
 
@@ -126,7 +140,7 @@ def _forces(axes: Axes, font: float) -> None:
               style="italic")  # fmt: skip
     # The velocity is along the arc, upward.
     side = (math.cos(THETA), math.sin(THETA))
-    start = (x + (BOB + 0.05) * side[0], y + (BOB + 0.05) * side[1])
+    start = (x + (ASIDE + 0.14) * side[0], y + (ASIDE + 0.14) * side[1])
     _arrow(axes, start, (start[0] + 0.7 * side[0], start[1] + 0.7 * side[1]), _MOTION)
     axes.text(
         start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "d\u03b8/dt > 0",
@@ -146,8 +160,9 @@ def _forces(axes: Axes, font: float) -> None:
         _FORCE,
     )
     axes.text(
-        1.14, 0.38, "drag and dry friction\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)", color=_FORCE,
-        fontsize=0.82 * font, va="center", linespacing=1.4,
+        1.14, 0.42,
+        "drag and dry friction over m l\u00b2:\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)",
+        color=_FORCE, fontsize=0.82 * font, va="center", linespacing=1.4,
     )  # fmt: skip
 
 

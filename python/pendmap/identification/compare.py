@@ -16,7 +16,9 @@ from pendmap.identification.reading import reading_of
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.table1 import PeakErrors, Table1, table_of
 from pendmap.model import Rig
+from pendmap.notebook import Readable
 from pendmap.records.experiment import Experiment
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,7 +34,7 @@ MODEL = "model"
 """What the model is called in table 1."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class RunComparison:
     """A model beside one free decay.
 
@@ -65,14 +67,21 @@ class RunComparison:
     peaks: Peaks
     table: Table1
 
+    def __repr__(self) -> str:
+        held = ", held out" if self.run.hold_out else ""
+        return (
+            f"<RunComparison {self.run.name}{held}: rms {self.rms:.3g} rad, noise "
+            f"{self.sigma:.3g} rad>"
+        )
+
     @property
     def errors(self) -> PeakErrors | None:
         """Errors of periods and peaks; none where there are too few."""
         return self.table.errors.get(MODEL)
 
 
-@dataclasses.dataclass(frozen=True)
-class Comparison:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Comparison(Readable):
     """A model beside an experiment.
 
     Parameters
@@ -88,6 +97,18 @@ class Comparison:
     model: Rig
     experiment: Experiment
     runs: tuple[RunComparison, ...]
+
+    def __repr__(self) -> str:
+        worst = max(run.rms / run.sigma for run in self.runs)
+        each = f"rms up to {worst:.3g} times the noise"
+        runs = counted(len(self.runs), "run")
+        return f"<Comparison {self.experiment.path.name}: {runs}, {each}; {self.model.title}>"
+
+    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+        """Return the table and the lines that ``pendmap compare`` prints."""
+        from pendmap.identification import compared  # noqa: PLC0415 (it is of comparisons)
+
+        return [compared.runs_table(self)], list(compared.as_text(self))
 
 
 def compare(model: Rig, experiment: Experiment) -> Comparison:

@@ -17,6 +17,7 @@ from pendmap.identification.table1 import Table1, table_of
 from pendmap.identification.trajectory import METHOD as BEST
 from pendmap.identification.trajectory import identification_of
 from pendmap.model import Rig
+from pendmap.notebook import Readable
 from pendmap.records.experiment import Experiment
 from pendmap.words import counted
 
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["BEST", "IdentificationReport", "decay_of", "identify_experiment"]
 
 
-@dataclasses.dataclass(frozen=True)
-class IdentificationReport:
+@dataclasses.dataclass(frozen=True, repr=False)
+class IdentificationReport(Readable):
     """What every method says of an experiment.
 
     Parameters
@@ -55,6 +56,19 @@ class IdentificationReport:
     methods: dict[str, Identification]
     joint: JointFit | None
     table: Table1
+
+    def __repr__(self) -> str:
+        sound = (found.short for found in self.methods.values() if found.sound)
+        best = next(sound, "no method gives a model")
+        more = f"; {counted(len(self.methods), 'method')}, {counted(len(self.runs), 'run')}"
+        return f"<IdentificationReport {self.run.name}: {best}{more}>"
+
+    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+        """Return the tables and lines that ``pendmap identify`` prints."""
+        from pendmap.identification import summary  # noqa: PLC0415 (summaries are of reports)
+
+        tables = [summary.methods_table(self), summary.table1_table(self)]
+        return tables, list(summary.as_text(self))
 
     @property
     def best(self) -> Identification:

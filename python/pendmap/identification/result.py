@@ -6,6 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.identification.digits import with_error
 from pendmap.model import Rig
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Estimate:
     ci95: tuple[float, float] | None = None
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Identification:
     """The damping that one method finds in a record.
 
@@ -76,6 +77,17 @@ class Identification:
     misfit: float | None = None
     model: Rig | None = None
     converged: bool = True
+
+    def __repr__(self) -> str:
+        return f"<Identification {self.short}>"
+
+    @property
+    def short(self) -> str:
+        """The method and what it found, in a line; numbers in SI, their errors in brackets."""
+        if not self.applicable:
+            return f"{self.method}: {'; '.join(self.warnings)}"
+        found = ", ".join(f"{name} = {with_error(each)}" for name, each in self.estimates.items())
+        return f"{self.method}: {found}" + ("" if self.converged else "; did not converge")
 
     @property
     def sound(self) -> bool:

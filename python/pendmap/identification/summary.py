@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
+from pendmap.identification.digits import interval, with_error
 from pendmap.identification.left_out import left_out
 from pendmap.records.summary import findings_said
 
@@ -13,16 +14,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pendmap.identification.report import IdentificationReport
-    from pendmap.identification.result import Estimate, Identification
+    from pendmap.identification.result import Identification
 
 __all__ = [
     "COLUMNS",
     "as_json",
     "as_text",
-    "interval",
     "methods_table",
     "table1_table",
-    "with_error",
 ]
 
 COLUMNS: Final = {
@@ -34,9 +33,6 @@ COLUMNS: Final = {
     "offset": "offset (rad)",
 }
 """What the table of methods shows, and how it is headed; effects' parameters follow."""
-
-DIGITS: Final = 2
-"""Digits of a standard error."""
 
 
 def as_json(report: IdentificationReport) -> dict[str, Any]:
@@ -122,36 +118,8 @@ def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str
     return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows
 
 
-def interval(estimate: Estimate) -> str:
-    """Return the 95 % interval with the digits that the standard error has: ``[6.2022, 6.2071]``.
-
-    Empty where there is none.
-    """
-    if estimate.ci95 is None:
-        return ""
-    low, high = estimate.ci95
-    error = estimate.stderr
-    if error is None or not math.isfinite(error) or error <= 0:
-        error = (high - low) / 4
-    places = DIGITS - 1 - math.floor(math.log10(error)) if 0 < error < math.inf else 0
-    if places <= 0 or places > 15:  # noqa: PLR2004 (no digits left, or none needed)
-        return f"[{low:.6g}, {high:.6g}]"
-    return f"[{low:.{places}f}, {high:.{places}f}]"
-
-
 def _best(report: IdentificationReport) -> Identification | None:
     try:
         return report.best
     except InputError:
         return None
-
-
-def with_error(estimate: Estimate) -> str:
-    """Return a number with its standard error in the last digits: ``6.2047(12)``, +- 0.0012."""
-    value, error = estimate.value, estimate.stderr
-    if error is None or not math.isfinite(error) or error <= 0:
-        return f"{value:.5g}"
-    places = DIGITS - 1 - math.floor(math.log10(error))
-    if places <= 0 or places > 15:  # noqa: PLR2004 (no digits left, or none needed)
-        return f"{value:.5g} +- {error:.2g}"
-    return f"{value:.{places}f}({round(error * 10**places)})"

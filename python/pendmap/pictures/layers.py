@@ -180,7 +180,7 @@ def what(dataset: xr.Dataset, layer: str) -> str:
 
 
 def unit(dataset: xr.Dataset, layer: str) -> str:
-    """Return what a scalar layer counts, for a colour bar; without drive it says what a period is."""
+    """Return what a scalar layer counts, for a colour bar; without drive also what a period is."""
     driven = float(dataset.attrs.get("p", 1.0)) != 0.0
     units = Units.of(dataset.attrs)
     own = units.own_period.replace(" pi", "\N{GREEK SMALL LETTER PI}").replace(" ", "")

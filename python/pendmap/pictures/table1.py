@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.identification.summary import with_error
+from pendmap.identification.digits import with_error
 from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:

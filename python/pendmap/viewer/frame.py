@@ -12,7 +12,6 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.model.units import NONDIMENSIONAL, VELOCITY, Units
-from pendmap.pictures import layers as layering
 from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
