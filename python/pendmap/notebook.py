@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
-__all__ = ["Readable"]
+__all__ = ["Readable", "columns"]
 
 
 class Readable(abc.ABC):
@@ -27,7 +27,7 @@ class Readable(abc.ABC):
 
     def __str__(self) -> str:
         tables, lines = self.said()
-        return "\n".join([*(_columns(*table) for table in tables if table[1]), *lines])
+        return "\n".join([*(columns(*table) for table in tables if table[1]), *lines])
 
     def _repr_html_(self) -> str:
         tables, lines = self.said()
@@ -35,8 +35,8 @@ class Readable(abc.ABC):
         return "".join(_html(*table) for table in tables if table[1]) + f"<p>{below}</p>"
 
 
-def _columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in columns as wide as they need, and an empty line."""
+def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in columns as wide as they need, its head first, and an empty line."""
     lines = [head, *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(head))]
     padded = ("  ".join(map(str.ljust, line, wide)) for line in lines)

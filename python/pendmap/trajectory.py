@@ -33,6 +33,8 @@ _APART = 0.1
 _SMOOTH_SAMPLES = 200_000
 """Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
 _MOST_SAMPLES = 2_000_000
+_LARGEST = 1e6
+"""Angles up to this begin a motion, rad: rounding takes 1e-10 of them."""
 _ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
 
 
@@ -86,13 +88,18 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     Raises
     ------
     InputError
-        If a value is not finite or outside its range.
+        If a value is not finite or outside its range; the angle's is 1e6 rad to both sides.
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
     theta, velocity = checks.number("theta", theta), checks.number("velocity", velocity)
     until, tol = checks.number("until", until), checks.number("tol", tol)
     lyapunov = checks.flag("lyapunov", lyapunov)
+    if abs(theta) > _LARGEST:
+        raise InputError(
+            f"theta is {theta:g}: allowed are {-_LARGEST:g} to {_LARGEST:g} rad: rounding leaves "
+            "less of larger angles than the motion needs"
+        )
     if until <= 0:
         raise InputError(f"until is {until:g}: allowed is a time above 0")
     periods = until / model.period
@@ -103,7 +110,11 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             samples = max(samples, _smooth(pendulum, speed, end))
     samples = checks.whole("samples", samples, 1, checks.MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
-        raise InputError(f"until is {until:g}: {periods:.3g} periods do not fit into memory")
+        most = 100 * _MOST_SAMPLES // samples * model.period
+        raise InputError(
+            f"until is {until:g}: {periods:.3g} periods do not fit into memory: allowed is a time "
+            f"up to {most:.3g}"
+        )
     try:
         start = (theta, units.bare(velocity, VELOCITY))
         end = units.bare(until, TIME)

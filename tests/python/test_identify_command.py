@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import signal
+import subprocess
 import tomllib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
+from conftest import COMMAND
 from decays import decay, record
 from pendmap.identification import Estimate
 from pendmap.identification.digits import with_error
@@ -101,6 +105,7 @@ def test_some_methods_and_an_effect(decay_file: Path, pendmap_command: Run) -> N
         (("identify", "."), "has no experiment.toml"),
         (("identify", "decay.csv", "--method", "best"), "allowed are trajectory"),
         (("identify", "decay.csv", "--effect", "quadratic"), "perhaps quadratic_drag"),
+        (("identify", "decay.csv", "--effect", "drive_phase"), "acts on the drive: allowed is"),
         (("identify", "decay.csv", "--out", "model.nc"), "allowed are .toml"),
         (("identify", "forced"), "no run is free"),
         (("compare", "absent.toml", "decay.csv"), "absent.toml: No such file"),
@@ -145,3 +150,21 @@ def test_refused_on_one_line(
 )
 def test_numbers_with_their_errors(value: float, error: float | None, shown: str) -> None:
     assert with_error(Estimate(value, error)) == shown
+
+
+def test_a_reader_that_goes_away_is_no_failed_check(decay_file: Path, tmp_path: Path) -> None:
+    """What a shell says of any command that ends so: 128 and the signal's number."""
+    words = ["identify", decay_file, "--method", "combined_repaired", "--out", "model.toml"]
+    read, write = os.pipe()
+    os.close(read)
+    made = subprocess.run(
+        [str(COMMAND), *map(str, words)],
+        cwd=tmp_path,
+        stdout=write,
+        stderr=subprocess.PIPE,
+        check=False,
+        text=True,
+    )
+    os.close(write)
+    assert (made.returncode, made.stderr) == (128 + signal.SIGPIPE, "")
+    assert (tmp_path / "model.toml").is_file()

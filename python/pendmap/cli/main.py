@@ -38,6 +38,10 @@ _NAMED = re.compile(r"(?P<name>\w+) is (?P<rest>[^:]+: .*)", re.DOTALL)
 """How everything below names what it refuses: ``gamma is -1: allowed is 0 or more``."""
 
 
+class _ReaderGone(Exception):  # noqa: N818 (nothing is wrong)
+    """Whoever reads stdout has seen enough; click would make a failed check of it, exit 1."""
+
+
 class _Commands(click.Group):
     """Commands that are imported when they are called: ``--help`` imports none of them."""
 
@@ -55,6 +59,8 @@ class _Commands(click.Group):
         """Run the command; what it refuses is named as it was typed, by its option."""
         try:
             return super().invoke(ctx)
+        except BrokenPipeError:
+            raise _ReaderGone from None
         except InputError as error:
             called = self.get_command(ctx, ctx.invoked_subcommand or "")
             options = {p.name: p.opts[0] for p in called.params} if called else {}
@@ -98,8 +104,8 @@ def _exit_code() -> int:  # noqa: PLR0911 (one for each way to end)
         files = (stop.__cause__ or stop.__context__ or stop).args
         click.echo(f"pendmap: interrupted, {', '.join(files) or 'nothing was'} written", err=True)
         return INTERRUPTED
-    except BrokenPipeError:
-        # Whoever reads has seen enough: no message, and none from the interpreter at the end.
+    except _ReaderGone:
+        # No message, and none from the interpreter at the end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except MemoryError:

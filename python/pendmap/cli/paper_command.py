@@ -67,7 +67,10 @@ def command(  # noqa: PLR0913 (an option each)
         raise click.UsageError("--plot is one file: allowed with one figure; --out takes a folder")
     if out is not None:
         out.mkdir(exist_ok=True)  # the folder above is there, as for every other file
-    written = write_all(_files(keys, out or Path(), plot, seed))
+    folder = out or Path()
+    for key in keys if plot is None else ():  # before anything is computed
+        OutputFile((".png", ".csv")).convert(folder / _name(key), None, None)
+    written = write_all(_files(keys, folder, plot, seed))
     if as_json:
         click.echo(json.dumps({"files": written}))
     elif not quiet:

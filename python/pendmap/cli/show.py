@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.files import held_interrupts
+from pendmap.notebook import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pendmap.cli.options import Outputs
-
-WIDEST = 1000
 
 __all__ = ["open_viewer", "plain", "progress_bar", "show", "write_all", "write_table"]
 
@@ -107,17 +106,8 @@ def _files(outputs: Outputs) -> Iterator[tuple[Callable[[xr.Dataset, Path], Path
 
 def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Write a table in columns as wide as they need, however wide the terminal is."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(*head, box=None, pad_edge=False, header_style="bold")
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    # Wider than any table: columns that were cut to fit a terminal would lose digits.
-    console = Console(width=WIDEST)
-    console.print(table, crop=False, soft_wrap=True)
-    console.print()
+    first, *others = columns(head, rows).split("\n")
+    click.echo("\n".join([click.style(first, bold=True), *others]))
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)

@@ -17,6 +17,7 @@ from pendmap.identification.table1 import Table1, table_of
 from pendmap.identification.trajectory import METHOD as BEST
 from pendmap.identification.trajectory import identification_of
 from pendmap.model import Rig
+from pendmap.model.effects import definition
 from pendmap.notebook import Readable
 from pendmap.records.experiment import Experiment
 from pendmap.words import counted
@@ -155,12 +156,20 @@ def identify_experiment(
     Raises
     ------
     InputError
-        If a method is not known, or there is no free decay.
+        If a method or an effect is not known, an effect is one of the drive, or there is no free
+        decay.
     """
     checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
     if start is not None:
         checks.of_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
     names = check_names(methods)
+    for effect in effects:
+        name = effect if isinstance(effect, str) else effect.name
+        if definition(name)["group"] == "drive":
+            raise InputError(
+                f"effect {name} acts on the drive: allowed is one that acts on free decays, of "
+                "damping, torque or reading"
+            )
     run = decay_of(experiment)
     if run.peaks_only:
         peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
