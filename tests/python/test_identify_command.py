@@ -154,7 +154,7 @@ def test_numbers_with_their_errors(value: float, error: float | None, shown: str
 
 def test_a_reader_that_goes_away_is_no_failed_check(decay_file: Path, tmp_path: Path) -> None:
     """What a shell says of any command that ends so: 128 and the signal's number."""
-    words = ["identify", decay_file, "--method", "combined_repaired", "--out", "model.toml"]
+    words = ["identify", decay_file, "--method", "energy_balance", "--out", "model.toml"]
     read, write = os.pipe()
     os.close(read)
     made = subprocess.run(
