@@ -288,7 +288,7 @@ def spoilers(path: Motion, count: int) -> None:
             for seed in range(count if noise else 1):
                 times, angles = record(path, seed, offset, sensor)
                 start = State(0.0, float(find_peaks(times, angles).amplitude[0]), 0.0)
-                found = METHODS[name](times, angles)
+                found = METHODS[name].identify(times, angles)
                 if found.applicable:
                     made.append(misses(found, truth, start)[0])
             cells.append(f"{np.median(made):.2e}" if made else "-")

@@ -33,8 +33,6 @@ _APART = 0.1
 _SMOOTH_SAMPLES = 200_000
 """Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
 _MOST_SAMPLES = 2_000_000
-_LARGEST = 1e6
-"""Angles up to this begin a motion, rad: rounding takes 1e-10 of them."""
 _ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
 
 
@@ -88,18 +86,13 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     Raises
     ------
     InputError
-        If a value is not finite or outside its range; the angle's is 1e6 rad to both sides.
+        If a value is not finite or outside its range.
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
     theta, velocity = checks.number("theta", theta), checks.number("velocity", velocity)
     until, tol = checks.number("until", until), checks.number("tol", tol)
     lyapunov = checks.flag("lyapunov", lyapunov)
-    if abs(theta) > _LARGEST:
-        raise InputError(
-            f"theta is {theta:g}: allowed are {-_LARGEST:g} to {_LARGEST:g} rad: rounding leaves "
-            "less of larger angles than the motion needs"
-        )
     if until <= 0:
         raise InputError(f"until is {until:g}: allowed is a time above 0")
     periods = until / model.period
@@ -221,6 +214,11 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
         lines.append(
             f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding, or the smallest step allowed, "
             f"leaves {a['reached_error']:.1e}."
+        )
+    rounding = float(np.spacing(np.abs(dataset["theta"].values).max()))
+    if rounding > a["tol"]:
+        lines.append(
+            f"ANGLES ARE ROUNDED TO {rounding:.1e} rad, so large are they: begin nearer to 0."
         )
     if a["stuck"]:
         kinds, times = dataset["event_kind"].values, dataset["event_time"].values

@@ -271,3 +271,10 @@ def test_turns_since_the_start_are_said_in_words(velocity: float, said: str) -> 
     assert said in line
     full = (0.5 - float(run.theta[-1])) / math.tau
     assert str(round(full)) in line or velocity == 0
+
+
+@pytest.mark.parametrize(("theta", "said"), [(1.0, False), (1e5, False), (1e9, True), (1e16, True)])
+def test_angles_too_large_for_their_digits_are_said(theta: float, said: bool) -> None:  # noqa: FBT001
+    """A double has 53 bits: the angle's last one is above the tolerance of 1e-9 from 8e6 on."""
+    summary = pendmap.simulate(Pendulum(), theta, 0.0, 1.0).attrs["summary"]
+    assert ("ANGLES ARE ROUNDED" in summary) == said
