@@ -5,7 +5,9 @@
 //! by `d` out of the tangential direction reads
 //! `r (th'' cos d + th'^2 sin d) + g sin(th + d)`.
 //! Where friction jumps with the sense of the motion, `th''` and the reading jump with it, at every
-//! turn; a pendulum that is held fast has `th'' = 0` and shows gravity alone.
+//! turn; a pendulum that is held fast has `th'' = 0` and shows gravity alone. A reading is the mean
+//! over an interval of sampling: at a turn within it the jump is shared in proportion, so that the
+//! sum of squares has no steps where a turn passes a sample.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -23,6 +25,8 @@ pub struct Accelerometer {
     pub gravity: f64,
     /// What it reads of nothing.
     pub bias: f64,
+    /// The interval that a reading is the mean over, in `1 / w_ref`.
+    pub interval: f64,
     /// The angle between its axis and the tangential direction, rad.
     pub tilt: f64,
 }
@@ -40,17 +44,43 @@ impl Accelerometer {
     ) -> N {
         let leaning = (theta + tilt).scale(FRAC_1_PI).sine::<Fine>().scale(self.gravity);
         let turned = tilt.scale(FRAC_1_PI);
-        let pull = signs
-            .map_or(N::constant(0.0), |signs| course.acceleration(tau, theta, velocity, signs));
+        let pull = signs.map_or(N::constant(0.0), |signs| {
+            self.mean_acceleration(course, tau, [theta, velocity], signs)
+        });
         let inward = velocity * velocity * turned.sine::<Fine>();
         let moving = pull.mul_add(turned.cosine::<Fine>(), inward);
         moving.scale_add(self.place, leaning) + bias
     }
 
+    /// `th''`, with the jump of friction at a turn less than half an interval away shared: the turn
+    /// is `|th'| / |th''|` away.
+    fn mean_acceleration<N: Number>(
+        &self,
+        course: &Course<N>,
+        tau: f64,
+        [theta, velocity]: [N; 2],
+        [sense, side]: [f64; 2],
+    ) -> N {
+        let here = course.acceleration(tau, theta, velocity, [sense, side]);
+        let away = velocity.scale(sense);
+        let reach = here.scale((0.5 * self.interval).copysign(here.value()));
+        if !course.jumps() || away.value() >= reach.value() {
+            return here;
+        }
+        let mut there = course.acceleration(tau, theta, velocity, [-sense, side]);
+        // Before a turn the pull is against the motion; where it would be so after it, too, friction
+        // holds the pendulum.
+        if here.value() * sense < 0.0 && there.value() * sense >= 0.0 {
+            there = N::constant(0.0);
+        }
+        let share = (away / reach).affine(-0.5, 0.5);
+        (there - here).mul_add(share, here)
+    }
+
     /// Whether all of it are numbers, and it shows anything.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        let all = [self.place, self.gravity, self.bias, self.tilt];
+        let all = [self.place, self.gravity, self.bias, self.interval, self.tilt];
         all.iter().all(|x| x.is_finite()) && (self.place != 0.0 || self.gravity != 0.0)
     }
 }

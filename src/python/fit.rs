@@ -60,6 +60,7 @@ impl Pivot<'_> {
 pub struct Sensor<'py> {
     place: f64,
     gravity: f64,
+    interval: f64,
     angle: Floats<'py>,
 }
 
@@ -81,12 +82,14 @@ impl Run<'_> {
         let recorded = self.pivot.as_ref().map(Pivot::recorded).transpose()?;
         let angles = |sensor: &Sensor<'_>| Ok::<_, PyErr>(sensor.angle.as_slice()?.to_vec());
         let angles = self.accelerometer.as_ref().map(angles).transpose()?;
-        let accelerometer = self.accelerometer.map(|Sensor { place, gravity, .. }| Accelerometer {
-            place,
-            gravity,
-            bias: 0.0,
-            tilt: 0.0,
-        });
+        let accelerometer =
+            self.accelerometer.map(|Sensor { place, gravity, interval, .. }| Accelerometer {
+                place,
+                gravity,
+                bias: 0.0,
+                interval,
+                tilt: 0.0,
+            });
         Ok(Record {
             pendulum: pendulum(self.parameters)?,
             recorded: recorded.map(Arc::new),

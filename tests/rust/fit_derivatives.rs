@@ -86,7 +86,8 @@ fn derivatives_hold_for_what_an_accelerometer_reads() {
     record.angles = Some(record.readings.clone());
     // At two thirds of the equivalent length, leaning and with gravity; then without it.
     for (place, gravity) in [(2.0 / 3.0, 1.0), (-1.0, 0.0)] {
-        record.accelerometer = Some(Accelerometer { place, gravity, bias: 0.01, tilt: 0.03 });
+        record.accelerometer =
+            Some(Accelerometer { place, gravity, bias: 0.01, interval: 0.06, tilt: 0.03 });
         let error = worst(record.clone(), None, start);
         assert!(error < 1e-6, "{error:e}");
     }

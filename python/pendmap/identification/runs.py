@@ -67,7 +67,8 @@ class RodSensor:
 
     It reads ``place (th'' cos(tilt) + th'**2 sin(tilt)) + gravity sin(th + tilt) + bias``, where
     ``bias`` and ``tilt`` are fitted. Where friction turns round, at every turn, ``th''`` and the
-    reading jump by ``2 place Tr``; while friction holds the pendulum, ``th''`` is 0.
+    reading jump by ``2 place Tr``, which the reading whose interval of sampling holds the turn
+    shares; while friction holds the pendulum, ``th''`` is 0.
 
     Parameters
     ----------
@@ -182,6 +183,8 @@ def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
     return {
         "place": float(units.given(sensor.place, 2)),
         "gravity": sensor.gravity,
+        # A reading is the mean over an interval of sampling.
+        "interval": float(units.bare(float(np.median(np.diff(run.time))), -1)),
         "angle": _floats("angle", sensor.angle),
     }
 

@@ -50,7 +50,7 @@ class Column:
     unit: str | None = None
     scale: float | None = None
     zero: float = 0.0
-    place: Place = Place()
+    place: Place = dataclasses.field(default_factory=Place)
 
 
 @dataclasses.dataclass(frozen=True)

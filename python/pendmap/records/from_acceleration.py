@@ -250,26 +250,23 @@ def _refuse_large(waves: list[_Wave], sensor: Accelerometer, where: str) -> None
     top = float(np.quantile([wave.top for wave in waves], 0.8))
     most = abs(sensor.gain)
     if top > MOST * most:
-        place = (
-            ""
-            if sensor.direction == "angular"
-            else f" at distance_m = {sensor.distance_m:g}{', gravity removed' * (not sensor.gravity)}"
-        )
+        removed = "" if sensor.gravity else ", gravity removed"
+        place = f" at distance_m = {sensor.distance_m:g}{removed}"
+        place = "" if sensor.direction == "angular" else place
         raise InputError(
             f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
             f" at most {most:.3g}{place}: unit, distance_m, direction or gravity_removed is wrong"
         )
     folds = [k for k, wave in enumerate(waves) if wave.dip > FOLDED]
-    if folds and any(not wave.folded(most) and wave.top > 0.9 * most for wave in waves[: folds[-1]]):
+    before = waves[: folds[-1]] if folds else []
+    if any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
         raise InputError(
             f"{where}: the pendulum turns over the top, which an acceleration alone does not show:"
             " allowed is an angle or a velocity beside it, or a later from_s"
         )
 
 
-def _unfolded(
-    values: Floats, waves: list[_Wave], sensor: Accelerometer, noise: float
-) -> Floats:
+def _unfolded(values: Floats, waves: list[_Wave], sensor: Accelerometer, noise: float) -> Floats:
     """Return the angle of each sample."""
     most = abs(sensor.gain)
     theta = np.arcsin(np.clip(values / most, -1, 1))
