@@ -59,6 +59,9 @@ BLIND: Final = 0.05
 DIM: Final = 0.2
 """... and within which little is left of it."""
 
+WIDE: Final = 1.18
+"""Period of a swing of a quarter turn to either side over that of a small one."""
+
 
 @dataclasses.dataclass(frozen=True)
 class FromAcceleration:
@@ -136,11 +139,12 @@ def angle_from(
             " more where no angle is beside it"
         )
     found = dataclasses.replace(accelerometer, w0=_frequency(waves, accelerometer))
-    doubt = _refuse_blind(found, where)
-    _refuse_large(waves, found, where)
     largest = max(wave.top for wave in waves)
     signal = largest / noise if noise else math.inf
-    if signal < 4 * QUIET:
+    weak = signal < 4 * QUIET
+    doubt = _refuse_blind(found, waves, where, weak=weak)
+    _refuse_large(waves, found, where)
+    if weak:
         doubt = f"the largest reading is {signal:.2g} times the noise{doubt and f'; {doubt}'}"
     return FromAcceleration(_unfolded(values, waves, found, noise), found, signal, doubt)
 
@@ -224,12 +228,19 @@ def _frequency(waves: list[_Wave], sensor: Accelerometer) -> float:
     return w0
 
 
-def _refuse_blind(sensor: Accelerometer, where: str) -> str:
+def _refuse_blind(sensor: Accelerometer, waves: list[_Wave], where: str, *, weak: bool) -> str:
     """Refuse a place that sees nothing of the swing; return what speaks against one near it."""
     if not sensor.gravity:
         return ""
     length = sensor.gravity / sensor.w0**2
     away = abs(sensor.distance_m / length - 1)
+    if weak:
+        # What noise and damping alone may be says little about the amplitude, which up to a quarter
+        # turn makes a period WIDE times longer.
+        slow = math.pi / float(np.median([wave.half_period for wave in waves]))
+        lengths = sensor.gravity / slow**2 / WIDE**2, sensor.gravity / slow**2
+        if (1 - BLIND) * lengths[0] < sensor.distance_m < (1 + BLIND) * lengths[1]:
+            length, away = min(lengths, key=lambda x: abs(x - sensor.distance_m)), 0.0
     centre = (
         f"distance_m is {sensor.distance_m:g} and the centre of oscillation g/w0^2 at {length:.4g}"
         " m from the pivot, where gravity and the swing cancel"
