@@ -46,7 +46,8 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
         names, matrix = best.covariance
         # A sensor's bias and tilt are no part of the pendulum.
         kept = [k for k, name in enumerate(names) if name.partition("[")[0] not in SENSOR]
-        names, matrix = [names[k] for k in kept], np.asarray(matrix)[np.ix_(kept, kept)]
+        names = tuple(names[k] for k in kept)
+        matrix = np.asarray(matrix)[np.ix_(kept, kept)]
         own = {"offset": f"{OFFSET}.d"}
         notes["covariance"] = {
             "names": [own.get(name, name) for name in names],

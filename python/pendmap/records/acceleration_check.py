@@ -98,8 +98,8 @@ def _motion(work: Work) -> _Motion | None:
     slope = _slope(sine, second[inside])
     if slope >= 0:
         return None
-    parts = (zeroth, first, second, smoothed)
-    return _Motion(*(part[inside] for part in parts), math.sqrt(-slope))
+    w0 = math.sqrt(-slope)
+    return _Motion(zeroth[inside], first[inside], second[inside], smoothed[inside], w0)
 
 
 def _slope(x: Floats, y: Floats) -> float:

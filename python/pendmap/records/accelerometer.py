@@ -116,7 +116,7 @@ def place_of(table: Mapping[str, object], where: str) -> Place:
             raise InputError(
                 f"{where}: unit is {unit!r} and direction 'angular': allowed are rad/s2 and deg/s2"
             )
-    return Place(direction, distance, removed)  # type: ignore[arg-type]
+    return Place(direction, distance, removed)
 
 
 def accelerometer_of(

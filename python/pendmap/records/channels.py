@@ -100,11 +100,11 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         findings.append(Finding("pivot-unit", text))
     sensor, missing = None, ""
     if "acceleration" in places:
-        k, column = places["acceleration"], asked.get("acceleration")
+        k, said = places["acceleration"], asked.get("acceleration")
         heading, read_in = name_and_unit(table.names[k])
         gravity = float(description.known.get("gravity", GRAVITY))
-        given_in = column.unit if column and column.unit else read_in
-        sensor, missing = accelerometer_of(column, given_in, heading, gravity)
+        given_in = said.unit if said and said.unit else read_in
+        sensor, missing = accelerometer_of(said, given_in, heading, gravity)
     return Channels(
         values, units, frozenset(declared), pivot, unit, tuple(findings), sensor, missing
     )
