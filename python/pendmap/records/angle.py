@@ -137,7 +137,10 @@ def _accelerated(work: Work) -> None:
         if sensor.direction == "angular"
         else f"a tangential acceleration {sensor.distance_m:g} m from the pivot{removed}"
     )
-    text = f"the angle is made of {place}; the best method fits the acceleration itself"
+    text = (
+        f"the angle is made of {place}, without the damping's part in it: roughly right, for"
+        " pictures and the methods of peaks; the trajectory method fits the acceleration itself"
+    )
     work.say("angle-from-acceleration", text, mended=True)
     if found.doubt:
         work.say("acceleration-weak", found.doubt)
