@@ -54,7 +54,7 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     let follow = Follow { problem, shaped, columns, window, directions };
     let samples = window.to - window.from;
     let mut slopes = vec![0.0; samples * directions];
-    let mut states = Vec::new();
+    let (mut states, mut heard) = (Vec::new(), Vec::new());
     let mut first = 0;
     while first < directions {
         let left = directions - first;
@@ -69,10 +69,10 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
             9..=12 => Follow::pass::<12>,
             _ => Follow::pass::<WIDEST>,
         };
-        pass(&follow, first, &mut slopes, &mut states);
+        pass(&follow, first, &mut slopes, &mut states, &mut heard);
         first += left.min(WIDEST);
     }
-    follow.read(states, &slopes)
+    follow.read(states, &heard, &slopes)
 }
 
 struct Follow<'a> {
@@ -84,8 +84,15 @@ struct Follow<'a> {
 }
 
 impl Follow<'_> {
-    /// The derivatives of the angle in `N` directions from `first` on.
-    fn pass<const N: usize>(&self, first: usize, slopes: &mut [f64], states: &mut Vec<State>) {
+    /// What the sensor is given, the angle or an accelerometer's reading, with its derivatives in
+    /// `N` directions from `first` on.
+    fn pass<const N: usize>(
+        &self,
+        first: usize,
+        slopes: &mut [f64],
+        states: &mut Vec<State>,
+        heard: &mut Vec<f64>,
+    ) {
         let record = &self.problem.records[self.window.record];
         let motion = &self.columns.motion;
         let number = |slot: Slot, value: f64| {
@@ -94,7 +101,7 @@ impl Follow<'_> {
             let place = direction.map_or(usize::MAX, |direction| direction.wrapping_sub(first));
             Tangent::<f64, N>::seeded(value, place)
         };
-        let Shaped { pendulum, gravity } = self.shaped;
+        let Shaped { pendulum, gravity, accelerometer } = self.shaped;
         let parameter = |index: usize, value: f64| number(Slot::Parameter(index), value);
         let mut course = Course::new(pendulum, true, self.problem.tolerance, parameter)
             .watched()
@@ -112,22 +119,36 @@ impl Follow<'_> {
         };
         let run =
             sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
+        let given: Vec<Tangent<f64, N>> = match accelerometer {
+            None => run.states.iter().map(|state| state[0]).collect(),
+            Some(sensor) => {
+                let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
+                let moments = times.iter().zip(&run.states).zip(&run.signs);
+                moments
+                    .map(|((tau, state), signs)| sensor.read(&course, *tau, *state, *signs, own))
+                    .collect()
+            }
+        };
         let filled = N.min(self.directions - first);
-        for (row, state) in slopes.chunks_exact_mut(self.directions).zip(&run.states) {
-            row[first..first + filled].copy_from_slice(&state[0].slope[..filled]);
+        for (row, given) in slopes.chunks_exact_mut(self.directions).zip(&given) {
+            row[first..first + filled].copy_from_slice(&given.slope[..filled]);
         }
+        *heard = given.into_iter().map(Number::value).collect();
         *states = run.states.iter().map(|state| state.map(Number::value)).collect();
     }
 
-    /// What the sensor makes of the angles.
-    fn read(&self, states: Vec<State>, slopes: &[f64]) -> Linear {
+    /// What the sensor makes of what it is given.
+    fn read(&self, states: Vec<State>, heard: &[f64], slopes: &[f64]) -> Linear {
         let record = &self.problem.records[self.window.record];
-        let sensor = Sensor::new(&self.shaped.pendulum, self.columns);
+        let sensor = match self.shaped.accelerometer {
+            None => Some(Sensor::new(&self.shaped.pendulum, self.columns)),
+            Some(_) => None,
+        };
         let (moving, reading) = (self.columns.motion.len(), self.columns.reading.len());
         let width = moving + reading + 2;
         let mut residuals = Vec::with_capacity(states.len());
         let mut rows = Vec::with_capacity(states.len() * width);
-        for (k, state) in states.iter().enumerate() {
+        for (k, given) in heard.iter().enumerate() {
             let sample = self.window.from + k;
             let weight = record.weights[sample];
             if weight == 0.0 {
@@ -136,7 +157,8 @@ impl Follow<'_> {
                 continue;
             }
             let slopes = &slopes[k * self.directions..(k + 1) * self.directions];
-            let read = sensor.read(state[0]);
+            let given = Tangent::seeded(*given, 0);
+            let read = sensor.as_ref().map_or(given, |sensor| sensor.read(given));
             residuals.push(weight * (record.readings[sample] - read.value));
             let by_angle = weight * read.slope[0];
             rows.extend(slopes[..moving].iter().map(|slope| by_angle * slope));
@@ -147,7 +169,7 @@ impl Follow<'_> {
     }
 }
 
-/// The sensor, with derivatives by the angle and by its free parameters.
+/// The sensor of the angle, with derivatives by the angle and by its free parameters.
 struct Sensor(Observation<Tangent<f64, READINGS>>);
 
 impl Sensor {
@@ -158,7 +180,7 @@ impl Sensor {
         }))
     }
 
-    fn read(&self, theta: f64) -> Tangent<f64, READINGS> {
-        self.0.read(Tangent::seeded(theta, 0))
+    fn read(&self, theta: Tangent<f64, READINGS>) -> Tangent<f64, READINGS> {
+        self.0.read(theta)
     }
 }

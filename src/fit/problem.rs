@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::accelerometer::Accelerometer;
 use crate::error::Error;
 use crate::model::effects::Action;
 use crate::model::{Pendulum, Recorded};
@@ -18,8 +19,13 @@ pub struct Record {
     pub recorded: Option<Arc<Recorded>>,
     /// Times of the samples, times `w_ref`; each after the one before it.
     pub times: Vec<f64>,
-    /// What the sensor read, rad.
+    /// What the sensor read, rad; of an accelerometer in the unit of its factors.
     pub readings: Vec<f64>,
+    /// The accelerometer that read, where it was no sensor of the angle; effects on the reading do
+    /// not act on it.
+    pub accelerometer: Option<Accelerometer>,
+    /// About which angles these were, rad, where the readings are none: initial states begin there.
+    pub angles: Option<Vec<f64>>,
     /// One over the standard error of each reading; 0 for readings that are not to be trusted.
     pub weights: Vec<f64>,
     /// The longest window, times `w_ref`; infinite where one may cover the whole record.
@@ -33,6 +39,10 @@ pub enum Slot {
     Gravity,
     /// That place in [`Pendulum::parameters`].
     Parameter(usize),
+    /// [`Accelerometer::bias`].
+    Bias,
+    /// [`Accelerometer::tilt`].
+    Tilt,
 }
 
 /// A free parameter.
@@ -69,6 +79,8 @@ pub struct Shaped {
     pub pendulum: Pendulum,
     /// `(w0 / w_ref)^2`.
     pub gravity: f64,
+    /// The record's accelerometer.
+    pub accelerometer: Option<Accelerometer>,
 }
 
 /// The free parameters of one record: their places in [`Problem::free`], and what they are.
@@ -114,6 +126,12 @@ impl Problem {
                     let allowed = "one of those given";
                     return Err(range("record of a free parameter", *record as f64, allowed));
                 };
+                if matches!(slot, Slot::Bias | Slot::Tilt)
+                    && records[*record].accelerometer.is_none()
+                {
+                    let allowed = "one with an accelerometer";
+                    return Err(range("record of a bias or tilt", *record as f64, allowed));
+                }
                 if let Slot::Parameter(index) = *slot
                     && index >= *known
                 {
@@ -171,11 +189,15 @@ impl Problem {
     /// allowed: what is missing in a model may drive them there.
     #[must_use]
     pub fn shaped(&self, index: usize, values: &[f64]) -> Option<Shaped> {
-        let mut shaped = Shaped { pendulum: self.records[index].pendulum.clone(), gravity: 1.0 };
+        let Record { pendulum, accelerometer, .. } = &self.records[index];
+        let (pendulum, accelerometer) = (pendulum.clone(), *accelerometer);
+        let mut shaped = Shaped { pendulum, gravity: 1.0, accelerometer };
         for (free, value) in self.free.iter().zip(values) {
             match free.slot(index) {
                 Some(Slot::Gravity) => shaped.gravity = *value,
                 Some(Slot::Parameter(place)) => shaped.pendulum.set_parameter(place, *value),
+                Some(Slot::Bias) => shaped.change(|sensor| sensor.bias = *value),
+                Some(Slot::Tilt) => shaped.change(|sensor| sensor.tilt = *value),
                 None => {}
             }
         }
@@ -191,6 +213,12 @@ impl Problem {
 }
 
 impl Shaped {
+    fn change(&mut self, change: impl FnOnce(&mut Accelerometer)) {
+        if let Some(accelerometer) = &mut self.accelerometer {
+            change(accelerometer);
+        }
+    }
+
     fn is_sound(&self) -> bool {
         let numbers = self.pendulum.parameters();
         let finite = numbers.iter().all(|(_, value)| value.is_finite());
@@ -201,13 +229,22 @@ impl Shaped {
             };
             parameters.iter().zip(effect.values()).all(fits)
         });
-        finite && in_range && self.pendulum.motion().omega > 0.0 && self.gravity > 0.0
+        let read = self.accelerometer.is_none_or(|sensor| sensor.is_sound());
+        finite && in_range && read && self.pendulum.motion().omega > 0.0 && self.gravity > 0.0
     }
 }
 
 impl Record {
+    /// Angles that its readings are, or are about.
+    #[must_use]
+    pub fn angles(&self) -> &[f64] {
+        self.angles.as_ref().unwrap_or(&self.readings)
+    }
+
     fn check(&self) -> Result<(), Error> {
-        for (name, values) in [("readings", &self.readings), ("weights", &self.weights)] {
+        let angles = self.angles.as_ref().unwrap_or(&self.readings);
+        let all = [("readings", &self.readings), ("weights", &self.weights), ("angles", angles)];
+        for (name, values) in all {
             if values.len() != self.times.len() {
                 let given = (self.times.len(), values.len());
                 return Err(Error::Lengths { given, names: ("times", name) });

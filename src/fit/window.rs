@@ -70,7 +70,7 @@ pub fn halves(problem: &Problem, window: &Window) -> Option<[Window; 2]> {
     })
 }
 
-/// Angle and velocity at a sample from a polynomial through the readings about it, by least squares.
+/// Angle and velocity at a sample from a polynomial through the angles about it, by least squares.
 #[must_use]
 pub fn guess(record: &Record, at: usize) -> State {
     let now = record.times[at];
@@ -100,14 +100,14 @@ fn polynomial(record: &Record, from: usize, to: usize, now: f64, degree: usize) 
     for k in (from..to).filter(|k| record.weights[*k] > 0.0) {
         let row: Vec<f64> = (0..count).map(|i| (record.times[k] - now).powi(i as i32)).collect();
         for i in 0..count {
-            right[i] += row[i] * record.readings[k];
+            right[i] += row[i] * record.angles()[k];
             for j in 0..count {
                 normal[(i, j)] += row[i] * row[j];
             }
         }
     }
     let nearest = (from..to).find(|k| record.weights[*k] > 0.0).unwrap_or(from);
-    let fallback = [record.readings[nearest], 0.0];
+    let fallback = [record.angles()[nearest], 0.0];
     normal.cholesky().map_or(fallback, |factor| {
         let all = factor.solve(&right);
         [all[0], all[1]]

@@ -114,6 +114,15 @@ impl<'a, N: Number> Flight<'a, N> {
         matches!(self.mode, Mode::Stuck(_))
     }
 
+    /// The sense of the motion and the side of a corner; none where it does not move.
+    #[must_use]
+    pub fn signs_held(&self) -> Option<[f64; 2]> {
+        match self.mode {
+            Mode::Moving(signs, _) => Some(signs),
+            Mode::Stuck(_) | Mode::Lost => None,
+        }
+    }
+
     /// Whether it will never move again.
     #[must_use]
     pub fn is_stuck_for_ever(&self) -> bool {

@@ -10,6 +10,8 @@ use super::tangent::Number;
 pub struct Sampled<N> {
     /// Angle, not wrapped, and velocity at each time; not numbers after the motion left their range.
     pub states: Vec<[N; 2]>,
+    /// The sense of the motion and the side of a corner at each time; none where it does not move.
+    pub signs: Vec<Option<[f64; 2]>>,
     /// Turns, sticks and releases up to the last time.
     pub events: Vec<Event>,
     /// Whether friction holds the pendulum at the last time.
@@ -34,14 +36,16 @@ pub fn sample<N: Number>(
     let mut states = Vec::with_capacity(times.len());
     let at_start = times.iter().take_while(|time| **time <= tau).count();
     states.extend(std::iter::repeat_n(flight.state, at_start));
+    let mut signs = vec![flight.signs_held(); at_start];
     while let Some(piece) = flight.advance() {
         let done = states.len();
         let due = times[done..].iter().take_while(|time| **time <= flight.tau).count();
         if due > 0 {
-            let curve = match piece {
-                Piece::Leap(mut leap) => Some(leap.curve(course)),
-                Piece::Rest(..) => None,
+            let (curve, held) = match piece {
+                Piece::Leap(mut leap) => (Some(leap.curve(course)), Some(leap.signs)),
+                Piece::Rest(..) => (None, None),
             };
+            signs.resize(done + due, held);
             for time in &times[done..done + due] {
                 let moving = curve.filter(|_| *time < flight.tau);
                 states.push(moving.map_or(flight.state, |curve| curve.at(*time)));
@@ -53,6 +57,7 @@ pub fn sample<N: Number>(
     }
     let lost = flight.state.map(|x| x.reset(f64::NAN, 1.0));
     states.resize(times.len(), lost);
+    signs.resize(times.len(), None);
     let stuck = flight.is_stuck();
-    Sampled { states, stuck, steps: flight.steps, events: flight.events }
+    Sampled { states, signs, stuck, steps: flight.steps, events: flight.events }
 }

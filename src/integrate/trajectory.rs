@@ -227,8 +227,8 @@ impl Run {
         }
         let growth = lengths.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let states = run.states.iter().map(|state| state.map(Number::value)).collect();
-        let Sampled { events, stuck, steps, .. } = run;
-        Ok((Self { states, events, stuck, steps }, growth))
+        let Sampled { signs, events, stuck, steps, .. } = run;
+        Ok((Self { states, signs, events, stuck, steps }, growth))
     }
 }
 

@@ -14,14 +14,14 @@ use crate::fit::descent::Point;
 use crate::fit::normal::linearised;
 use crate::fit::profile::intervals;
 use crate::fit::window::Window;
-use crate::fit::{Free, Problem, Record, Settings, Slot, fit};
+use crate::fit::{Accelerometer, Free, Problem, Record, Settings, Slot, fit};
 use crate::model::Recorded;
 use crate::model::recorded::{Quantity, Samples};
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
 /// `([(record, place), ...], start)`: which place in the list of parameters it is in which records,
-/// -1 for gravity; where the search starts.
+/// -1 for gravity, -2 and -3 for an accelerometer's bias and tilt; where the search starts.
 type FreeTuple = (Vec<(usize, isize)>, f64);
 
 /// `(record, first sample, one after the last, angle, velocity)`.
@@ -54,6 +54,16 @@ impl Pivot<'_> {
     }
 }
 
+/// An accelerometer as Python hands it over: its factors, and about which angles it saw.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Sensor<'py> {
+    place: f64,
+    gravity: f64,
+    interval: f64,
+    angle: Floats<'py>,
+}
+
 /// A record as Python hands it over.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -64,17 +74,30 @@ pub struct Run<'py> {
     weight: Floats<'py>,
     longest: f64,
     pivot: Option<Pivot<'py>>,
+    accelerometer: Option<Sensor<'py>>,
 }
 
 impl Run<'_> {
     fn record(self) -> PyResult<Record> {
         let recorded = self.pivot.as_ref().map(Pivot::recorded).transpose()?;
+        let angles = |sensor: &Sensor<'_>| Ok::<_, PyErr>(sensor.angle.as_slice()?.to_vec());
+        let angles = self.accelerometer.as_ref().map(angles).transpose()?;
+        let accelerometer =
+            self.accelerometer.map(|Sensor { place, gravity, interval, .. }| Accelerometer {
+                place,
+                gravity,
+                bias: 0.0,
+                interval,
+                tilt: 0.0,
+            });
         Ok(Record {
             pendulum: pendulum(self.parameters)?,
             recorded: recorded.map(Arc::new),
             times: self.time.as_slice()?.to_vec(),
             readings: self.reading.as_slice()?.to_vec(),
             weights: self.weight.as_slice()?.to_vec(),
+            accelerometer,
+            angles,
             longest: self.longest,
         })
     }
@@ -97,7 +120,11 @@ pub struct FitChoices {
 
 fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<Problem> {
     let records = runs.into_iter().map(Run::record).collect::<PyResult<_>>()?;
-    let place = |index: isize| usize::try_from(index).map_or(Slot::Gravity, Slot::Parameter);
+    let place = |index: isize| match index {
+        -2 => Slot::Bias,
+        -3 => Slot::Tilt,
+        other => usize::try_from(other).map_or(Slot::Gravity, Slot::Parameter),
+    };
     let free = free.iter().map(|(places, start)| {
         let places = places.iter().map(|(record, index)| (*record, place(*index))).collect();
         Free { places, start: *start }

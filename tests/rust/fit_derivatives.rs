@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pendmap::fit::window::Window;
-use pendmap::fit::{Problem, Record};
+use pendmap::fit::{Accelerometer, Problem, Record, Slot};
 use pendmap::integrate::State;
 use pendmap::integrate::course::Course;
 use pendmap::integrate::event::EventKind;
@@ -16,7 +16,11 @@ use crate::support::{driven, undriven};
 
 /// The largest difference of the rows from finite differences, over the size of the column or 1.
 fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
-    let (slots, own) = everything(&record.pendulum);
+    let (mut slots, mut own) = everything(&record.pendulum);
+    if let Some(sensor) = record.accelerometer {
+        slots.extend([Slot::Bias, Slot::Tilt]);
+        own.extend([sensor.bias, sensor.tilt]);
+    }
     let values = values.unwrap_or(own);
     let count = record.times.len();
     let problem =
@@ -69,6 +73,31 @@ fn derivatives_hold_for_a_decay_to_rest() {
     values[0] = 1.21;
     let error = worst(record, Some(values), start);
     assert!(error < 1e-6, "{error:e}");
+}
+
+#[test]
+fn derivatives_hold_for_what_an_accelerometer_reads() {
+    let pendulum = with(
+        undriven(0.02, 0.003).with_friction(0.05).expect("in range"),
+        &[(Kind::LoadDependentFriction, &[0.01]), (Kind::QuadraticDrag, &[0.004])],
+    );
+    let start = [2.0, -0.1];
+    let mut record = record(pendulum, None, start, 90.0);
+    record.angles = Some(record.readings.clone());
+    // At two thirds of the equivalent length, leaning and with gravity; then without it.
+    for (place, gravity) in [(2.0 / 3.0, 1.0), (-1.0, 0.0)] {
+        record.accelerometer =
+            Some(Accelerometer { place, gravity, bias: 0.01, interval: 0.06, tilt: 0.03 });
+        let error = worst(record.clone(), None, start);
+        assert!(error < 1e-6, "{error:e}");
+    }
+}
+
+#[test]
+fn a_bias_needs_an_accelerometer() {
+    let record = record(undriven(0.02, 0.0), None, [1.0, 0.0], 20.0);
+    let fault = Problem::new(vec![record], free(&[Slot::Bias], 1, &[0.0]), TOLERANCE);
+    assert!(fault.expect_err("no accelerometer").to_string().contains("accelerometer"));
 }
 
 #[test]

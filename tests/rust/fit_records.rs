@@ -41,7 +41,16 @@ pub fn record(
     let sensor = Observation::lift(&pendulum, |_, value| value);
     let readings = states.iter().map(|state| sensor.read(state[0])).collect();
     let weights = vec![1.0; times.len()];
-    Record { pendulum, recorded, times, readings, weights, longest: f64::INFINITY }
+    Record {
+        pendulum,
+        recorded,
+        times,
+        readings,
+        accelerometer: None,
+        angles: None,
+        weights,
+        longest: f64::INFINITY,
+    }
 }
 
 /// The same parameters free in all records.

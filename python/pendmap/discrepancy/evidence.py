@@ -92,6 +92,12 @@ def evidence_of(experiment: Experiment) -> Evidence:
     runs = tuple(run for run in experiment.runs if not run.peaks_only)
     if not runs:
         raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
+    made = [run for run in runs if run.accelerometer is not None]
+    if made:
+        raise InputError(
+            f"{made[0].name}: its angle is made of an acceleration, whose own errors are not among"
+            " the effects: allowed is a record with an angle or a velocity"
+        )
     readings = tuple(
         reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
     )

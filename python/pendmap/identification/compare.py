@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.identification.clock import from_first
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 from pendmap.identification.from_start import OFFSET
-from pendmap.identification.joint import as_fit_run
+from pendmap.identification.joint import as_fit_run, reading_of_run
 from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.identification.reading import reading_of
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.table1 import PeakErrors, Table1, table_of
 from pendmap.model import Rig
@@ -141,9 +139,7 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
 
 
 def _compared(model: Rig, run: Run) -> RunComparison:
-    reading = reading_of(
-        from_first(run.time)[0], run.theta, trusted=run.trusted, count=run.count_rad
-    )
+    reading = reading_of_run(run)
     fit: TrajectoryFit = fit_runs([as_fit_run(run, reading)], model, free=())
     first = fit.windows[0]
     peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)

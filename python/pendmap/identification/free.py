@@ -14,12 +14,12 @@ from pendmap.model.rig import COUNTERPARTS
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from pendmap.identification.runs import FitRun
+    from pendmap.identification.runs import FitRun, RodSensor
     from pendmap.model import Rig
     from pendmap.model.effects import Effect
     from pendmap.model.units import Units
 
-__all__ = ["PER_RUN", "PLACES", "Quantity", "free_quantities"]
+__all__ = ["PER_RUN", "PLACES", "SENSOR", "Quantity", "free_quantities"]
 
 PLACES: Final[Mapping[str, int]] = {
     "w0": -1,
@@ -32,18 +32,25 @@ PLACES: Final[Mapping[str, int]] = {
 }
 """Places in the core's list of parameters; those of effects follow. -1 is gravity."""
 
+SENSOR: Final[Mapping[str, int]] = {"bias": -2, "tilt": -3}
+"""The same of an accelerometer's own, run by run: they are always fitted."""
+
 PER_RUN: Final = ("p", "Omega", "phi")
 """What belongs to the drive of one run."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A free parameter: its name in SI, the power of ``w0`` that it has, where it stands."""
+    """A free parameter: its name in SI, the power of ``w0`` that it has, where it stands.
+
+    ``unit`` is what one of the core's is in SI besides.
+    """
 
     name: str
     power: float
     places: list[tuple[int, int]]
     start: float
+    unit: float = 1.0
 
     @property
     def is_w0(self) -> bool:
@@ -52,19 +59,21 @@ class Quantity:
 
     def bare(self, value: float, units: Units) -> float:
         """Return what the core calls it: of ``w0`` gravity."""
-        return (value / units.w0) ** 2 if self.is_w0 else float(units.bare(value, self.power))
+        if self.is_w0:
+            return (value / units.w0) ** 2
+        return float(units.bare(value, self.power)) / self.unit
 
     def given(self, value: float, units: Units) -> float:
         """Return in SI what the core calls ``value``."""
         if self.is_w0:
             return units.w0 * math.sqrt(value) if value > 0 else math.nan
-        return float(units.given(value, self.power))
+        return self.unit * float(units.given(value, self.power))
 
     def slope(self, value: float, units: Units) -> float:
         """Return the derivative of :meth:`given`."""
         if self.is_w0:
             return 0.5 * units.w0 / math.sqrt(value)
-        return float(units.given(1.0, self.power))
+        return self.unit * float(units.given(1.0, self.power))
 
 
 def free_quantities(
@@ -81,7 +90,7 @@ def free_quantities(
         The records and the pendulum of each.
     free : sequence of str
         Names as in :func:`pendmap.identification.fitting.fit_runs`; a phase that a run does not
-        know is added.
+        know is added, and so are bias and tilt of an accelerometer.
     start : mapping of str to float
         Starts other than the rigs' values.
 
@@ -112,12 +121,23 @@ def free_quantities(
             Quantity(f"phi[{k}]" if len(runs) > 1 else "phi", 0, [(k, PLACES["phi"])], math.nan)
             for k in unknown_phase
         ]
+    for k, run in enumerate(runs):
+        if run.accelerometer is not None:
+            quantities += _of_sensor(run.accelerometer, k, f"[{k}]" if len(runs) > 1 else "")
     return [
         dataclasses.replace(
             q, start=start.get(q.name, start.get(q.name.partition("[")[0], _value_of(q, rigs)))
         )
         for q in quantities
     ]
+
+
+def _of_sensor(sensor: RodSensor, k: int, which: str) -> list[Quantity]:
+    """Return what is not known of an accelerometer: its reading of nothing, and how it leans."""
+    own = [Quantity(f"bias{which}", 0, [(k, SENSOR["bias"])], math.nan, sensor.unit)]
+    if sensor.leans:
+        own.append(Quantity(f"tilt{which}", 0, [(k, SENSOR["tilt"])], math.nan))
+    return own
 
 
 def _effect(name: str, rig: Rig) -> tuple[int, Effect, str] | None:
@@ -163,6 +183,8 @@ def _power_of(name: str, rig: Rig, free: Sequence[str]) -> float:
 def _value_of(quantity: Quantity, rigs: Sequence[Rig]) -> float:
     rig = rigs[quantity.places[0][0]]
     name = quantity.name.partition("[")[0]
+    if name in SENSOR:
+        return 0.0
     if name in PLACES:
         return float(getattr(rig, name))
     found = _effect(name, rig)

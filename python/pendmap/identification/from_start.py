@@ -66,9 +66,11 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     """
     first = runs[0]
     good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
-    time, theta = first.time[good], first.theta[good]
+    time, theta = first.time[good], first.angle[good]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
+    # An accelerometer has a bias instead.
+    zeroed = offset and any(run.accelerometer is None for run in runs)
 
     def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
         model = _start_of(begin, time, theta, readings[0].sigma)
@@ -76,7 +78,7 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
             model = dataclasses.replace(model, Tr=0.0)
         named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
         known = [*model.effects, *named]
-        zero = [] if OFFSET in {e.name for e in known} or not offset else [OFFSET]
+        zero = [OFFSET] if zeroed and OFFSET not in {e.name for e in known} else []
         more = [Effect(name, {"d": 0.0}) for name in zero]
         model = dataclasses.replace(model, effects=(*known, *more))
         wanted = _sizes(known) if free is None else free

@@ -10,14 +10,18 @@ from pendmap.identification.clock import from_first
 from pendmap.identification.fitting import FitRun, Pivot, TrajectoryFit
 from pendmap.identification.from_start import fit_from_start
 from pendmap.identification.reading import Reading, reading_of
+from pendmap.identification.runs import RodSensor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from pendmap.model import Effect, Rig
     from pendmap.records import Run
 
-__all__ = ["JointFit", "as_fit_run", "fit_together"]
+__all__ = ["JointFit", "as_angles", "as_fit_run", "fit_together", "reading_of_run"]
 
 QUANTITIES: Final = {"m/s2": "acceleration", "m/s": "velocity", "m": "position"}
 """What a recorded motion of the pivot is, by its unit."""
@@ -56,14 +60,42 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         )
     return FitRun(
         time,
-        run.theta,
+        as_angles(run),
         reading.each,
         trusted=run.trusted,
         drive=run.drive,
         pivot=pivot,
         lab_time_s=run.lab_time_s + first,
         name=run.name,
+        accelerometer=_rod_sensor(run),
     )
+
+
+def as_angles(run: Run) -> NDArray[np.float64]:
+    """Return a run's readings: its angles, or those of its accelerometer over the gain.
+
+    The gain makes them angles of small free swings.
+    """
+    if run.accelerometer is None or run.acceleration is None:
+        return run.theta
+    return run.acceleration / run.accelerometer.gain
+
+
+def reading_of_run(run: Run) -> Reading:
+    """Return what the readings of a run are worth; see :func:`reading_of`."""
+    time = from_first(run.time)[0]
+    if run.accelerometer is None:
+        return reading_of(time, run.theta, trusted=run.trusted, count=run.count_rad)
+    return reading_of(time, as_angles(run), trusted=run.trusted)
+
+
+def _rod_sensor(run: Run) -> RodSensor | None:
+    sensor = run.accelerometer
+    if sensor is None:
+        return None
+    place, gravity = sensor.distance_m / sensor.gain, sensor.gravity / sensor.gain
+    leans = sensor.direction != "angular"
+    return RodSensor(place, gravity, run.theta, sensor.gain, leans=leans)
 
 
 def fit_together(
@@ -95,10 +127,7 @@ def fit_together(
     """
     if not runs:
         raise InputError("runs is empty: allowed is one record or more")
-    readings = [
-        reading_of(from_first(run.time)[0], run.theta, trusted=run.trusted, count=run.count_rad)
-        for run in runs
-    ]
+    readings = [reading_of_run(run) for run in runs]
     fit = fit_from_start(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
         readings,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.identification.free import SENSOR
 from pendmap.identification.from_start import OFFSET
 
 if TYPE_CHECKING:
@@ -43,6 +44,10 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     notes: dict[str, Any] = {}
     if best.covariance is not None:
         names, matrix = best.covariance
+        # A sensor's bias and tilt are no part of the pendulum.
+        kept = [k for k, name in enumerate(names) if name.partition("[")[0] not in SENSOR]
+        names = tuple(names[k] for k in kept)
+        matrix = np.asarray(matrix)[np.ix_(kept, kept)]
         own = {"offset": f"{OFFSET}.d"}
         notes["covariance"] = {
             "names": [own.get(name, name) for name in names],
@@ -50,7 +55,7 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
             "ci95": {
                 own.get(name, name): list(e.ci95)
                 for name, e in best.estimates.items()
-                if e.ci95 is not None
+                if e.ci95 is not None and name in names
             },
         }
     sha256 = report.experiment.sha256

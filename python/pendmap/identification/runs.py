@@ -19,7 +19,15 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
     from pendmap.model.units import Units
 
-__all__ = ["FitRun", "Pivot", "bare_run", "bare_windows", "rig_of", "tolerance_of"]
+__all__ = [
+    "FitRun",
+    "Pivot",
+    "RodSensor",
+    "bare_run",
+    "bare_windows",
+    "rig_of",
+    "tolerance_of",
+]
 
 FORCED_WINDOW_SWINGS: Final = 3.0
 """The longest window of a forced run, in periods of small swings: forced motions may be chaotic,
@@ -54,6 +62,36 @@ class Pivot:
 
 
 @dataclasses.dataclass(frozen=True)
+class RodSensor:
+    """An accelerometer on the rod, whose readings a fit compares instead of angles.
+
+    It reads ``place (th'' cos(tilt) + th'**2 sin(tilt)) + gravity sin(th + tilt) + bias``, where
+    ``bias`` and ``tilt`` are fitted. Where friction turns round, at every turn, ``th''`` and the
+    reading jump by ``2 place Tr``, which the reading whose interval of sampling holds the turn
+    shares; while friction holds the pendulum, ``th''`` is 0.
+
+    Parameters
+    ----------
+    place : float
+        Reading per rad/s^2.
+    gravity : float
+        Reading of the whole of gravity; 0 where the sensor gives none.
+    angle : ndarray of float, shape (n,)
+        About which angles the readings were taken, rad: where the search starts.
+    unit : float
+        What a bias is given in, over the unit of the readings.
+    leans : bool
+        Whether its axis has a tilt.
+    """
+
+    place: float
+    gravity: float
+    angle: NDArray[np.float64]
+    unit: float = 1.0
+    leans: bool = True
+
+
+@dataclasses.dataclass(frozen=True)
 class FitRun:
     """A record to be fitted.
 
@@ -62,7 +100,7 @@ class FitRun:
     time : ndarray of float, shape (n,)
         In s; each after the one before it. The drive's phase counts from ``time = 0``.
     theta : ndarray of float, shape (n,)
-        What the sensor read, rad, unwrapped.
+        What the sensor read, rad, unwrapped; of an accelerometer in the unit of its factors.
     sigma : float or ndarray of float, shape (n,)
         Standard error of the readings, rad; above 0.
     trusted : ndarray of bool, shape (n,), or None
@@ -77,6 +115,8 @@ class FitRun:
         The longest window; none: the whole record for a free decay, three swings for a forced run.
     name : str
         What to call it.
+    accelerometer : RodSensor or None
+        What read, if it was no sensor of the angle; effects on the reading do not act on it.
     """
 
     time: NDArray[np.float64]
@@ -88,6 +128,12 @@ class FitRun:
     lab_time_s: float = 0.0
     longest_s: float | None = None
     name: str = ""
+    accelerometer: RodSensor | None = None
+
+    @property
+    def angle(self) -> NDArray[np.float64]:
+        """The angle, rad; of an accelerometer the one that was made of its readings."""
+        return self.theta if self.accelerometer is None else self.accelerometer.angle
 
     @property
     def forced(self) -> bool:
@@ -124,6 +170,22 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
         "weight": np.ascontiguousarray(weight),
         "longest": float(units.bare(longest, -1)),
         "pivot": None if run.pivot is None else _bare_pivot(run.pivot, rig, units),
+        "accelerometer": _bare_sensor(run, units),
+    }
+
+
+def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
+    sensor = run.accelerometer
+    if sensor is None:
+        return None
+    if run.forced:
+        raise InputError(f"{run.name or 'run'}: an accelerometer on a moving pivot is not fitted")
+    return {
+        "place": float(units.given(sensor.place, 2)),
+        "gravity": sensor.gravity,
+        # A reading is the mean over an interval of sampling.
+        "interval": float(units.bare(float(np.median(np.diff(run.time))), -1)),
+        "angle": _floats("angle", sensor.angle),
     }
 
 

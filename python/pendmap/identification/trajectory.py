@@ -16,6 +16,7 @@ import numpy as np
 from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.identification.clock import from_first, span
+from pendmap.identification.free import SENSOR
 from pendmap.identification.from_start import OFFSET, TooShortError, fit_from_start
 from pendmap.identification.reading import Reading, reading_of
 from pendmap.identification.result import Estimate, Identification
@@ -221,7 +222,9 @@ def _warnings(
         found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
     if not fit.converged:
         found.append("the search did not converge")
-    lost = [name for name, e in estimates.items() if e.ci95 is None]
+    # How a sensor leans shows in wide swings alone: nobody asks for it.
+    wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
+    lost = [name for name, e in wanted.items() if e.ci95 is None]
     if lost:
         found.append(f"no end was found for the interval of {', '.join(lost)}")
     coarse = [reading.count for reading in readings if reading.coarse]

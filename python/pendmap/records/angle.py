@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.records.accelerometer import LIKE
 from pendmap.records.circle import circle_angle
+from pendmap.records.from_acceleration import angle_from
 from pendmap.records.swings import swings
 from pendmap.words import counted
 
@@ -103,10 +105,45 @@ def _derived(work: Work) -> None:
         text = "the angle is the velocity integrated; its zero is the middle of the swing"
         work.say("angle-integrated", text, mended=True)
         return
-    raise InputError(
-        f"{work.where}: an acceleration alone tells no angle, where the sensor sits is not known:"
-        " allowed is an angle, a velocity (gyroscope) or pixel_x and pixel_y beside it"
+    _accelerated(work)
+
+
+def _accelerated(work: Work) -> None:
+    """Make the angle of an acceleration alone, whose place must be known."""
+    beside = "an angle, a velocity (gyroscope) or pixel_x and pixel_y beside it"
+    sensor = work.accelerometer
+    if sensor is None:
+        raise InputError(
+            f"{work.where}: an acceleration alone tells no angle, where the sensor sits is not"
+            f" known: {work.place_missing} missing in [columns] of experiment.toml: allowed is like"
+            f" {LIKE}, or {beside}"
+        )
+    if sensor.direction == "radial":
+        raise InputError(
+            f"{work.where}: a radial acceleration alone cannot tell left from right: allowed is"
+            f" the tangential one, or {beside}"
+        )
+    if work.plan.kind == "forced":
+        raise InputError(
+            f"{work.where}: an acceleration alone on a forced run holds the pivot's own: allowed is"
+            f" a free decay, or {beside}"
+        )
+    _finite(work, "acceleration", work.extra["acceleration"])
+    found = angle_from(work.time, work.extra["acceleration"], sensor, work.where)
+    work.theta, work.accelerometer = found.theta, found.accelerometer
+    removed = ", gravity removed" if not sensor.gravity else f", g = {sensor.gravity:g} m/s^2"
+    place = (
+        "an angular acceleration"
+        if sensor.direction == "angular"
+        else f"a tangential acceleration {sensor.distance_m:g} m from the pivot{removed}"
     )
+    text = (
+        f"the angle is made of {place}, without the damping's part in it: roughly right, for"
+        " pictures and the methods of peaks; the trajectory method fits the acceleration itself"
+    )
+    work.say("angle-from-acceleration", text, mended=True)
+    if found.doubt:
+        work.say("acceleration-weak", found.doubt)
 
 
 def _integrated(work: Work, velocity: Floats) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.records.accelerometer import GRAVITY, Accelerometer, accelerometer_of
 from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain
 
@@ -51,6 +52,10 @@ class Channels:
         What it is: ``"m/s2"``, ``"m/s"`` or ``"m"``.
     findings : tuple of Finding
         What had to be guessed.
+    accelerometer : Accelerometer or None
+        Where the acceleration was measured, if that is known ...
+    place_missing : str
+        ... else the keys of [columns] that would say it.
     """
 
     values: Mapping[str, Floats]
@@ -59,6 +64,8 @@ class Channels:
     pivot: Mapping[str, Floats] | None = None
     pivot_unit: str | None = None
     findings: tuple[Finding, ...] = ()
+    accelerometer: Accelerometer | None = None
+    place_missing: str = ""
 
 
 def channels_of(table: Table, description: Description, plan: RunPlan, where: str) -> Channels:
@@ -91,7 +98,16 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
     if plan.pivot and "unit" not in plan.pivot:
         text = 'the pivot has no unit: taken for an acceleration, unit = "m/s2"'
         findings.append(Finding("pivot-unit", text))
-    return Channels(values, units, frozenset(declared), pivot, unit, tuple(findings))
+    sensor, missing = None, ""
+    if "acceleration" in places:
+        k, said = places["acceleration"], asked.get("acceleration")
+        heading, read_in = name_and_unit(table.names[k])
+        gravity = float(description.known.get("gravity", GRAVITY))
+        given_in = said.unit if said and said.unit else read_in
+        sensor, missing = accelerometer_of(said, given_in, heading, gravity)
+    return Channels(
+        values, units, frozenset(declared), pivot, unit, tuple(findings), sensor, missing
+    )
 
 
 def _place(name: str, table: Table, where: str) -> int:

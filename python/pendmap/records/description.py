@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.records.accelerometer import Place, place_of
 from pendmap.records.units import CHANNELS, PIVOT_UNITS
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ NAME: Final = "experiment.toml"
 _RIG: Final = ("gravity", "length_m", "w0", "encoder_counts")
 _TOP: Final = ("rig", "columns", "reader", "run")
 _COLUMN: Final = ("name", "unit", "scale", "zero")
+_PLACE: Final = ("direction", "distance_m", "gravity_removed")
 _READER: Final = ("delimiter", "decimal", "skip_rows")
 _RUN: Final = (
     *("file", "kind", "lab_time_s", "from_s", "to_s"),
@@ -39,12 +41,16 @@ _MOST_COUNTS: Final = 10**9
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """Where a channel stands: the column's name, its unit, rad (or other SI) a unit, zero."""
+    """Where a channel stands: the column's name, its unit, rad (or other SI) a unit, zero.
+
+    ``place`` is where an accelerometer sits.
+    """
 
     name: str | None = None
     unit: str | None = None
     scale: float | None = None
     zero: float = 0.0
+    place: Place = dataclasses.field(default_factory=Place)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,7 +185,8 @@ def _column(channel: str, value: object) -> Column:
     if not isinstance(value, dict):
         allowed = f'allowed is a table like {channel} = {{ name = "...", unit = "..." }}'
         raise InputError(f"{where} is {checks.shown(value)}: {allowed}")
-    _keys(value, _COLUMN, where)
+    placed = channel == "acceleration"
+    _keys(value, (*_COLUMN, *_PLACE) if placed else _COLUMN, where)
     name = _text(f"{where}: name", value["name"]) if "name" in value else None
     unit = _text(f"{where}: unit", value["unit"]) if "unit" in value else None
     scale = None
@@ -188,7 +195,8 @@ def _column(channel: str, value: object) -> Column:
         if scale == 0:
             raise InputError(f"{where}: scale is 0: allowed is any other number")
     zero = checks.number(f"{where}: zero", value.get("zero", 0.0))
-    column = Column(name, unit, scale, zero)
+    place = place_of(value, where) if placed else Place()
+    column = Column(name, unit, scale, zero, place)
     if unit is not None and scale is None:
         CHANNELS[channel].factor(unit, where)  # refuses what is not known, before files are read
     return column

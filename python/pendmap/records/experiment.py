@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from pendmap.records.accelerometer import Accelerometer
+
     Floats = NDArray[np.float64]
 
 __all__ = ["Experiment", "Finding", "Run", "Segment"]
@@ -92,7 +94,9 @@ class Run:
     velocity : ndarray, shape (N,), or None
         rad/s, where it was measured.
     acceleration : ndarray, shape (N,), or None
-        m/s^2 (or rad/s^2), where it was measured beside the angle.
+        m/s^2 (or rad/s^2), where it was measured.
+    accelerometer : Accelerometer or None
+        Where it was measured, if the angle was made of it alone.
     drive : mapping or None
         ``p``, ``Omega`` and ``phi`` (``None``: to be fitted) of a(t) = p cos(Omega t + phi).
     pivot : mapping of str to ndarray, or None
@@ -124,6 +128,7 @@ class Run:
     hold_out: bool = False
     velocity: Floats | None = None
     acceleration: Floats | None = None
+    accelerometer: Accelerometer | None = None
     drive: Mapping[str, float | None] | None = None
     pivot: Mapping[str, Floats] | None = None
     pivot_unit: str | None = None

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["find"]
+__all__ = ["find", "find_spikes"]
 
 SPIKE: Final = 10.0
 """Local standard deviations of a residual that are looked into. White noise reaches 6 once in
@@ -71,6 +71,32 @@ class _Jump:
     at: int
     size: float
     error: float
+
+
+def find_spikes(work: Work, values: Floats, unit: str) -> None:
+    """Mark readings of another kind that are far from their neighbours, and say so.
+
+    An accelerometer may jump, where friction turns round; what does not come back is not looked
+    into.
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    if work.time.size < 2 * POINTS:
+        return
+    fit = local_fit(work.time, values)
+    size = np.abs(fit.residual)
+    if size.size < POINTS:
+        return
+    # What is false shows in every window that it is part of, most in its own.
+    highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
+    at = fit.middle[(size > 2 * SPIKE * broad_scale(size)) & (size >= highest)]
+    if not at.size or at.size > MOST_SPIKES * values.size:
+        return
+    near = np.array([np.median(values[max(k - SIDE, 0) : k + SIDE + 1]) for k in at])
+    worst = float(np.max(np.abs(values[at] - near)))
+    work.trusted[at] = False
+    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} {unit}: not for fitting"
+    work.say("outliers", text, at=at)
 
 
 def find(work: Work) -> None:

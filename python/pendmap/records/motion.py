@@ -251,6 +251,8 @@ def _segment(work: Work, what: str, low: int, high: int, *, used: bool) -> Segme
 
 def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
     """Say where it rests, or about what it swings, if that is not 0."""
+    if work.made_of is not None:
+        return  # the middle was taken for 0 as the angle was made
     last = work.segments[-1]
     if last.what == "rest":
         tail = work.theta[work.time >= last.from_s]

@@ -104,7 +104,7 @@ def _run(
     if not work.peaks_only:
         samples.check(work)
         moves = motion.moves(work)
-        if moves:
+        if moves and work.made_of is None:
             scale.check(work)
         samples.say_steps(work)
         if moves:
@@ -123,6 +123,7 @@ def _run(
         hold_out=plan.hold_out,
         velocity=work.extra.get("velocity"),
         acceleration=work.extra.get("acceleration"),
+        accelerometer=work.made_of,
         drive=plan.drive,
         pivot=work.pivot(),
         pivot_unit=channels.pivot_unit,

@@ -38,6 +38,10 @@ PLAIN: Final = 0.05
 
 def check(work: Work) -> None:
     """Mark what is not for fitting, mend missed counts that are certain, and say so."""
+    if work.made_of is not None:
+        # What may be false is the acceleration: the angle made of it has corners of its own.
+        false_samples.find_spikes(work, work.extra["acceleration"], work.made_of.unit)
+        return
     work.seen = step_of(work.theta)
     work.count = _count(work)
     _clipped(work)

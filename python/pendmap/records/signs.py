@@ -1,4 +1,4 @@
-"""Signs and scales that two channels show of each other: gyroscope and angle, pivot and motion."""
+"""Signs and scales that two channels show of each other: gyroscope, accelerometer, angle, pivot."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records import acceleration_check
 from pendmap.records.local_fit import local_fit
 from pendmap.words import counted
 
@@ -40,6 +41,8 @@ def check(work: Work) -> None:
     """Turn a velocity that runs against the angle; say so where a drive acts the wrong way."""
     if "velocity" in work.extra:
         _velocity(work)
+    if "acceleration" in work.extra:
+        acceleration_check.check(work)
     if work.plan.kind == "forced":
         _drive(work)
 

@@ -12,7 +12,15 @@ from pendmap.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["CHANNELS", "PIVOT_UNITS", "Channel", "name_and_unit", "plain"]
+__all__ = [
+    "ANGULAR_ACCELERATIONS",
+    "CHANNELS",
+    "PIVOT_UNITS",
+    "Channel",
+    "name_and_unit",
+    "plain",
+    "spelling",
+]
 
 PIVOT_UNITS: Final = {
     "m/s2": ("m/s2", 1.0),
@@ -56,7 +64,7 @@ class Channel:
         InputError
             If it is not one of this channel's.
         """
-        spelled = _spelling(unit)
+        spelled = spelling(unit)
         if spelled in self.units:
             return self.units[spelled]
         if spelled in _RAW:
@@ -71,7 +79,7 @@ class Channel:
 
     def has(self, unit: str) -> bool:
         """Whether a text is one of the channel's units, raw ones included."""
-        return _spelling(unit) in self.units or _spelling(unit) in _RAW
+        return spelling(unit) in self.units or spelling(unit) in _RAW
 
 
 _RAW: Final = ("v", "mv", "volt", "volts", "count", "counts", "tick", "ticks", "adc", "lsb")
@@ -97,10 +105,15 @@ _SPEEDS: Final = {
     "rpm": _TURN / 60,
     **dict.fromkeys(("rev/s", "rps"), _TURN),
 }
+ANGULAR_ACCELERATIONS: Final = {
+    **dict.fromkeys(("rad/s2", "1/s2"), 1.0),
+    **dict.fromkeys(("deg/s2", "°/s2"), _DEGREE),
+}
+"""Units of an acceleration that needs no place on the rod, in rad/s^2."""
 _ACCELERATIONS: Final = {
     **dict.fromkeys(("m/s2", "m/s/s", "ms-2", "m/ss"), 1.0),
     "g": 9.80665,
-    "rad/s2": 1.0,
+    **ANGULAR_ACCELERATIONS,
 }
 _LENGTHS: Final = {
     **dict.fromkeys(("px", "pixel", "pixels"), 1.0),
@@ -169,7 +182,7 @@ CHANNELS: Final = {
         "m/s2",
         _ACCELERATIONS,
         "acceleration_m_s2",
-        ("(linear )?acc(el|eleration)?( ?[xyz])?", "a[xyz]?"),
+        ("((linear|angular) )?acc(el|eleration|elerometer)?( ?[xyz])?", "a[xyz]?", "theta ?ddot"),
     ),
     "pixel_x": Channel("px", _LENGTHS, "pixel_x", ("x", "pixel ?x", "x ?pixel", "px x", "pos ?x")),
     "pixel_y": Channel("px", _LENGTHS, "pixel_y", ("y", "pixel ?y", "y ?pixel", "px y", "pos ?y")),
@@ -183,7 +196,7 @@ _AFTER: Final = re.compile(r"^(?P<name>[^/]+?)\s*(?:/\s*|,\s*|\s+in\s+)(?P<unit>
 _BEHIND: Final = re.compile(r"^(?P<name>.+?)[_ ](?P<unit>[a-zµ°]+(?:_s2?)?)$", re.IGNORECASE)
 
 
-def _spelling(unit: str) -> str:
+def spelling(unit: str) -> str:
     """Return a unit as the tables above spell it."""
     text = unit.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
     text = text.replace("µ", "u").replace("μ", "u").replace("·", "").replace(" ", "")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap.records.accelerometer import Accelerometer
     from pendmap.records.channels import Channels
     from pendmap.records.description import RunPlan
     from pendmap.records.text import Table
@@ -37,7 +38,8 @@ class Work:
 
     ``count`` is the step of the readings as it is known, ``seen`` as they show it, 0 for none.
     ``extra`` holds further channels by name, those of the pivot as ``pivot:vertical`` and
-    ``pivot:horizontal``.
+    ``pivot:horizontal``. ``accelerometer`` says where an acceleration was measured, or
+    ``place_missing`` which keys would.
     """
 
     where: str
@@ -54,6 +56,14 @@ class Work:
     count: float = 0.0
     seen: float = 0.0
     peaks_only: bool = False
+    accelerometer: Accelerometer | None = None
+    place_missing: str = ""
+
+    @property
+    def made_of(self) -> Accelerometer | None:
+        """The accelerometer that the angle was made of; none where the angle was measured."""
+        made = self.accelerometer is not None and math.isfinite(self.accelerometer.w0)
+        return self.accelerometer if made else None
 
     @classmethod
     def begin(
@@ -80,6 +90,8 @@ class Work:
             extra=extra | ({} if "angle" in channels.values else {"no angle": np.zeros(time.size)}),
             trusted=np.ones(time.size, bool),
             findings=[*table.findings, *channels.findings],
+            accelerometer=channels.accelerometer,
+            place_missing=channels.place_missing,
         )
 
     def say(

@@ -20,6 +20,7 @@ UNITS: Final[Mapping[str, str]] = {
     "c_over_m": "1/s",
     "Tr": "rad/s\N{SUPERSCRIPT TWO}",
     "offset": "rad",
+    "tilt": "rad",
 }
 """Units of what several methods know; parameters of effects are in SI, as they say themselves."""
 

@@ -1,0 +1,86 @@
+//! An accelerometer on the rod, at the distance `r` from the pivot.
+//!
+//! It does not measure `r th''` but the specific force, acceleration less gravity. Towards positive
+//! theta that is `r th'' + g sin th`, towards the pivot `r th'^2 + g cos th`; an axis that is turned
+//! by `d` out of the tangential direction reads
+//! `r (th'' cos d + th'^2 sin d) + g sin(th + d)`.
+//! Where friction jumps with the sense of the motion, `th''` and the reading jump with it, at every
+//! turn; a pendulum that is held fast has `th'' = 0` and shows gravity alone. A reading is the mean
+//! over an interval of sampling: at a turn within it the jump is shared in proportion, so that the
+//! sum of squares has no steps where a turn passes a sample.
+
+use std::f64::consts::FRAC_1_PI;
+
+use crate::integrate::course::Course;
+use crate::integrate::tangent::Number;
+use crate::lanes::sine::Fine;
+
+/// What an accelerometer reads of a motion: `place (th'' cos tilt + th'^2 sin tilt) + gravity
+/// sin(th + tilt) + bias`, in any unit that the readings have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accelerometer {
+    /// The factor on `th''`, time being counted in `1 / w_ref`.
+    pub place: f64,
+    /// The factor on gravity's part; 0 where gravity has been taken out.
+    pub gravity: f64,
+    /// What it reads of nothing.
+    pub bias: f64,
+    /// The interval that a reading is the mean over, in `1 / w_ref`.
+    pub interval: f64,
+    /// The angle between its axis and the tangential direction, rad.
+    pub tilt: f64,
+}
+
+impl Accelerometer {
+    /// The reading in one state; `signs` are the sense of the motion and the side of a corner, none
+    /// where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
+    pub fn read<N: Number>(
+        &self,
+        course: &Course<N>,
+        tau: f64,
+        [theta, velocity]: [N; 2],
+        signs: Option<[f64; 2]>,
+        [bias, tilt]: [N; 2],
+    ) -> N {
+        let leaning = (theta + tilt).scale(FRAC_1_PI).sine::<Fine>().scale(self.gravity);
+        let turned = tilt.scale(FRAC_1_PI);
+        let pull = signs.map_or(N::constant(0.0), |signs| {
+            self.mean_acceleration(course, tau, [theta, velocity], signs)
+        });
+        let inward = velocity * velocity * turned.sine::<Fine>();
+        let moving = pull.mul_add(turned.cosine::<Fine>(), inward);
+        moving.scale_add(self.place, leaning) + bias
+    }
+
+    /// `th''`, with the jump of friction at a turn less than half an interval away shared: the turn
+    /// is `|th'| / |th''|` away.
+    fn mean_acceleration<N: Number>(
+        &self,
+        course: &Course<N>,
+        tau: f64,
+        [theta, velocity]: [N; 2],
+        [sense, side]: [f64; 2],
+    ) -> N {
+        let here = course.acceleration(tau, theta, velocity, [sense, side]);
+        let away = velocity.scale(sense);
+        let reach = here.scale((0.5 * self.interval).copysign(here.value()));
+        if !course.jumps() || away.value() >= reach.value() {
+            return here;
+        }
+        let mut there = course.acceleration(tau, theta, velocity, [-sense, side]);
+        // Before a turn the pull is against the motion; where it would be so after it, too, friction
+        // holds the pendulum.
+        if here.value() * sense < 0.0 && there.value() * sense >= 0.0 {
+            there = N::constant(0.0);
+        }
+        let share = (away / reach).affine(-0.5, 0.5);
+        (there - here).mul_add(share, here)
+    }
+
+    /// Whether all of it are numbers, and it shows anything.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let all = [self.place, self.gravity, self.bias, self.interval, self.tilt];
+        all.iter().all(|x| x.is_finite()) && (self.place != 0.0 || self.gravity != 0.0)
+    }
+}

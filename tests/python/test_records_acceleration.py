@@ -1,0 +1,200 @@
+"""The acceleration channel: what it needs, how it is refused, what is said beside an angle."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import pendmap
+from accelerations import GRAVITY, TRUTH, experiment, readings
+from driven_decays import motion
+from pendmap import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pendmap.records import Run
+
+PLACE = 'direction = "tangential", distance_m = %g'
+CENTRE = GRAVITY / TRUTH["w0"] ** 2
+
+
+def column(place: str, unit: str = "m/s2") -> str:
+    return f'{{ name = "acc", unit = "{unit}", {place} }}'
+
+
+def read(folder: Path) -> Run:
+    return pendmap.read_experiment(folder).runs[0]
+
+
+def said(run: Run) -> dict[str, str]:
+    return {finding.what: finding.text for finding in run.findings}
+
+
+@pytest.mark.parametrize("release", [0.3, 1.4, 2.5])
+def test_the_angle_that_is_made_is_near(tmp_path: Path, release: float) -> None:
+    time, theta, force = readings(release=release)
+    run = read(experiment(tmp_path, column(PLACE % 0.1), time, force))
+    assert run.accelerometer is not None
+    assert run.accelerometer.w0 == pytest.approx(TRUTH["w0"], rel=0.02)
+    assert float(np.sqrt(np.mean((run.theta - theta) ** 2))) < 0.05
+    assert "angle-from-acceleration" in said(run)
+    assert {"outliers", "missed-counts", "readings-in-degrees"}.isdisjoint(said(run))
+
+
+@pytest.mark.parametrize(
+    ("place", "refused"),
+    [
+        ('unit = "m/s2"', "direction and distance_m missing"),
+        ('direction = "tangential"', "distance_m missing"),
+        ("distance_m = 0.1", "direction missing"),
+        ('direction = "radial", distance_m = 0.1', "cannot tell left from right"),
+        ('direction = "up", distance_m = 0.1', 'allowed are "tangential", "radial", "angular"'),
+        (PLACE % -1, "distance_m is -1: allowed is more than 0"),
+        ('direction = "tangential", distance_m = "near"', "distance_m is 'near'"),
+        (PLACE % 0.1 + ", gravity_removed = 1", "gravity_removed"),
+        ('direction = "angular", unit = "m/s2"', "allowed are rad/s2 and deg/s2"),
+        ('unit = "rad/s2", direction = "tangential"', "allowed are m/s2 and g"),
+        (PLACE % 0.1 + ", distanse = 1", "perhaps distance_m is meant"),
+    ],
+)
+def test_what_is_missing_or_wrong_is_named(tmp_path: Path, place: str, refused: str) -> None:
+    time, _, force = readings(seconds=20)
+    there = experiment(tmp_path, f'{{ name = "acc", {place} }}', time, force)
+    with pytest.raises(InputError) as error:
+        read(there)
+    assert refused in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_place_belongs_to_an_acceleration_alone(tmp_path: Path) -> None:
+    time, theta, _ = readings(seconds=20)
+    there = experiment(tmp_path, "", time, theta, names="t_s,theta_rad")
+    text = (there / "experiment.toml").read_text(encoding="utf-8")
+    text = text.replace("[columns]", "[columns]\nangle = { distance_m = 0.1 }")
+    (there / "experiment.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="angle: distance_m is not known"):
+        read(there)
+
+
+def test_an_axis_along_the_rod_is_told_from_one_across(tmp_path: Path) -> None:
+    for gravity, removed in ((GRAVITY, "false"), (0.0, "true")):
+        time, _, force = readings("radial", gravity=gravity)
+        place = f"{PLACE % 0.1}, gravity_removed = {removed}"
+        with pytest.raises(InputError, match="along the rod: allowed is the column of the axis"):
+            read(experiment(tmp_path, column(place), time, force))
+
+
+def test_a_wrong_unit_is_told_by_readings_that_no_swing_has(tmp_path: Path) -> None:
+    time, _, force = readings(release=1.4)
+    with pytest.raises(InputError, match=r"reaches .* at most .* unit, distance_m, direction"):
+        read(experiment(tmp_path, column(PLACE % 0.1, "g"), time, force))
+
+
+def test_the_centre_of_oscillation_sees_nothing(tmp_path: Path) -> None:
+    time, _, force = readings(distance=CENTRE)
+    with pytest.raises(InputError, match="nothing but damping is felt there"):
+        read(experiment(tmp_path, column(PLACE % CENTRE), time, force))
+    near = 0.85 * CENTRE
+    time, _, force = readings(distance=near)
+    text = said(read(experiment(tmp_path, column(PLACE % near), time, force)))
+    assert "centre of oscillation" in text["acceleration-weak"]
+    # 1 mm of the 38 mm that are left.
+    percent = re.search(r"1 mm makes angles ([\d.]+) % wrong", text["acceleration-weak"])
+    assert percent is not None
+    assert float(percent[1]) == pytest.approx(0.1 / (CENTRE - near), rel=0.1)
+
+
+def test_a_signal_near_the_noise_is_said(tmp_path: Path) -> None:
+    time, _, force = readings(release=0.05, friction=0.0, noise=0.03)
+    text = said(read(experiment(tmp_path, column(PLACE % 0.1), time, force)))
+    assert "times the noise" in text["acceleration-weak"]
+
+
+def test_turns_over_the_top_and_forced_runs_are_refused(tmp_path: Path) -> None:
+    time = np.arange(0, 30, 0.01)
+    theta = motion(time, (0.3, 20.0), w0=6.2, c_over_m=0.08, friction=0.1)
+    force = -np.gradient(np.gradient(theta, time), time)
+    with pytest.raises(InputError, match="over the top"):
+        read(experiment(tmp_path, '{ name = "acc", unit = "rad/s2" }', time, force))
+    time, _, force = readings()
+    there = experiment(tmp_path, column(PLACE % 0.1), time, force)
+    with (there / "experiment.toml").open("a", encoding="utf-8") as file:
+        file.write("drive = { p = 0.1, Omega = 12 }\n")
+    with pytest.raises(InputError, match="forced run holds the pivot's own: allowed is a free"):
+        read(there)
+
+
+def test_files_of_phyphox(tmp_path: Path) -> None:
+    """As phyphox writes them: three axes, with gravity, or without as "Linear Acceleration"."""
+    for heading, gravity in (("Acceleration", GRAVITY), ("Linear Acceleration", 0.0)):
+        time, _, across = readings(distance=0.3, gravity=gravity)
+        _, _, along = readings("radial", distance=0.3, gravity=gravity, seed=1)
+        other = 0.02 * np.random.default_rng(2).standard_normal(time.size)
+        names = '"Time (s)",' + ",".join(f'"{heading} {axis} (m/s^2)"' for axis in "xyz")
+        place = f'{{ name = "{heading} x (m/s^2)", {PLACE % 0.3} }}'
+        there = experiment(tmp_path, place, time, across, along, other, names=names)
+        run = read(there)
+        assert run.accelerometer is not None
+        assert run.accelerometer.gravity == gravity
+        assert ("gravity removed" in said(run)["angle-from-acceleration"]) == (gravity == 0)
+
+
+def test_spikes_of_the_sensor_are_left_out(tmp_path: Path) -> None:
+    time, _, force = readings()
+    force[[500, 1200]] += [5.0, -3.0]
+    run = read(experiment(tmp_path, column(PLACE % 0.1), time, force))
+    assert "2 outliers" in said(run)["outliers"]
+    assert not run.trusted[[500, 1200]].any()
+
+
+BESIDE = {
+    "agrees": (PLACE % 0.1, 1.0, "acceleration-agrees", "0.1 m: a check, not fitted"),
+    "turned": (PLACE % 0.1, -1.0, "sign-turned", "turned round"),
+    "elsewhere": (PLACE % 0.15, 1.0, "acceleration-scale", "distance_m would be 0.1"),
+    "radial": ('direction = "radial", distance_m = 0.1', 1.0, "acceleration-unlike", "not used"),
+    "unplaced": ('unit = "m/s2"', 1.0, "acceleration-unused", "distance_m 0.1"),
+}
+
+
+@pytest.mark.parametrize("case", BESIDE)
+def test_beside_an_angle_it_is_a_check_that_is_said(tmp_path: Path, case: str) -> None:
+    place, sign, key, words = BESIDE[case]
+    time, theta, force = readings(release=1.2)
+    theta = theta + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
+    there = experiment(
+        tmp_path,
+        f'{{ name = "acc", {place} }}',
+        time,
+        theta,
+        sign * force,
+        names="t_s,theta_rad,acc",
+    )
+    run = read(there)
+    assert words in said(run)[key], said(run)
+    assert run.accelerometer is None
+    assert run.acceleration is not None
+
+
+def test_a_radial_axis_beside_an_angle_shows_its_distance(tmp_path: Path) -> None:
+    time, theta, force = readings("radial", release=1.2, distance=0.2)
+    theta = theta + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
+    names = "t_s,theta_rad,acc"
+    place = 'direction = "radial", distance_m = 0.2'
+    there = experiment(tmp_path, f'{{ name = "acc", {place} }}', time, theta, force, names=names)
+    assert "radial at 0.2 m: a check" in said(read(there))["acceleration-agrees"]
+    there = experiment(tmp_path, '{ name = "acc" }', time, theta, force, names=names)
+    text = said(read(there))["acceleration-unused"]
+    assert '"radial", with distance_m 0.2' in text or '"radial", with distance_m 0.19' in text
+
+
+def test_a_gyroscope_and_an_accelerometer(tmp_path: Path) -> None:
+    time, theta, force = readings(release=1.2)
+    speed = np.gradient(theta, time) + 2e-3 * np.random.default_rng(3).standard_normal(time.size)
+    names = "t_s,velocity_rad_s,acc"
+    there = experiment(tmp_path, column(PLACE % 0.1), time, speed, force, names=names)
+    found = said(read(there))
+    assert {"angle-integrated", "acceleration-agrees"} <= set(found)
