@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import pendmap
-from pendmap.records.summary import _used
 from recorded import COUNT, clean, experiment, found, motion, noisy, read, text
 
 if TYPE_CHECKING:
@@ -210,7 +209,7 @@ def test_noise_alone_is_not_for_fitting(tmp_path: Path) -> None:
     time = np.arange(2000) / 100
     run = read(tmp_path, text((time, noisy(0 * time, 1e-3, 0))))
     assert [segment.used for segment in run.segments] == [False]
-    assert _used(run) == 0
+    assert not run.trusted.any()
 
 
 @pytest.mark.parametrize("form", ["%.6f", "%.4f"])

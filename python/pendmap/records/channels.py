@@ -51,6 +51,8 @@ class Channels:
         What it is: ``"m/s2"``, ``"m/s"`` or ``"m"``.
     findings : tuple of Finding
         What had to be guessed.
+    edge, phase : str and float, or None
+        Which edge of the trigger counts, and the drive's phase there, rad; as [columns] has them.
     """
 
     values: Mapping[str, Floats]
@@ -59,6 +61,8 @@ class Channels:
     pivot: Mapping[str, Floats] | None = None
     pivot_unit: str | None = None
     findings: tuple[Finding, ...] = ()
+    edge: str | None = None
+    phase: float | None = None
 
 
 def channels_of(table: Table, description: Description, plan: RunPlan, where: str) -> Channels:
@@ -91,7 +95,17 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
     if plan.pivot and "unit" not in plan.pivot:
         text = 'the pivot has no unit: taken for an acceleration, unit = "m/s2"'
         findings.append(Finding("pivot-unit", text))
-    return Channels(values, units, frozenset(declared), pivot, unit, tuple(findings))
+    said = asked.get("trigger")
+    return Channels(
+        values,
+        units,
+        frozenset(declared),
+        pivot,
+        unit,
+        tuple(findings),
+        edge=said.edge if said else None,
+        phase=said.phase if said else None,
+    )
 
 
 def _place(name: str, table: Table, where: str) -> int:

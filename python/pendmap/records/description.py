@@ -24,6 +24,8 @@ NAME: Final = "experiment.toml"
 _RIG: Final = ("gravity", "length_m", "w0", "encoder_counts")
 _TOP: Final = ("rig", "columns", "reader", "run")
 _COLUMN: Final = ("name", "unit", "scale", "zero")
+_TRIGGER: Final = ("edge", "phase")
+_EDGES: Final = ("rising", "falling")
 _READER: Final = ("delimiter", "decimal", "skip_rows")
 _RUN: Final = (
     *("file", "kind", "lab_time_s", "from_s", "to_s"),
@@ -32,6 +34,16 @@ _RUN: Final = (
 _DRIVE: Final = ("p", "Omega", "phi")
 _PIVOT: Final = ("vertical", "horizontal", "unit")
 _DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
+_CONVERTED: Final = {
+    **dict.fromkeys(
+        ("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
+        "p = Y Omega^2/g, with Y the amplitude of the pivot's motion in m (stroke_mm / 1000)",
+    ),
+    **dict.fromkeys(
+        ("frequency_hz", "frequency", "f_hz", "f"), "Omega = 2 pi f in rad/s, of f in Hz"
+    ),
+}
+"""What a drive is measured in, and how it becomes what the equation has."""
 _PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
 _MOST_SKIPPED: Final = 1_000_000
 _MOST_COUNTS: Final = 10**9
@@ -39,12 +51,17 @@ _MOST_COUNTS: Final = 10**9
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """Where a channel stands: the column's name, its unit, rad (or other SI) a unit, zero."""
+    """Where a channel stands: the column's name, its unit, rad (or other SI) a unit, zero.
+
+    Of a trigger also which edge counts, and the drive's phase ``Omega t + phi`` there, rad.
+    """
 
     name: str | None = None
     unit: str | None = None
     scale: float | None = None
     zero: float = 0.0
+    edge: str | None = None
+    phase: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,7 +196,7 @@ def _column(channel: str, value: object) -> Column:
     if not isinstance(value, dict):
         allowed = f'allowed is a table like {channel} = {{ name = "...", unit = "..." }}'
         raise InputError(f"{where} is {checks.shown(value)}: {allowed}")
-    _keys(value, _COLUMN, where)
+    _keys(value, (*_COLUMN, *(_TRIGGER if channel == "trigger" else ())), where)
     name = _text(f"{where}: name", value["name"]) if "name" in value else None
     unit = _text(f"{where}: unit", value["unit"]) if "unit" in value else None
     scale = None
@@ -188,7 +205,12 @@ def _column(channel: str, value: object) -> Column:
         if scale == 0:
             raise InputError(f"{where}: scale is 0: allowed is any other number")
     zero = checks.number(f"{where}: zero", value.get("zero", 0.0))
-    column = Column(name, unit, scale, zero)
+    edge = value.get("edge")
+    if edge is not None and edge not in _EDGES:
+        allowed = " or ".join(f'"{each}"' for each in _EDGES)
+        raise InputError(f"{where}: edge is {checks.shown(edge)}: allowed is {allowed}")
+    phase = checks.number(f"{where}: phase", value["phase"]) if "phase" in value else None
+    column = Column(name, unit, scale, zero, edge, phase)
     if unit is not None and scale is None:
         CHANNELS[channel].factor(unit, where)  # refuses what is not known, before files are read
     return column
@@ -245,6 +267,9 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
 
 def _drive(value: object, where: str) -> dict[str, float | None]:
     table = _table(value, f"{where}: drive", _DRIVE_LIKE)
+    for name, way in _CONVERTED.items():
+        if name in table:
+            raise InputError(f"{where}: drive: {name} is not known: allowed is {way}")
     _keys(table, _DRIVE, f"{where}: drive")
     for name in ("p", "Omega"):
         if name not in table:
