@@ -47,8 +47,8 @@ def releases(work: Work, parts: list[Places], middle: float, limit: float, perio
     period : float
         Of small swings, s.
     """
-    hand = touched(work, period, middle)
-    free = [piece for part in parts for piece in without_hand(work.time, part, hand, period)]
+    hand = touched(work, period)
+    free = without_hand(work.time, parts, hand, period)
     return [piece for part in free for piece in _grown(work, part, middle, limit)]
 
 
