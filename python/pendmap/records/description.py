@@ -34,16 +34,11 @@ _RUN: Final = (
 _DRIVE: Final = ("p", "Omega", "phi")
 _PIVOT: Final = ("vertical", "horizontal", "unit")
 _DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
-_CONVERTED: Final = {
-    **dict.fromkeys(
-        ("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
-        "p = Y Omega^2/g, with Y the amplitude of the pivot's motion in m (stroke_mm / 1000)",
-    ),
-    **dict.fromkeys(
-        ("frequency_hz", "frequency", "f_hz", "f"), "Omega = 2 pi f in rad/s, of f in Hz"
-    ),
-}
-"""What a drive is measured in, and how it becomes what the equation has."""
+_MEASURED: Final = (
+    *("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
+    *("frequency_hz", "frequency", "f_hz", "f"),
+)
+"""What a drive is measured in, and people write."""
 _PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
 _MOST_SKIPPED: Final = 1_000_000
 _MOST_COUNTS: Final = 10**9
@@ -267,9 +262,12 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
 
 def _drive(value: object, where: str) -> dict[str, float | None]:
     table = _table(value, f"{where}: drive", _DRIVE_LIKE)
-    for name, way in _CONVERTED.items():
+    for name in _MEASURED:
         if name in table:
-            raise InputError(f"{where}: drive: {name} is not known: allowed is {way}")
+            raise InputError(
+                f"{where}: drive: {name} is not known: allowed are p = Y Omega^2/g, of the pivot's"
+                " amplitude Y in m (stroke_mm / 1000), and Omega = 2 pi f in rad/s, of f in Hz"
+            )
     _keys(table, _DRIVE, f"{where}: drive")
     for name in ("p", "Omega"):
         if name not in table:

@@ -84,8 +84,7 @@ def touched(work: Work, period: float) -> NDArray[np.bool_]:
     # Of the swing before and of the swing after the smaller one: a hand is between unlike ones.
     half = round(period / interval / 2)
     sides = [
-        maximum_filter1d(pull, 2 * half + 1, mode="nearest", origin=side * half)
-        for side in (-1, 1)
+        maximum_filter1d(pull, 2 * half + 1, mode="nearest", origin=side * half) for side in (-1, 1)
     ]
     restoring = np.minimum(*sides)
     noise = normal_scale(local_fit(work.time[good], work.theta[good]).residual)
@@ -99,6 +98,8 @@ def touched(work: Work, period: float) -> NDArray[np.bool_]:
     for k in gaps:
         low, high = work.time[places[k]], work.time[places[k + 1]]
         moved[(even > low - period / 4) & (even < high + period / 4)] = False
+    moved[(even < work.time[places[0]] + period / 4) & ~good[0]] = False
+    moved[(even > work.time[places[-1]] - period / 4) & ~good[-1]] = False
     moved = binary_dilation(moved, iterations=window // 2)
     nearest = np.clip(np.round((work.time - work.time[0]) / interval), 0, count - 1)
     return np.asarray(moved[nearest.astype(np.intp)], bool)
@@ -145,7 +146,9 @@ def without_hand(
     for a, b in touches:
         if time[b - 1] - time[a] >= LONG * period:
             # One that begins to carry may move for a while as the pendulum would.
-            near = [t for t in touches if time[a] - time[t[1] - 1] < period > time[t[0]] - time[b - 1]]
+            near = [
+                t for t in touches if time[a] - time[t[1] - 1] < period > time[t[0]] - time[b - 1]
+            ]
             held[near[0][0] : near[-1][1]] = True
     free = []
     for low, high in parts:

@@ -92,7 +92,7 @@ def check(work: Work) -> None:
     span = (int(ends[0]), int(ends[-1]) + 1)
     stretches = _still(work, period, limit, span)
     parts = _moving(span, stretches)
-    parts = releases(work, parts, middle, limit, period)
+    parts = releases(work, parts, middle, limit, period, noise)
     if not parts:
         return
     held = held_short(work, parts[0], period, noise)
@@ -148,9 +148,7 @@ def _moving(span: Places, still: list[Places]) -> list[Places]:
     return [(a, b) for a, b in pairs if b - a > 5]
 
 
-def _settle(
-    work: Work, parts: list[Places], used: list[bool], middle: float, span: Places
-) -> None:
+def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, span: Places) -> None:
     """Name the stretches, trust the releases that are used, and say so."""
     trusted = np.zeros(work.time.size, bool)
     segments = []

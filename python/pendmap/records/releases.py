@@ -11,6 +11,8 @@ from pendmap.records.hand import touched, without_hand
 from pendmap.records.swings import after_turns, swings
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from pendmap.records.work import Work
 
     Places = tuple[int, int]
@@ -26,12 +28,22 @@ HELD: Final = 1.5
 UPRIGHT: Final = 2.7
 """Angle in rad beyond which a pendulum leaves so slowly that a hold cannot be told."""
 
+FEWEST_HELD: Final = 10
+"""Samples of a hold that show whether it is quiet."""
+
 FEWEST: Final = 5
 """Half cycles of a release that is worth a run: three swings from a hand have five between its
 first and last passage of the middle."""
 
 
-def releases(work: Work, parts: list[Places], middle: float, limit: float, period: float) -> list[Places]:
+def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motion)
+    work: Work,
+    parts: list[Places],
+    middle: float,
+    limit: float,
+    period: float,
+    noise: float,
+) -> list[Places]:
     """Divide motions into stretches that nobody touches, in order.
 
     Parameters
@@ -46,17 +58,43 @@ def releases(work: Work, parts: list[Places], middle: float, limit: float, perio
         Within what nothing moves, rad.
     period : float
         Of small swings, s.
+    noise : float
+        Of a reading, rad.
     """
     hand = touched(work, period)
-    free = without_hand(work.time, parts, hand, period)
+    free = [
+        (_let_go(work, part, hand, period, noise), part[1])
+        for part in without_hand(work.time, parts, hand, period)
+    ]
     return [piece for part in free for piece in _grown(work, part, middle, limit)]
+
+
+def _let_go(work: Work, part: Places, hand: NDArray[np.bool_], period: float, noise: float) -> int:
+    """Return where a motion begins after a quiet hold, closer than a hand is known to let go."""
+    low, high = part
+    before, sure = (
+        int(np.searchsorted(work.time, work.time[low] - share * period)) for share in (0.5, 0.2)
+    )
+    hold = work.theta[before:sure]
+    if hold.size < FEWEST_HELD or not hand[before:low].all():
+        return low
+    # A hand that trembles drifts more than noise does.
+    early, late = np.array_split(hold, 2)
+    drift = abs(float(np.mean(early) - np.mean(late)))
+    span = max(6 * noise, 2 * work.count)
+    if np.ptp(hold) > span or drift > max(4 * noise / math.sqrt(hold.size), work.count / 4):
+        return low
+    found = held_short(work, (before, high), period, noise)
+    return low if found is None else min(low, found)
 
 
 def enough(work: Work, part: Places, middle: float, limit: float) -> bool:
     """Whether a release has the swings to be worth a run."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
+    if not good.size:
+        return False
     theta = work.theta[good] - middle
-    theta = theta - 2 * math.pi * round(float(np.median(theta)) / (2 * math.pi)) if good.size else theta
+    theta -= 2 * math.pi * round(float(np.median(theta)) / (2 * math.pi))  # carried round once
     start = after_turns(theta)
     return swings(work.time[good][start:], theta[start:], least=limit).peak.size >= FEWEST
 

@@ -234,14 +234,18 @@ def check_drive(work: Work) -> None:
     given = drive["Omega"] if drive else None
     found = edges_of(work.extra["trigger"], work.edge)
     if found is None or found[0].size < FEWEST:
-        why = f"the trigger {_none(found)}" if found is None or not found[0].size else (
-            f"the trigger has {counted(found[0].size, f'{found[1]} edge')}"
+        why = (
+            f"the trigger {_none(found)}"
+            if found is None or not found[0].size
+            else (f"the trigger has {counted(found[0].size, f'{found[1]} edge')}")
         )
         work.say("trigger-unlike", f"{why}: it shows no drive")
         return
     beat = beat_of(work.time, found[0], given)
     if beat is None:
-        text = f"the trigger's {found[0].size} {found[1]} edges do not recur evenly: it shows no drive"
+        text = (
+            f"the trigger's {found[0].size} {found[1]} edges do not recur evenly: it shows no drive"
+        )
         work.say("trigger-unlike", text)
         return
     bounces = f"; {counted(beat.left_out, 'bounce')} left out" if beat.left_out else ""
