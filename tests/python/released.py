@@ -29,7 +29,7 @@ class Released:
     spans: list[tuple[float, float]]
 
 
-def released(
+def released(  # noqa: PLR0913 (the releases, and what the hand does)
     starts: Sequence[float],
     seconds: Sequence[float],
     *,

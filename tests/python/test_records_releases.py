@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 import pendmap
+from decays import decay, record
 from pendmap.discrepancy.evidence import evidence_of
 from pendmap.identification import compare, identified_model, identify_experiment
 from pendmap.identification.compared import as_json as compared
 from pendmap.identification.compared import as_text as compared_text
+from pendmap.identification.joint import as_fit_run
+from pendmap.identification.reading import reading_of
 from pendmap.identification.summary import as_json, as_text
 from pendmap.records import Experiment, Run
-from recorded import C, TR, W0, clean, experiment, found, motion, noisy, text
+from recorded import TR, W0, C, clean, experiment, found, motion, noisy, text
 from released import Released, released
 
 if TYPE_CHECKING:
@@ -127,9 +130,6 @@ def test_what_a_run_is_said_to_be_is_inherited(tmp_path: Path) -> None:
     assert report.joint is not None
     assert [run.name for run in report.runs] == ["a", "decay (2) 1/2", "decay (2) 2/2"]
     # Drifts count from the laboratory's clock: a release begins when the file says.
-    from pendmap.identification.joint import as_fit_run
-    from pendmap.identification.reading import reading_of
-
     second = there.runs[1]
     given = as_fit_run(second, reading_of(second.time, second.theta))
     assert given.lab_time_s + given.time[0] == pytest.approx(300 + second.time[0])
@@ -153,8 +153,6 @@ def test_a_release_of_few_swings_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize("friction", [0.06, 0.8])
 def test_friction_is_no_hand(tmp_path: Path, friction: float) -> None:
     # Tr is 0.02 of w0^2 at most: the last swings have little else than friction.
-    from decays import decay, record
-
     time, theta = record(decay(release=0.8, c_over_m=0.05, tr=friction, until=80.0), seconds=60)
     rest = np.flatnonzero(np.abs(np.diff(theta[::20])) > 0.01)[-1] / 5
     (run,) = pendmap.read_experiment(write(tmp_path, Released(time, theta, []))).runs

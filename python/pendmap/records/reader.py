@@ -29,10 +29,10 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
     """Read a record or a folder of records, and say what is odd about them.
 
     A file (CSV, other text, Parquet) with a time and an angle is an experiment of one free decay. A
-    folder is one with an ``experiment.toml``. Each free release of a file is a run of its own, named
-    ``decay 1/3``. Nothing is written. What is certain is mended (turns
-    that a sensor wraps are unwrapped, milliseconds become seconds, ...), and that is said; all
-    else is only said. ``Run.trusted`` marks the samples that are for fitting.
+    folder is one with an ``experiment.toml``. Each free release of a file is a run of its own,
+    named ``decay 1/3``. Nothing is written. What is certain is mended (turns that a sensor wraps
+    are unwrapped, milliseconds become seconds, ...), and that is said; all else is only said.
+    ``Run.trusted`` marks the samples that are for fitting.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
     """
     place = Path(path)
     if not place.is_dir():
-        runs, findings = _runs(place, RunPlan(place.name), ALONE, {}, place.stem)
-        return Experiment(place, tuple(runs), {}, tuple(findings), {place.name: runs[0].sha256})
+        found, findings = _runs(place, RunPlan(place.name), ALONE, {}, place.stem)
+        return Experiment(place, tuple(found), {}, tuple(findings), {place.name: found[0].sha256})
     if not (place / NAME).is_file():
         raise InputError(f"{place}: has no {NAME}: allowed is one that lists the runs, or a file")
     description = read_description(place / NAME)

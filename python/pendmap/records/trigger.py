@@ -159,11 +159,11 @@ def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
     if not motions:
         work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
         return parts
-    times = ", ".join(f"{work.time[k]:.6g}" for k in kept[:6]) + (", ..." if len(kept) > 6 else "")  # noqa: PLR2004
+    times = ", ".join(f"{work.time[k]:.6g}" for k in kept[:6]) + (", ..." if len(kept) > 6 else "")
     bounced = found[0].size - len(kept)
     bounces = f"; {counted(bounced, 'bounce')} left out" if bounced else ""
-    text = f"the trigger's {found[1]} edge marks {counted(len(kept), 'release')}, at {times} s{bounces}"
-    work.say("trigger-release", text)
+    text = f"the trigger's {found[1]} edge marks {counted(len(kept), 'release')}, at {times} s"
+    work.say("trigger-release", text + bounces)
     return motions
 
 

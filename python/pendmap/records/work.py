@@ -120,7 +120,7 @@ class Work:
         The first keeps what is before it, the last what is after it; what is between two releases
         is in neither.
         """
-        if len(self.releases) < 2:  # noqa: PLR2004 (nothing to take apart)
+        if len(self.releases) < 2:
             return [self], []
         lows = [0, *(low for low, _ in self.releases[1:])]
         highs = [*(high for _, high in self.releases[:-1]), self.time.size]
