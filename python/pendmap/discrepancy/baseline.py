@@ -101,7 +101,7 @@ def _unfolded(model: Rig) -> Rig:
 
 def _start(evidence: Evidence) -> Rig:
     """Return a start from the free runs, the longest first; the natural frequency may be known."""
-    known = evidence.experiment.known.get("w0")
+    known = evidence.experiment.w0
     free = [(run, k) for run, k in zip(evidence.fitted, evidence.fitted_of, strict=True)]
     free = [(run, k) for run, k in free if not run.forced]
     for run, k in sorted(free, key=lambda pair: -float(np.ptp(pair[0].time))):
@@ -109,13 +109,13 @@ def _start(evidence: Evidence) -> Rig:
         rough = rough_start(run.time[good], run.theta[good], evidence.readings[k].sigma)
         if rough is not None:
             found = Rig(w0=rough["w0"], c_over_m=rough["c_over_m"], Tr=rough.get("Tr", 0.0))
-            return found if known is None else dataclasses.replace(found, w0=float(known))
+            return found if known is None else dataclasses.replace(found, w0=known)
     if known is None:
         raise InputError(
             f"{evidence.experiment.path}: no free run shows a natural frequency: allowed is one of "
             "two half swings or more, or w0 under [rig]"
         )
-    return Rig(w0=float(known), c_over_m=0.01 * float(known))
+    return Rig(w0=known, c_over_m=0.01 * known)
 
 
 def _other_starts(evidence: Evidence) -> list[Rig]:

@@ -39,7 +39,7 @@ class Evidence:
     experiment : Experiment
         Where they come from.
     runs : tuple of Run
-        All that have samples.
+        All that have samples for fitting.
     readings : tuple of Reading
         What the readings of each are worth.
     fitted, held : tuple of FitRun
@@ -87,11 +87,13 @@ def evidence_of(experiment: Experiment) -> Evidence:
     Raises
     ------
     InputError
-        If no run has samples, or all are held back.
+        If no run has samples, nothing moves, or all are held back.
     """
     runs = tuple(run for run in experiment.runs if not run.peaks_only)
     if not runs:
         raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
+    experiment.refuse_still(runs)
+    runs = tuple(run for run in runs if run.moves)
     made = [run for run in runs if run.accelerometer is not None]
     if made:
         raise InputError(

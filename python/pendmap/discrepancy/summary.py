@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.records.summary import findings_said
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -171,3 +173,4 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
         )
     yield f"Next: {found.advice.next_experiment}"
+    yield from findings_said(found.evidence.experiment)

@@ -126,7 +126,7 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
     Raises
     ------
     InputError
-        If no run is a free decay of samples.
+        If no run is a free decay of samples, or nothing moves.
     """
     checks.of_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
     checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
@@ -135,7 +135,8 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
         raise InputError(
             f"{experiment.path}: no run is a free decay of samples: allowed is one or more"
         )
-    return Comparison(model, experiment, tuple(_compared(model, run) for run in free))
+    experiment.refuse_still(free)
+    return Comparison(model, experiment, tuple(_compared(model, run) for run in free if run.moves))
 
 
 def _compared(model: Rig, run: Run) -> RunComparison:

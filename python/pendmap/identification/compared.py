@@ -25,6 +25,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     return {
         "experiment": str(comparison.experiment.path),
         "runs": [_run(run) for run in comparison.runs],
+        "findings": [found.text for found in comparison.experiment.findings],
     }
 
 

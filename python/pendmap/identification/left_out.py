@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from pendmap.words import counted
 
@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from pendmap.records import Experiment, Run
 
 __all__ = ["left_out"]
+
+STILL: Final = "in which nothing moves"
+"""What a run is that shows no motion."""
 
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
@@ -30,7 +33,9 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
             continue
         why = "held out" if run.hold_out else "forced"
         if run.kind == "free" and not run.hold_out:
-            why = "of peaks alone" if run.peaks_only else "shorter"
+            why = "of peaks alone" if run.peaks_only else "shorter" if run.moves else STILL
+        elif run.kind == "free" and not run.moves:
+            why = STILL
         elif run.kind == "free" and run.peaks_only and any(each.hold_out for each in read):
             why = "of peaks alone"
         reasons[why] = reasons.get(why, 0) + 1
@@ -38,7 +43,7 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
         return ""
     first, *others = (
         f"{counted(n, 'run')} {why}"
-        if why in {"held out", "of peaks alone"}
+        if why in {"held out", "of peaks alone", STILL}
         else counted(n, f"{why} run")
         for why, n in reasons.items()
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.identification.clock import span
@@ -114,12 +116,12 @@ class IdentificationReport(Readable):
 
 
 def decay_of(experiment: Experiment) -> Run:
-    """Return the longest free run of an experiment that is not held out.
+    """Return the free run of an experiment that swings longest and is not held out.
 
     Raises
     ------
     InputError
-        If there is none.
+        If there is none, or nothing moves.
     """
     free = [run for run in experiment.runs if run.kind == "free" and not run.hold_out]
     if not free:
@@ -127,7 +129,12 @@ def decay_of(experiment: Experiment) -> Run:
             f"{experiment.path}: no run is free and not held out: allowed is an experiment with a "
             "free decay"
         )
-    return max(free, key=lambda run: float(run.time[-1] - run.time[0]))
+    experiment.refuse_still(free)
+    return max((run for run in free if run.moves), key=_length)
+
+
+def _length(run: Run) -> float:
+    return float(np.ptp(run.time[run.trusted]))
 
 
 def identify_experiment(
@@ -190,8 +197,8 @@ def _best(
     experiment: Experiment, run: Run, start: Rig | None, effects: Sequence[Effect | str]
 ) -> tuple[JointFit | None, Identification]:
     others = [r for r in experiment.runs if r.kind == "free" and not r.hold_out and r is not run]
-    runs = [run, *(r for r in others if not r.peaks_only)]
-    known = {name: experiment.known[name] for name in ("w0",) if name in experiment.known}
+    runs = [run, *(r for r in others if r.moves and not r.peaks_only)]
+    known = {} if experiment.w0 is None else {"w0": experiment.w0}
     try:
         joint = fit_together(runs, start=start, known=known, effects=effects)
     except TooShortError as error:

@@ -41,6 +41,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
     return {
         "experiment": str(report.experiment.path),
         "run": run.name,
+        "runs": _runs(report),
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
         "methods": {name: _method(found) for name, found in report.methods.items()},
@@ -49,8 +50,39 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
             for r in report.table.rows
         ],
         "rms": None if report.joint is None else report.joint.fit.rms,
-        "findings": [f.text for f in (*report.experiment.findings, *run.findings)],
+        "findings": [
+            found.text
+            for found in (
+                *report.experiment.findings,
+                *(found for each in report.runs for found in each.findings),
+            )
+        ],
     }
+
+
+def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
+    """Return the runs that a method read; rms and noise are those of the joint fit."""
+    entries: list[dict[str, Any]] = []
+    for k, run in enumerate(report.runs):
+        time = run.time[run.trusted]
+        rms = noise = None
+        if report.joint is not None:
+            left = report.joint.fit.residuals[k][run.trusted]
+            rms = float((left**2).mean() ** 0.5)
+            noise = report.joint.readings[k].sigma
+        entries.append(
+            {
+                "name": run.name,
+                "file": run.file,
+                "lab_time_s": run.lab_time_s,
+                "from_s": float(time[0]),
+                "to_s": float(time[-1]),
+                "samples": int(time.size),
+                "rms": rms,
+                "noise": noise,
+            }
+        )
+    return entries
 
 
 def _method(found: Identification) -> dict[str, Any]:
@@ -83,7 +115,7 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
     for name, found in report.methods.items():
         for warning in found.warnings:
             yield f"{name}: {warning}"
-    yield from findings_said(report.experiment, report.run)
+    yield from findings_said(report.experiment, *report.runs)
 
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:

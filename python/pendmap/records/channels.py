@@ -56,6 +56,8 @@ class Channels:
         Where the acceleration was measured, if that is known ...
     place_missing : str
         ... else the keys of [columns] that would say it.
+    edge, phase : str and float, or None
+        Which edge of the trigger counts, and the drive's phase there, rad; as [columns] has them.
     """
 
     values: Mapping[str, Floats]
@@ -66,6 +68,8 @@ class Channels:
     findings: tuple[Finding, ...] = ()
     accelerometer: Accelerometer | None = None
     place_missing: str = ""
+    edge: str | None = None
+    phase: float | None = None
 
 
 def channels_of(table: Table, description: Description, plan: RunPlan, where: str) -> Channels:
@@ -105,8 +109,18 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         gravity = float(description.known.get("gravity", GRAVITY))
         given_in = said.unit if said and said.unit else read_in
         sensor, missing = accelerometer_of(said, given_in, heading, gravity)
+    edges = asked.get("trigger")
     return Channels(
-        values, units, frozenset(declared), pivot, unit, tuple(findings), sensor, missing
+        values,
+        units,
+        frozenset(declared),
+        pivot,
+        unit,
+        tuple(findings),
+        accelerometer=sensor,
+        place_missing=missing,
+        edge=edges.edge if edges else None,
+        phase=edges.phase if edges else None,
     )
 
 

@@ -26,6 +26,8 @@ _RIG: Final = ("gravity", "length_m", "w0", "encoder_counts")
 _TOP: Final = ("rig", "columns", "reader", "run")
 _COLUMN: Final = ("name", "unit", "scale", "zero")
 _PLACE: Final = ("direction", "distance_m", "gravity_removed")
+_TRIGGER: Final = ("edge", "phase")
+_EDGES: Final = ("rising", "falling")
 _READER: Final = ("delimiter", "decimal", "skip_rows")
 _RUN: Final = (
     *("file", "kind", "lab_time_s", "from_s", "to_s"),
@@ -34,6 +36,11 @@ _RUN: Final = (
 _DRIVE: Final = ("p", "Omega", "phi")
 _PIVOT: Final = ("vertical", "horizontal", "unit")
 _DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
+_MEASURED: Final = (
+    *("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
+    *("frequency_hz", "frequency", "f_hz", "f"),
+)
+"""What a drive is measured in, and people write."""
 _PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
 _MOST_SKIPPED: Final = 1_000_000
 _MOST_COUNTS: Final = 10**9
@@ -43,7 +50,8 @@ _MOST_COUNTS: Final = 10**9
 class Column:
     """Where a channel stands: the column's name, its unit, rad (or other SI) a unit, zero.
 
-    ``place`` is where an accelerometer sits.
+    ``place`` is where an accelerometer sits; of a trigger ``edge`` is the edge that counts and
+    ``phase`` the drive's phase ``Omega t + phi`` there, rad.
     """
 
     name: str | None = None
@@ -51,6 +59,8 @@ class Column:
     scale: float | None = None
     zero: float = 0.0
     place: Place = dataclasses.field(default_factory=Place)
+    edge: str | None = None
+    phase: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,8 +195,8 @@ def _column(channel: str, value: object) -> Column:
     if not isinstance(value, dict):
         allowed = f'allowed is a table like {channel} = {{ name = "...", unit = "..." }}'
         raise InputError(f"{where} is {checks.shown(value)}: {allowed}")
-    placed = channel == "acceleration"
-    _keys(value, (*_COLUMN, *_PLACE) if placed else _COLUMN, where)
+    own = {"acceleration": _PLACE, "trigger": _TRIGGER}.get(channel, ())
+    _keys(value, (*_COLUMN, *own), where)
     name = _text(f"{where}: name", value["name"]) if "name" in value else None
     unit = _text(f"{where}: unit", value["unit"]) if "unit" in value else None
     scale = None
@@ -195,8 +205,13 @@ def _column(channel: str, value: object) -> Column:
         if scale == 0:
             raise InputError(f"{where}: scale is 0: allowed is any other number")
     zero = checks.number(f"{where}: zero", value.get("zero", 0.0))
-    place = place_of(value, where) if placed else Place()
-    column = Column(name, unit, scale, zero, place)
+    place = place_of(value, where) if channel == "acceleration" else Place()
+    edge = value.get("edge")
+    if edge is not None and edge not in _EDGES:
+        allowed = " or ".join(f'"{each}"' for each in _EDGES)
+        raise InputError(f"{where}: edge is {checks.shown(edge)}: allowed is {allowed}")
+    phase = checks.number(f"{where}: phase", value["phase"]) if "phase" in value else None
+    column = Column(name, unit, scale, zero, place, edge, phase)
     if unit is not None and scale is None:
         CHANNELS[channel].factor(unit, where)  # refuses what is not known, before files are read
     return column
@@ -253,6 +268,12 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
 
 def _drive(value: object, where: str) -> dict[str, float | None]:
     table = _table(value, f"{where}: drive", _DRIVE_LIKE)
+    for name in _MEASURED:
+        if name in table:
+            raise InputError(
+                f"{where}: drive: {name} is not known: allowed are p = Y Omega^2/g, of the pivot's"
+                " amplitude Y in m (stroke_mm / 1000), and Omega = 2 pi f in rad/s, of f in Hz"
+            )
     _keys(table, _DRIVE, f"{where}: drive")
     for name in ("p", "Omega"):
         if name not in table:

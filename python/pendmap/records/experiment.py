@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any, Literal
 
+from pendmap.errors import InputError
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     import numpy as np
@@ -86,7 +88,7 @@ class Run:
         rad, from the downward rest, unwrapped, finite.
     trusted : ndarray of bool, shape (N,)
         False where a sample is not for fitting: outlier, missed count, clipped, held by hand, at
-        rest, handled between two releases.
+        rest, handled between two releases; everywhere where nothing moves.
     lab_time_s : float
         When the run began in the laboratory.
     hold_out : bool
@@ -140,6 +142,11 @@ class Run:
     sha256: str = ""
 
     @property
+    def moves(self) -> bool:
+        """Whether anything in it is for fitting."""
+        return bool(self.trusted.any())
+
+    @property
     def rate_hz(self) -> float:
         """Samples a second, from the median interval."""
         import numpy as np
@@ -160,7 +167,8 @@ class Experiment:
     known : mapping
         What ``[rig]`` says: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``.
     findings : tuple of Finding
-        What concerns the experiment and no run alone.
+        What concerns the experiment and no run alone: of a file with several releases also what was
+        found in all of it.
     sha256 : mapping of str to str
         Of each file that was read.
     """
@@ -170,3 +178,27 @@ class Experiment:
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     sha256: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def w0(self) -> float | None:
+        """The ``w0`` of ``[rig]``, rad/s, unless the period of a record speaks against it."""
+        doubtful = any(f.what == "period-unlike-rig" for f in self._said())
+        return None if doubtful or "w0" not in self.known else float(self.known["w0"])
+
+    def refuse_still(self, runs: Iterable[Run]) -> None:
+        """Refuse runs of which none moves.
+
+        Raises
+        ------
+        InputError
+            If none of ``runs`` has samples for fitting.
+        """
+        if any(run.moves for run in runs):
+            return
+        why = next((f.text for f in self._said() if f.what == "no-motion"), "no sample is trusted")
+        raise InputError(f"{self.path}: nothing to fit: {why}: allowed is a record of a motion")
+
+    def _said(self) -> Iterator[Finding]:
+        yield from self.findings
+        for run in self.runs:
+            yield from run.findings

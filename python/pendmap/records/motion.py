@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.records import trigger
 from pendmap.records.experiment import Segment
 from pendmap.records.local_fit import local_fit
 from pendmap.records.noise import normal_scale
+from pendmap.records.releases import enough, held_short, releases
 from pendmap.records.runs_of import true_runs
 from pendmap.records.scale import periods_of
 from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,8 +25,9 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
+    Places = tuple[int, int]
 
-__all__ = ["check"]
+__all__ = ["check", "check_zero", "moves"]
 
 STILL: Final = 8.0
 """Standard deviations of noise within which a whole period must stay to be no motion: white
@@ -32,14 +36,8 @@ noise spans 5 or 6 in a hundred samples."""
 SMALL: Final = 0.1
 """Radians within which readings that are no smoother than noise are no motion."""
 
-RISE: Final = 0.1
-"""Share of the largest swing by which a free swing grows only if somebody helps."""
-
-HELD: Final = 1.5
-"""Times longer than a release from rest takes to be seen, from where it was held before."""
-
-UPRIGHT: Final = 2.7
-"""Angle in rad beyond which a pendulum leaves so slowly that a hold cannot be told."""
+MOST_LISTED: Final = 6
+"""Releases whose times a message lists."""
 
 CERTAIN: Final = 4.0
 """Standard errors that an offset must have to be said."""
@@ -65,6 +63,7 @@ def moves(work: Work) -> bool:
     spread = float(np.ptp(good)) if good.size else 0.0
     work.say("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
     work.segments = [Segment("rest", low, high, used=False)]
+    work.trusted[:] = False
     return False
 
 
@@ -77,7 +76,7 @@ def _limits(work: Work) -> tuple[float, float]:
 
 
 def check(work: Work) -> None:
-    """Divide a free record into stretches and trust the longest swing alone; say the offset."""
+    """Divide a free record into stretches and trust those that swing freely."""
     noise, limit = _limits(work)
     good = work.theta[work.trusted]
     if work.plan.kind != "free":
@@ -93,14 +92,19 @@ def check(work: Work) -> None:
     span = (int(ends[0]), int(ends[-1]) + 1)
     stretches = _still(work, period, limit, span)
     parts = _moving(span, stretches)
-    parts = [piece for part in parts for piece in _releases(work, part, middle, limit)]
+    parts = releases(work, parts, middle, limit, period, noise)
     if not parts:
         return
-    held = _held_short(work, parts[0], period, noise)
+    held = held_short(work, parts[0], period, noise)
     if held is not None:
         parts[0] = (held, parts[0][1])
-    _settle(work, parts, middle, span)
-    _offset(work, parts, limit)
+    parts = trigger.begun(work, parts, period)
+    used = [enough(work, part, middle, limit) for part in parts]
+    if sum(used) == 0:
+        longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
+        used[longest] = True
+    work.releases = [part for part, use in zip(parts, used, strict=True) if use]
+    _settle(work, parts, used, middle, span)
 
 
 def _noise(work: Work) -> float:
@@ -115,7 +119,7 @@ def _known_period(work: Work) -> float | None:
     return 2 * math.pi / w0 if w0 else None
 
 
-def _still(work: Work, period: float, limit: float, span: tuple[int, int]) -> list[tuple[int, int]]:
+def _still(work: Work, period: float, limit: float, span: Places) -> list[Places]:
     """Return stretches within ``span``, of a period and more, in which nothing moves."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -138,74 +142,15 @@ def _still(work: Work, period: float, limit: float, span: tuple[int, int]) -> li
     ]
 
 
-def _moving(span: tuple[int, int], still: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _moving(span: Places, still: list[Places]) -> list[Places]:
     edges = [span[0], *(place for stretch in still for place in stretch), span[1]]
     pairs = zip(edges[::2], edges[1::2], strict=True)
     return [(a, b) for a, b in pairs if b - a > 5]
 
 
-def _releases(
-    work: Work, part: tuple[int, int], middle: float, limit: float
-) -> list[tuple[int, int]]:
-    """Divide a motion where the swing grows: somebody took the pendulum and let it go again."""
-    low, high = part
-    good = np.flatnonzero(work.trusted[low:high]) + low
-    if good.size < 5:
-        return []
-    good = good[after_turns(work.theta[good] - middle) :]
-    half = swings(work.time[good], work.theta[good] - middle, least=limit)
-    size = np.abs(half.peak)
-    if size.size < 4:
-        return [part]
-    # Neighbours together: an offset makes every other half cycle larger.
-    pairs = np.maximum(size[:-1], size[1:])
-    rise = max(RISE * float(size.max()), 2 * limit)
-    cuts: list[tuple[int, int]] = []
-    least, at = pairs[0], 0
-    k = 1
-    while k < pairs.size:
-        if pairs[k] < least:
-            least, at = pairs[k], k
-        elif pairs[k] > least + rise:
-            top = k
-            while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
-                top += 1
-            peak = top + int(size[top + 1] > size[top]) if top + 1 < size.size else top
-            stop = int(np.searchsorted(work.time, half.peak_time[min(at + 1, size.size - 1)]))
-            go = int(np.searchsorted(work.time, half.peak_time[peak]))
-            cuts.append((stop, go))
-            least, at, k = pairs[top], top, top
-        k += 1
-    edges = [low, *(place for cut in cuts for place in cut), high]
-    pieces = zip(edges[::2], edges[1::2], strict=True)
-    return [(a, b) for a, b in pieces if b - a > 5]
-
-
-def _held_short(work: Work, part: tuple[int, int], period: float, noise: float) -> int | None:
-    """Return where a motion begins that was held for less than a period before."""
-    low = part[0]
-    if not work.trusted[low : low + 5].all():
-        return None
-    theta, time = work.theta[low : part[1]], work.time[low : part[1]]
-    start = float(np.median(theta[:5]))
-    seen = max(6 * noise, 1.5 * work.count, 1e-4)
-    left = np.flatnonzero(np.abs(theta - start) > seen)
-    w0 = 2 * math.pi / period
-    if not left.size or abs(start) > UPRIGHT or abs(math.sin(start)) < 0.05:
-        return None
-    usual = math.sqrt(2 * seen / (w0**2 * abs(math.sin(start))))
-    interval = float(np.median(np.diff(work.time)))
-    still = float(time[left[0]] - time[0])
-    if still <= HELD * usual + 4 * interval:
-        return None
-    return low + max(int(np.searchsorted(time, time[left[0]] - usual)), 0)
-
-
-def _settle(work: Work, parts: list[tuple[int, int]], middle: float, span: tuple[int, int]) -> None:
-    """Name the stretches, trust the longest swing, and say so."""
-    longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
+def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, span: Places) -> None:
+    """Name the stretches, trust the releases that are used, and say so."""
     trusted = np.zeros(work.time.size, bool)
-    trusted[parts[longest][0] : parts[longest][1]] = True
     segments = []
     if span[0] > 0:
         segments.append(_segment(work, "motion", 0, span[0], used=False))
@@ -213,7 +158,8 @@ def _settle(work: Work, parts: list[tuple[int, int]], middle: float, span: tuple
     for k, (low, high) in enumerate(parts):
         if low > at:
             segments.append(_between(work, at, low, middle, first=k == 0))
-        segments.append(_segment(work, "motion", low, high, used=k == longest))
+        segments.append(_segment(work, "motion", low, high, used=used[k]))
+        trusted[low:high] = used[k]
         at = high
     if at < span[1]:
         segments.append(_between(work, at, span[1], middle, first=False))
@@ -222,10 +168,7 @@ def _settle(work: Work, parts: list[tuple[int, int]], middle: float, span: tuple
     work.segments = segments
     work.trusted &= trusted
     if len(parts) > 1:
-        low, high = parts[longest]
-        begin, end = float(work.time[low]), float(work.time[high - 1])
-        text = f"{len(parts)} releases: the longest swing is used, {begin:.6g} to {end:.6g} s"
-        work.say("several-releases", text, span=(begin, end))
+        _say_releases(work, parts, used)
     first, last = segments[0], segments[-1]
     if first.what == "held":
         text = f"held until {first.to_s:.6g} s, not for fitting"
@@ -233,6 +176,23 @@ def _settle(work: Work, parts: list[tuple[int, int]], middle: float, span: tuple
     if last.what == "rest" and len(segments) > 1:
         text = f"at rest from {last.from_s:.6g} s, not for fitting"
         work.say("rest-tail", text, span=(last.from_s, last.to_s))
+
+
+def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
+    """Say which releases are taken, and which are too short."""
+
+    def listed(which: list[Places]) -> str:
+        spans = [f"{work.time[low]:.6g} to {work.time[high - 1]:.6g} s" for low, high in which]
+        return ", ".join(spans[:MOST_LISTED]) + (", ..." if len(spans) > MOST_LISTED else "")
+
+    taken = [part for part, use in zip(parts, used, strict=True) if use]
+    short = [part for part, use in zip(parts, used, strict=True) if not use]
+    each = "each taken as a run" if len(taken) > 1 else "one is used"
+    text = f"{counted(len(parts), 'release')}: {listed(taken)}, {each}"
+    if short:
+        text += f"; {len(short)} of fewer than three swings left out: {listed(short)}"
+    span = float(work.time[taken[0][0]]), float(work.time[taken[-1][1] - 1])
+    work.say("several-releases", text, span=span)
 
 
 def _between(work: Work, low: int, high: int, middle: float, *, first: bool) -> Segment:
@@ -249,10 +209,11 @@ def _segment(work: Work, what: str, low: int, high: int, *, used: bool) -> Segme
     return Segment(what, float(work.time[low]), float(work.time[high - 1]), used)
 
 
-def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
-    """Say where it rests, or about what it swings, if that is not 0."""
-    if work.made_of is not None:
-        return  # the middle was taken for 0 as the angle was made
+def check_zero(work: Work) -> None:
+    """Say where a free run rests, or about what it swings, if that is not 0."""
+    if work.plan.kind != "free" or not work.releases or work.made_of is not None:
+        return  # of an acceleration: the middle was taken for 0 as the angle was made
+    _, limit = _limits(work)
     last = work.segments[-1]
     if last.what == "rest":
         tail = work.theta[work.time >= last.from_s]
@@ -261,8 +222,7 @@ def _offset(work: Work, parts: list[tuple[int, int]], limit: float) -> None:
         error = max(error, work.count / math.sqrt(12))
         said = f"it rests at {_folded(value):+.3g} rad: an offset, or what friction holds"
     else:
-        low, high = max(parts, key=lambda part: part[1] - part[0])
-        good = np.flatnonzero(work.trusted[low:high]) + low
+        good = np.flatnonzero(work.trusted)
         theta = work.theta[good]
         middle = middle_of(work.time[good], theta)
         middle = float(np.median(theta[theta.size // 2 :])) if middle is None else middle

@@ -126,10 +126,14 @@ class NoiseFloor:
 
 
 def noise_floor(run: Run) -> NoiseFloor:
-    """Return the noise of a run, from the samples that are trusted; see :func:`noise_of`."""
+    """Return the noise of a run, from the samples that are trusted; see :func:`noise_of`.
+
+    Where none is, since nothing moves, all show it.
+    """
     if run.peaks_only:
         return NoiseFloor(math.nan, math.nan)
-    return noise_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
+    trusted = run.trusted if run.trusted.any() else None
+    return noise_of(run.time, run.theta, trusted=trusted, count=run.count_rad)
 
 
 def noise_of(

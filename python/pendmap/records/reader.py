@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.records import angle, clock, motion, noise_check, samples, scale, signs
+from pendmap.records import angle, clock, motion, noise_check, samples, scale, signs, trigger
 from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
@@ -29,9 +29,10 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
     """Read a record or a folder of records, and say what is odd about them.
 
     A file (CSV, other text, Parquet) with a time and an angle is an experiment of one free decay. A
-    folder is one with an ``experiment.toml``. Nothing is written. What is certain is mended (turns
-    that a sensor wraps are unwrapped, milliseconds become seconds, ...), and that is said; all
-    else is only said. ``Run.trusted`` marks the samples that are for fitting.
+    folder is one with an ``experiment.toml``. Each free release of a file is a run of its own,
+    named ``decay 1/3``. Nothing is written. What is certain is mended (turns that a sensor wraps
+    are unwrapped, milliseconds become seconds, ...), and that is said; all else is only said.
+    ``Run.trusted`` marks the samples that are for fitting.
 
     Parameters
     ----------
@@ -57,39 +58,45 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
     """
     place = Path(path)
     if not place.is_dir():
-        run = _run(place, RunPlan(place.name), ALONE, {}, place.stem)
-        return Experiment(place, (run,), {}, (), {place.name: run.sha256})
+        found, findings = _runs(place, RunPlan(place.name), ALONE, {}, place.stem)
+        return Experiment(place, tuple(found), {}, tuple(findings), {place.name: found[0].sha256})
     if not (place / NAME).is_file():
         raise InputError(f"{place}: has no {NAME}: allowed is one that lists the runs, or a file")
     description = read_description(place / NAME)
     tables: dict[str, tuple[Table, str]] = {}
     names = _names([plan.file for plan in description.runs])
-    runs = []
+    runs: list[Run] = []
+    shared: list[Finding] = []
     for count, (plan, name) in enumerate(zip(description.runs, names, strict=True), 1):
         if not (place / plan.file).exists():
             raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
-        runs.append(_run(place / plan.file, plan, description, tables, name))
+        found, findings = _runs(place / plan.file, plan, description, tables, name)
+        runs += found
+        shared += findings
     digests = {run.file: run.sha256 for run in runs}
-    return Experiment(place, tuple(runs), description.known, _across(runs), digests)
+    return Experiment(place, tuple(runs), description.known, (*shared, *_across(runs)), digests)
 
 
 def _names(files: list[str]) -> list[str]:
-    """Name runs after their files, apart where several share one."""
+    """Name runs after their files, apart where several share one or a stem."""
+    stems = {file: file.rsplit(".", 1)[0] for file in files}
     names = []
     for k, file in enumerate(files):
-        stem = file.rsplit(".", 1)[0]
+        alone = list(stems.values()).count(stems[file]) == 1
+        name = stems[file] if alone else file
         same = files[: k + 1].count(file)
-        names.append(f"{stem} ({same})" if files.count(file) > 1 else stem)
+        names.append(f"{name} ({same})" if files.count(file) > 1 else name)
     return names
 
 
-def _run(
+def _runs(
     path: Path,
     plan: RunPlan,
     description: Description,
     tables: dict[str, tuple[Table, str]],
     name: str,
-) -> Run:
+) -> tuple[list[Run], list[Finding]]:
+    """Return the runs of a file, one for each release, and what was found in none of them alone."""
     if plan.file not in tables:
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
@@ -101,17 +108,32 @@ def _run(
     clock.mend(work)
     work.cut(plan.from_s, plan.to_s)
     angle.make(work)
-    if not work.peaks_only:
-        samples.check(work)
-        moves = motion.moves(work)
-        if moves and work.made_of is None:
-            scale.check(work)
-        samples.say_steps(work)
-        if moves:
-            motion.check(work)
-            signs.check(work)
-            noise_check.check(work)
+    if work.peaks_only:
+        work.refuse_short()
+        return [_run(work, name, channels, digest)], []
+    samples.check(work)
+    moves = motion.moves(work)
+    if moves and work.made_of is None:
+        scale.check(work)
+    samples.say_steps(work)
+    if moves:
+        motion.check(work)
+        trigger.check_drive(work)
+        signs.check(work)
     work.refuse_short()
+    works, shared = work.apart()
+    runs = []
+    for k, part in enumerate(works, 1):
+        if moves:
+            motion.check_zero(part)
+            noise_check.check(part)
+        own = f"{name} {k}/{len(works)}" if len(works) > 1 else name
+        runs.append(_run(part, own, channels, digest))
+    return runs, [dataclasses.replace(found, where=found.where or name) for found in shared]
+
+
+def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
+    plan = work.plan
     return Run(
         name=name,
         file=plan.file,

@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap.records import acceleration_check
 from pendmap.records.local_fit import local_fit
+from pendmap.records.units import PIVOT_UNITS
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -32,6 +33,9 @@ CERTAIN: Final = 8.0
 """Standard errors that a turned sign must have: samples of smoothed signals are not independent,
 about four of them are worth one."""
 
+FARTHEST: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}
+"""What no pivot of a laboratory spans, of each quantity."""
+
 SHARE: Final = 0.12
 """Periods that derivatives are taken over: shorter ones drown in noise, longer ones lose the
 shape."""
@@ -44,7 +48,19 @@ def check(work: Work) -> None:
     if "acceleration" in work.extra:
         acceleration_check.check(work)
     if work.plan.kind == "forced":
+        _far(work)
         _drive(work)
+
+
+def _far(work: Work) -> None:
+    """Say so where the pivot moves as no pivot does: its unit is another."""
+    unit, _ = PIVOT_UNITS[(work.plan.pivot or {}).get("unit", "m/s2")]
+    for way, values in (work.pivot() or {}).items():
+        good = values[np.isfinite(values)]
+        span = float(np.ptp(good)) if good.size else 0.0
+        if span > FARTHEST[unit]:
+            text = f"the pivot's {way} motion spans {span:.4g} {unit}: its unit is another"
+            work.say("pivot-unit", text)
 
 
 def _velocity(work: Work) -> None:
@@ -139,7 +155,8 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
         p, omega = plan.drive["p"] or 0.0, plan.drive["Omega"] or 0.0
         if p:
             found["drive"] = p * np.cos(omega * even + plan.drive["phi"])
-    order = {"m/s": 1, "m": 2}.get((plan.pivot or {}).get("unit", ""), 0)
+    unit, _ = PIVOT_UNITS[(plan.pivot or {}).get("unit", "m/s2")]
+    order = {"m/s": 1, "m": 2}.get(unit, 0)
     for way, values in (work.pivot() or {}).items():
         good = np.isfinite(values)
         if np.count_nonzero(good) < even.size // 2 or np.std(values[good]) == 0:

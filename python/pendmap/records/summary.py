@@ -57,7 +57,7 @@ def _run(run: Run) -> dict[str, Any]:
         "drive": None if run.drive is None else dict(run.drive),
         "channels": dict(run.channels),
         "samples": int(run.time.size),
-        "trusted": _used(run),
+        "trusted": int(run.trusted.sum()),
         "from_s": float(run.time[0]),
         "to_s": float(run.time[-1]),
         "rate_hz": run.rate_hz,
@@ -81,7 +81,7 @@ def as_text(experiment: Experiment) -> str:
     if experiment.known:
         known = ", ".join(f"{name} {value:g}" for name, value in experiment.known.items())
         lines.append(f"rig       {known}")
-    lines += [f"- {found.text}  [{found.what}]" for found in experiment.findings]
+    lines += [_line(found) for found in experiment.findings]
     for run in experiment.runs:
         if lines:
             lines.append("")
@@ -97,7 +97,7 @@ def _lines(run: Run) -> Iterator[str]:
     span = f"{run.time[0]:.6g} to {run.time[-1]:.6g} s"
     what = "turning point" if run.peaks_only else "sample"
     rate = "" if run.peaks_only else f" at {run.rate_hz:.5g} Hz"
-    yield f"  samples   {run.time.size} {what}s{rate}, {span}; {_used(run)} for fitting"
+    yield f"  samples   {run.time.size} {what}s{rate}, {span}; {run.trusted.sum()} for fitting"
     yield f"  angle     {run.theta.min():.4g} to {run.theta.max():.4g} rad{_steps(run)}"
     if run.drive is not None:
         phi = run.drive["phi"]
@@ -119,9 +119,13 @@ def _lines(run: Run) -> Iterator[str]:
     count = counted(len(run.findings), "finding")
     yield f"  {count}, {mended} of them mended" if run.findings else "  nothing odd was found"
     for found in run.findings:
-        mark = "mended: " if found.mended else ""
-        where = f" ({found.where})" if found.where.startswith(("row", "line")) else ""
-        yield f"  - {mark}{found.text}{where}  [{found.what}]"
+        yield f"  {_line(found)}"
+
+
+def _line(found: Finding) -> str:
+    mark = "mended: " if found.mended else ""
+    where = f" ({found.where})" if found.where.startswith(("row", "line")) else ""
+    return f"- {mark}{found.text}{where}  [{found.what}]"
 
 
 def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
@@ -130,7 +134,8 @@ def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
     What says how the record was understood is left to ``pendmap look``.
     """
     for found in experiment.findings:
-        yield f"{experiment.path}: {found.text}"
+        mark = "mended: " if found.mended else ""
+        yield f"{experiment.path}: {mark}{found.text}"
     for run in runs:
         for found in run.findings:
             mark = "mended: " if found.mended else ""
@@ -155,9 +160,3 @@ def noise_said(noise: NoiseFloor) -> str:
     if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
         said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high speed"
     return said
-
-
-def _used(run: Run) -> int:
-    """Return how many samples are for fitting: none where nothing moves."""
-    still = bool(run.segments) and not any(segment.used for segment in run.segments)
-    return 0 if still else int(run.trusted.sum())

@@ -44,6 +44,11 @@ _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _NOTHING: Final = frozenset(
     ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity")
 )
+_LEVELS: Final = {
+    **dict.fromkeys(("true", "high", "on"), "1"),
+    **dict.fromkeys(("false", "low", "off"), "0"),
+}
+"""Words that loggers write for the levels of a trigger."""
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 
 
@@ -162,6 +167,9 @@ def _numbers(column: object, decimal: str) -> NDArray[np.float64]:
     if decimal != ".":
         texts = texts.str.replace(decimal, ".", regex=False)
     numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
+    if np.isnan(numbers).all():
+        words = texts.str.lower().map(_LEVELS)
+        numbers = pd.to_numeric(words, errors="coerce").to_numpy(dtype=float, copy=True)
     numbers[~np.isfinite(numbers)] = np.nan
     return np.asarray(numbers)
 
@@ -184,7 +192,7 @@ def _is_row(parts: list[str], decimal: str) -> int:
         text = part if decimal == "." else part.replace(decimal, ".", 1) if "." not in part else "?"
         if _NUMBER.fullmatch(text):
             numbers += 1
-        elif part.lower() not in _NOTHING:
+        elif part.lower() not in _NOTHING and part.lower() not in _LEVELS:
             return 0
     return numbers
 

@@ -187,7 +187,12 @@ CHANNELS: Final = {
     "pixel_x": Channel("px", _LENGTHS, "pixel_x", ("x", "pixel ?x", "x ?pixel", "px x", "pos ?x")),
     "pixel_y": Channel("px", _LENGTHS, "pixel_y", ("y", "pixel ?y", "y ?pixel", "px y", "pos ?y")),
     "peaks": Channel("rad", _ANGLES, "peak_rad", ("peaks?", "amplitudes?", "turning points?")),
-    "trigger": Channel("1", {"1": 1.0, "v": 1.0}, "trigger", ("trigger", "trig", "sync")),
+    "trigger": Channel(
+        "1",
+        {"1": 1.0, "v": 1.0, "mv": 1e-3, "ttl": 1.0},
+        "trigger",
+        ("trigger", "trig", "sync", "ttl"),
+    ),
 }
 """By name, in the order in which columns are tried."""
 

@@ -39,7 +39,9 @@ class Work:
     ``count`` is the step of the readings as it is known, ``seen`` as they show it, 0 for none.
     ``extra`` holds further channels by name, those of the pivot as ``pivot:vertical`` and
     ``pivot:horizontal``. ``accelerometer`` says where an acceleration was measured, or
-    ``place_missing`` which keys would.
+    ``place_missing`` which keys would. ``releases`` are the stretches for fitting of a free
+    record, first place and the one after the last; ``edge`` and ``phase`` what [columns] says of
+    the trigger.
     """
 
     where: str
@@ -58,6 +60,9 @@ class Work:
     peaks_only: bool = False
     accelerometer: Accelerometer | None = None
     place_missing: str = ""
+    releases: list[tuple[int, int]] = dataclasses.field(default_factory=list)
+    edge: str | None = None
+    phase: float | None = None
 
     @property
     def made_of(self) -> Accelerometer | None:
@@ -92,6 +97,8 @@ class Work:
             findings=[*table.findings, *channels.findings],
             accelerometer=channels.accelerometer,
             place_missing=channels.place_missing,
+            edge=channels.edge,
+            phase=channels.phase,
         )
 
     def say(
@@ -119,6 +126,31 @@ class Work:
         self.time, self.theta = self.time[which], self.theta[which]
         self.rows, self.trusted = self.rows[which], self.trusted[which]
         self.extra = {name: values[which] for name, values in self.extra.items()}
+
+    def apart(self) -> tuple[list[Work], list[Finding]]:
+        """Return a work for each release, and what was found in the file and in none of them alone.
+
+        The first keeps what is before it, the last what is after it; what is between two releases
+        is in neither.
+        """
+        if len(self.releases) < 2:
+            return [self], []
+        lows = [0, *(low for low, _ in self.releases[1:])]
+        highs = [*(high for _, high in self.releases[:-1]), self.time.size]
+        shared, parts = list(self.findings), []
+        for k, (low, high) in enumerate(zip(lows, highs, strict=True)):
+            begin, end = float(self.time[low]), float(self.time[high - 1])
+            own = [f for f in shared if _within(f.from_s, f.to_s, begin, end)]
+            shared = [f for f in shared if f not in own]
+            part = dataclasses.replace(
+                self,
+                findings=own,
+                segments=[s for s in self.segments if _within(s.from_s, s.to_s, begin, end)],
+                releases=[(self.releases[k][0] - low, self.releases[k][1] - low)],
+            )
+            part.keep(np.arange(low, high))
+            parts.append(part)
+        return parts, shared
 
     def cut(self, low: float | None, high: float | None) -> None:
         """Keep the part of the file that the run is said to be."""
@@ -156,3 +188,7 @@ class Work:
             if name.startswith("pivot:")
         }
         return found or None
+
+
+def _within(low: float | None, high: float | None, begin: float, end: float) -> bool:
+    return low is not None and high is not None and begin <= low <= high <= end

@@ -1,0 +1,281 @@
+"""The trigger: edges that mark a release, or recur with the drive."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+    Places = tuple[int, int]
+
+__all__ = ["Beat", "beat_of", "begun", "check_drive", "edges_of"]
+
+BETWEEN: Final = 0.02
+"""Share of the samples that may lie between two levels: those of a slow edge."""
+
+DEAD: Final = 0.2
+"""Share of the way between the levels that is neither: noise there makes no edge."""
+
+APART: Final = 3.0
+"""Periods of small swings that releases are apart; what recurs faster is no release."""
+
+BOUNCE: Final = 0.3
+"""Share of a drive period within which a second edge is a bounce of the first."""
+
+FEWEST: Final = 4
+"""Edges from which a drive's frequency is taken."""
+
+EVEN: Final = 0.1
+"""Share of the period by which edges of a drive may miss its beat, rms, beyond the sampling."""
+
+DIFFERS: Final = 3.0
+"""Standard errors from which a given frequency or phase is not that of the trigger."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Beat:
+    """A drive as its trigger shows it.
+
+    Parameters
+    ----------
+    omega, stderr : float
+        rad/s.
+    time : ndarray, shape (M,)
+        Of the edges that count, s: the middle between the samples before and after.
+    error : float
+        Standard error of one of them, s.
+    left_out : int
+        Bounces.
+    """
+
+    omega: float
+    stderr: float
+    time: Floats
+    error: float
+    left_out: int
+
+
+def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp], str] | None:
+    """Return the places of the first samples after each edge, and which edge it is.
+
+    The threshold lies between the means of the two levels, with a dead band about it. Where it is
+    not said which edge counts, the rising one does, or the falling one if there is no other.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        The channel; missing values keep the level before them.
+    edge : str, optional
+        ``"rising"`` or ``"falling"``.
+
+    Returns
+    -------
+    tuple or None
+        None where the channel has no two levels.
+    """
+    seen = values[np.isfinite(values)]
+    if seen.size == 0 or np.ptp(seen) == 0:
+        return None
+    threshold = (float(seen.min()) + float(seen.max())) / 2
+    for _ in range(20):
+        low, high = float(seen[seen <= threshold].mean()), float(seen[seen > threshold].mean())
+        middle = (low + high) / 2
+        if not seen.min() < middle < seen.max() or middle == threshold:
+            break
+        threshold = middle
+    band = DEAD * (high - low)
+    if np.mean(np.abs(seen - threshold) < band) > BETWEEN:
+        return None
+    state = np.where(values > threshold + band, 1, np.where(values < threshold - band, -1, 0))
+    places = np.flatnonzero(state)
+    signs = state[places]
+    turns = np.flatnonzero(np.diff(signs)) + 1
+    rising, falling = places[turns[signs[turns] > 0]], places[turns[signs[turns] < 0]]
+    if edge is None:
+        edge = "rising" if rising.size or not falling.size else "falling"
+    return (rising if edge == "rising" else falling), edge
+
+
+def _debounced(time: Floats, places: NDArray[np.intp], dead: float) -> list[int]:
+    """Return the edges that do not follow the one that counted before within ``dead``, s."""
+    kept: list[int] = []
+    for k in places.tolist():
+        if not kept or time[k] - time[kept[-1]] > dead:
+            kept.append(k)
+    return kept
+
+
+def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
+    """Return the stretches of a free record that begin at the trigger's edges.
+
+    Parameters
+    ----------
+    work : Work
+        A free record.
+    parts : list of (int, int)
+        The stretches that nobody touches, as the angle shows them.
+    period : float
+        Of small swings, s.
+
+    Returns
+    -------
+    list of (int, int)
+        For each edge the motion that follows it; ``parts`` where the trigger tells nothing.
+    """
+    if "trigger" not in work.extra or not parts:
+        return parts
+    found = edges_of(work.extra["trigger"], work.edge)
+    if found is None or not found[0].size:
+        work.say("trigger-unlike", f"the trigger {_none(found)}: it marks no release")
+        return parts
+    kept = _debounced(work.time, found[0], period)
+    apart = np.diff(work.time[kept])
+    if apart.size and np.median(apart) < APART * period:
+        text = (
+            f"the trigger's {counted(len(kept), f'{found[1]} edge')} recur after"
+            f" {np.median(apart):.3g} s, three swings and less: it marks no release"
+        )
+        work.say("trigger-unlike", text)
+        return parts
+    motions = []
+    for k, low in enumerate(kept):
+        high = kept[k + 1] if k + 1 < len(kept) else work.time.size
+        after = [(max(a, low), min(b, high)) for a, b in parts if a < high and b > low]
+        if not after:
+            continue
+        a, b = max(after, key=lambda part: part[1] - part[0])
+        # What the angle shows is known to a fraction of a swing; the trigger knows better.
+        motions.append((low if work.time[a] - work.time[low] < period else a, b))
+    if not motions:
+        work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
+        return parts
+    times = ", ".join(f"{work.time[k]:.6g}" for k in kept[:6]) + (", ..." if len(kept) > 6 else "")
+    bounced = found[0].size - len(kept)
+    bounces = f"; {counted(bounced, 'bounce')} left out" if bounced else ""
+    text = f"the trigger's {found[1]} edge marks {counted(len(kept), 'release')}, at {times} s"
+    work.say("trigger-release", text + bounces)
+    return motions
+
+
+def _none(found: tuple[NDArray[np.intp], str] | None) -> str:
+    return "has no two levels" if found is None else f"has no {found[1]} edge"
+
+
+def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) -> Beat | None:
+    """Return the frequency with which edges recur; None where they do not.
+
+    Each edge lies between two samples: where periods exist that every edge allows, they bound
+    Omega, and its standard error is that of an even distribution between the bounds. The bounds are
+    ``(t_j - t_i +- (d_i + d_j) / 2) / (n_j - n_i)``, d the interval at an edge, n its number. Else
+    it is the least-squares line of the edges' times over their numbers, with its standard error.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s.
+    places : ndarray of int, shape (M,)
+        Of the first sample after each edge.
+    omega : float, optional
+        About what is expected, rad/s, to tell bounces.
+    """
+    if places.size < FEWEST:
+        return None
+    apart = np.diff(time[places])
+    # Without a frequency to go by: bounces are many and short, periods few and long.
+    period = 2 * math.pi / omega if omega else float(np.quantile(apart, 0.9))
+    kept = np.asarray(_debounced(time, places, BOUNCE * period), np.intp)
+    if kept.size < FEWEST:
+        return None
+    before, after = time[kept - 1], time[kept]
+    middle = (before + after) / 2
+    period = float(np.median(np.diff(middle)))
+    number = np.concatenate([[0.0], np.cumsum(np.round(np.diff(middle) / period))])
+    if np.any(np.diff(number) < 1):
+        return None
+    (period, start), covariance = np.polyfit(number, middle, 1, cov="unscaled")
+    rest = middle - start - period * number
+    sampling = float(np.mean(after - before)) / math.sqrt(12)
+    spread = float(np.sqrt(np.sum(rest**2) / (rest.size - 2)))
+    if period <= 0 or spread > EVEN * period + 2 * sampling:
+        return None
+    error = max(spread, sampling) * math.sqrt(float(covariance[0, 0]))
+    low, high = _allowed(before, after, number)
+    if low <= high:
+        period, error = (low + high) / 2, (high - low) / math.sqrt(12)
+    w = 2 * math.pi / period
+    return Beat(w, w * error / period, middle, max(spread, sampling), places.size - kept.size)
+
+
+def _allowed(before: Floats, after: Floats, number: Floats) -> tuple[float, float]:
+    """Return the least and the greatest period that all edges allow."""
+    low, high = 0.0, math.inf
+    for k in range(1, number.size):
+        steps = number[k:] - number[:-k]
+        low = max(low, float(np.max((before[k:] - after[:-k]) / steps)))
+        high = min(high, float(np.min((after[k:] - before[:-k]) / steps)))
+    return low, high
+
+
+def check_drive(work: Work) -> None:
+    """Say what frequency the trigger of a forced run shows; take its phase where that is stated."""
+    if work.plan.kind != "forced" or "trigger" not in work.extra:
+        return
+    drive = work.plan.drive
+    given = drive["Omega"] if drive else None
+    found = edges_of(work.extra["trigger"], work.edge)
+    if found is None or found[0].size < FEWEST:
+        why = (
+            f"the trigger {_none(found)}"
+            if found is None or not found[0].size
+            else (f"the trigger has {counted(found[0].size, f'{found[1]} edge')}")
+        )
+        work.say("trigger-unlike", f"{why}: it shows no drive")
+        return
+    beat = beat_of(work.time, found[0], given)
+    if beat is None:
+        text = (
+            f"the trigger's {found[0].size} {found[1]} edges do not recur evenly: it shows no drive"
+        )
+        work.say("trigger-unlike", text)
+        return
+    bounces = f"; {counted(beat.left_out, 'bounce')} left out" if beat.left_out else ""
+    said = (
+        f"by the trigger Omega = {beat.omega:.7g} +- {beat.stderr:.1g} rad/s,"
+        f" {counted(beat.time.size, f'{found[1]} edge')}{bounces}"
+    )
+    if drive is None or given is None:
+        work.say("trigger-drive", said)
+        return
+    if abs(beat.omega - given) > DIFFERS * beat.stderr:
+        work.say("trigger-differs", f"{said}: the drive is given with {given:.7g}")
+        return
+    work.say("trigger-drive", said)
+    if work.phase is not None:
+        _phase(work, beat, given, work.phase)
+
+
+def _phase(work: Work, beat: Beat, omega: float, phase: float) -> None:
+    """Take the drive's phase from the edges, ``phi = phase - Omega t``, where it is not given."""
+    drive = work.plan.drive or {}
+    mean = np.mean(np.exp(1j * (phase - omega * beat.time)))
+    phi = float(np.angle(mean))
+    # An edge is somewhere between two samples, each time at the same place if they are in step.
+    error = omega * beat.error
+    told = drive["phi"]
+    if told is None:
+        work.plan = dataclasses.replace(work.plan, drive={**drive, "phi": phi})
+        text = f"phi = {phi:.4g} +- {error:.1g} rad by the trigger, phase {phase:g} at its edges"
+        work.say("trigger-phase", text)
+    elif abs(math.remainder(told - phi, 2 * math.pi)) > DIFFERS * error:
+        text = f"by the trigger phi = {phi:.4g} +- {error:.1g} rad: it is given as {told:.4g}"
+        work.say("trigger-differs", text)
