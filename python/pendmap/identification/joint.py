@@ -56,7 +56,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         )
     return FitRun(
         time,
-        run.theta,
+        run.theta - reading.shift,
         reading.each,
         trusted=run.trusted,
         drive=run.drive,
