@@ -82,7 +82,7 @@ def test_a_clock_whose_stamps_hide_its_jitter_is_found(tmp_path: Path) -> None:
     late = time + np.random.default_rng(2).normal(0, 1e-3, time.size)
     run = read(tmp_path, text((time, np.interp(late, fine, angle))))
     said = found(run)["noise-grows-with-speed"].text
-    assert float(said.split("stamps by ")[1].split()[0]) == pytest.approx(1e-3, rel=0.3)
+    assert float(said.split("stamps by ")[1].split()[0]) == pytest.approx(1.0, rel=0.1)  # ms
 
 
 @pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0])

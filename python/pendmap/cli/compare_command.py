@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import functools
 import json
+import sys
 from pathlib import Path
 
 import click
 
-from pendmap.cli.show import plain, write_all, write_table
+from pendmap.cli.show import plain, progress_bar, write_all, write_table
 from pendmap.cli.types import OutputFile
 
 __all__ = ["command"]
@@ -19,7 +20,7 @@ __all__ = ["command"]
 @click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
 @click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files.")
-@click.option("--quiet", is_flag=True, help="No summary.")
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(*, model: Path, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> None:
     """Simulate a MODEL beside every free decay of an EXPERIMENT.
 
@@ -40,7 +41,8 @@ def command(*, model: Path, path: Path, plot: Path | None, as_json: bool, quiet:
     rig = load_model(model)
     if not isinstance(rig, Rig):
         raise InputError(f"{model}: has no dimensions: allowed is a model in SI, with its w0")
-    comparison = compare(rig, read_experiment(path))
+    with progress_bar("compare", shown=sys.stderr.isatty() and not quiet):
+        comparison = compare(rig, read_experiment(path))
     written: list[str] = []
     if plot is not None:
         from pendmap import figures

@@ -75,13 +75,15 @@ def command(  # noqa: PLR0913 (an option each)
         plot = OutputFile([".png"]).convert(f"{Path(NAME).stem}.png", None, None)
     out = out or OutputFile([".toml"]).convert(NAME, None, None)
     model = None if model_path is None else _si(model_path)
-    experiment = read_experiment(path)
     shown = sys.stderr.isatty() and not quiet
+    with progress_bar("read", shown=shown):
+        experiment = read_experiment(path)
     with progress_bar("diagnose", shown=shown) as progress:
         found = diagnose(
             experiment, model=model, max_effects=max_effects, without=without, progress=progress
         )
-    written = write_all(_files(found, out, plot, "pendmap " + shlex.join(sys.argv[1:])))
+    with progress_bar("write", shown=shown):
+        written = write_all(_files(found, out, plot, "pendmap " + shlex.join(sys.argv[1:])))
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 

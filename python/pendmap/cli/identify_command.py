@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.options import Outputs, output_options
-from pendmap.cli.show import open_viewer, plain, write_all, write_table
+from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,7 +37,7 @@ SUFFIX = ".toml"
     metavar="NAME",
     help="Fit this effect of the library too; may be repeated.",
 )
-@click.option("--quiet", is_flag=True, help="No summary.")
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
 @output_options((SUFFIX,), "Model")
 def command(
     *,
@@ -58,14 +58,19 @@ def command(
     from pendmap.identification import identified_model, identify_experiment
     from pendmap.records import read_experiment
 
-    experiment = read_experiment(path)
-    report = identify_experiment(experiment, methods=methods or None, effects=effects)
+    with progress_bar("read", shown=outputs.shows_progress):
+        experiment = read_experiment(path)
+    with progress_bar("identify", shown=outputs.shows_progress) as progress:
+        report = identify_experiment(
+            experiment, methods=methods or None, effects=effects, progress=progress
+        )
     try:
         model = identified_model(report, "pendmap " + shlex.join(sys.argv[1:]))
     except InputError:
         _show(report, outputs)
         raise
-    written = write_all(_files(outputs, report, model))
+    with progress_bar("write", shown=outputs.shows_progress):
+        written = write_all(_files(outputs, report, model))
     _show(report, outputs, outputs.out)
     if written and not outputs.as_json and not outputs.quiet:
         click.echo("Written: " + ", ".join(written))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import click
 
+from pendmap.cli.show import plain, progress_bar
 from pendmap.cli.types import OutputFile
 from pendmap.files import held_interrupts
 
@@ -17,7 +19,7 @@ __all__ = ["command"]
 @click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
 @click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
-@click.option("--quiet", is_flag=True, help="No summary.")
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> None:
     """Say what a record holds and what is odd about it, before anything is fitted.
 
@@ -29,15 +31,14 @@ def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> Non
     from pendmap.records.summary import as_json as fields
     from pendmap.records.summary import as_text
 
-    experiment = read_experiment(path)
+    with progress_bar("read", shown=sys.stderr.isatty() and not quiet):
+        experiment = read_experiment(path)
     if plot is not None:
         from pendmap import figures
 
         with held_interrupts():
             figures.draw_record(experiment, plot)
     if as_json:
-        from pendmap.cli.show import plain
-
         click.echo(json.dumps(plain(fields(experiment)), allow_nan=False))
     elif not quiet:
         click.echo(as_text(experiment))

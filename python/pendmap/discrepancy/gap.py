@@ -79,12 +79,17 @@ def _rows(
         RunGap(
             run.name,
             held_out,
-            float(np.sqrt(np.mean(np.square(np.broadcast_to(run.sigma, run.time.shape))))),
+            _floor(run),
             _rms([run], before, k),
             _rms([run], after, k),
         )
         for k, run in enumerate(runs)
     ]
+
+
+def _floor(run: FitRun) -> float:
+    sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)
+    return float(np.sqrt(np.mean(np.square(sigma if run.trusted is None else sigma[run.trusted]))))
 
 
 def _together(runs: Sequence[FitRun], floors: Sequence[float]) -> float:

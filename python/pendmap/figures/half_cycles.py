@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 
 from pendmap.figures import blocks, sides, style
@@ -249,10 +250,14 @@ def _slopes(course: Course, at: Floats, reach: float) -> Floats:
 
 def _sign(axes: Axes, peaks: Peaks) -> None:
     """Draw the sign of the velocity: that of the way from each peak to the next."""
-    for k in np.flatnonzero(np.diff(peaks.index) == 1):
-        sign = math.copysign(1.0, peaks.amplitude[k + 1] - peaks.amplitude[k])
-        colour = ODD if peaks.index[k] % 2 else EVEN
-        axes.fill_between(peaks.time[k : k + 2], 0.0, [sign, sign], color=colour, lw=0, alpha=0.85)
+    for parity, colour in ((0, EVEN), (1, ODD)):
+        whole = np.flatnonzero((np.diff(peaks.index) == 1) & (peaks.index[:-1] % 2 == parity))
+        sign = np.sign(peaks.amplitude[whole + 1] - peaks.amplitude[whole])
+        begin, end, none = peaks.time[whole], peaks.time[whole + 1], np.zeros(whole.size)
+        corners = [(begin, none), (end, none), (end, sign), (begin, sign)]
+        # One collection: a record may have thousands of half cycles.
+        boxes = np.array(corners).transpose(2, 0, 1)
+        axes.add_collection(PolyCollection(list(boxes), facecolors=colour, lw=0, alpha=0.85))
     axes.axhline(0.0, color=style.QUIET, lw=0.6)
     axes.set_ylim(-1.35, 1.35)
     axes.yaxis.set_ticks([-1, 0, 1], ["\N{MINUS SIGN}1", "0", "1"])

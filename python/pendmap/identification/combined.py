@@ -140,6 +140,7 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
     reading: Reading = "all",
     cut: float = CUT,
 ) -> Identification:
@@ -158,6 +159,8 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional
         Samples that may be used.
+    peaks : Peaks, optional
+        Those of the record, where they are known; by default found.
     reading : {"all", "odd_ends", "odd_triplets"}
         The paper starts "only on odd half cycles": ``odd_ends`` takes 2.7 between the first and
         the last pair of peaks that begin at an odd one, ``odd_triplets`` the mean over the
@@ -175,7 +178,8 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     ----------
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
     """
-    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    if peaks is None:
+        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     why = _unresolved(*samples(time, theta, trusted), peaks, cut)
     return from_peaks(peaks, reading=reading, cut=cut, why=why)
 
@@ -203,9 +207,10 @@ def identify_odd_ends(
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
 ) -> Identification:
     """Identify with eq. 2.7 between two odd ends; see :func:`identify`."""
-    return identify(time, theta, sigma=sigma, trusted=trusted, reading="odd_ends")
+    return identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks, reading="odd_ends")
 
 
 def identify_odd_triplets(
@@ -214,6 +219,7 @@ def identify_odd_triplets(
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
 ) -> Identification:
     """Identify with the mean of the odd triplets; see :func:`identify`."""
-    return identify(time, theta, sigma=sigma, trusted=trusted, reading="odd_triplets")
+    return identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks, reading="odd_triplets")

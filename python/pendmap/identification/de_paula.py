@@ -37,6 +37,7 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
     fast: tuple[float, float] = FAST,
     slow: tuple[float, float] = SLOW,
 ) -> Identification:
@@ -55,6 +56,8 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional
         Samples that may be used.
+    peaks : Peaks, optional
+        Those of the record, where they are known; by default found.
     fast, slow : (float, float)
         Amplitudes of the two windows, rad: 12 to 90 degrees and 0 to 12 degrees.
 
@@ -69,7 +72,8 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     De Paula, Savi & Pereira-Pinto (2006), "Chaos and transient chaos in an experimental nonlinear
     pendulum", J. Sound Vib.; the windows are ours.
     """
-    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    if peaks is None:
+        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     return from_peaks(peaks, fast=fast, slow=slow)
 
 

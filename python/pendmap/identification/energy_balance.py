@@ -43,6 +43,7 @@ def identify(
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
 ) -> Identification:
     """Identify viscous damping and Coulomb friction by the energy that each half cycle loses.
 
@@ -59,6 +60,8 @@ def identify(
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional
         Samples that may be used; a half cycle with a gap takes the integral of a pendulum's.
+    peaks : Peaks, optional
+        Those of the record, where they are known; by default found.
 
     Returns
     -------
@@ -70,7 +73,8 @@ def identify(
     Liang & Feeny (2006), "Balancing energy to estimate damping parameters in forced oscillators",
     J. Sound Vib.; the balance here is that of a free decay, half cycle by half cycle.
     """
-    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    if peaks is None:
+        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     t, x = samples(time, theta, trusted)
     turned = peaks.turned
     if len(turned) < _FEWEST:

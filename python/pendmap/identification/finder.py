@@ -40,6 +40,7 @@ class Finder:
         late = float(np.median(np.abs(theta[course.turns[course.turns.size // 2 :]])))
         self.w0 = 4 * float(ellipk(math.sin(min(late, 3.0) / 2) ** 2)) / course.period
         self.step = float(np.median(np.diff(time)))
+        self.bottom, self.top = float(theta.min()), float(theta.max())
 
     def found(self) -> list[End]:
         """All peaks, in order of time."""
@@ -108,16 +109,16 @@ class Finder:
         """The noise of a sample, counted as often as samples are independent."""
         if self.count <= 2 * self.sigma:
             return self.sigma
-        inside = np.abs(self.time - fit.centre) <= fit.half
+        inside = self._between(fit.centre - fit.half, fit.centre + fit.half)
         levels = np.unique(np.round(self.theta[inside] / self.count)).size
         return self.sigma * math.sqrt(max(fit.points / (3 * levels), 1.0))
 
     def _clipped(self, k: int) -> End | None:
         """A top that was cut off: the extreme of the record for longer than the swing stays."""
-        extreme = self.theta.max() if self.course.smooth[k] > 0 else self.theta.min()
-        near = np.flatnonzero(
-            (self.theta == extreme) & (np.abs(self.time - self.time[k]) < self.course.period / 2)
-        )
+        extreme = self.top if self.course.smooth[k] > 0 else self.bottom
+        half = self.course.period / 2
+        around = self._between(float(self.time[k]) - half, float(self.time[k]) + half)
+        near = around.start + np.flatnonzero(self.theta[around] == extreme)
         if near.size < 5 or near[-1] - near[0] + 1 != near.size:  # noqa: PLR2004 (in a row)
             return None
         bend = self.w0**2 * max(math.sin(min(abs(extreme), math.pi)), 0.05)
@@ -125,7 +126,12 @@ class Finder:
         if lasts < 3 * self.step + 4 * math.sqrt((self.count + 4 * self.sigma) / bend):
             return None
         middle = float(self.time[near[0]] + self.time[near[-1]]) / 2
-        return End(middle, float(extreme), self.step, math.inf, "clipped")
+        return End(middle, extreme, self.step, math.inf, "clipped")
+
+    def _between(self, begin: float, end: float) -> slice:
+        """The samples from one instant to another."""
+        first, last = np.searchsorted(self.time, (begin, end))
+        return slice(int(first), int(last))
 
     @staticmethod
     def _resolved(before: End, after: End) -> bool:
@@ -143,10 +149,10 @@ class Finder:
         for before, after, k in zip(ends, ends[1:], index, strict=False):
             if after.kind == "stop" or before.angle * after.angle >= 0:
                 continue
-            inside = np.flatnonzero((self.time > before.time) & (self.time < after.time))
-            if inside.size < 3:  # noqa: PLR2004
+            inside = self._between(before.time, after.time)
+            if inside.stop - inside.start < 3:  # noqa: PLR2004
                 continue
-            k0 = inside[np.argmin(np.abs(self.course.smooth[inside]))]
+            k0 = inside.start + int(np.argmin(np.abs(self.course.smooth[inside])))
             half = max(_CROSSING / self.w0, 3.5 * self.step)
             fit, time = None, float(self.time[k0])
             for _ in range(2):

@@ -60,7 +60,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         )
     return FitRun(
         time,
-        as_angles(run),
+        as_angles(run) - reading.shift,
         reading.each,
         trusted=run.trusted,
         drive=run.drive,

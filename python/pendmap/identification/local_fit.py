@@ -20,6 +20,10 @@ _NORMAL_MAD: Final = 0.674489750196
 _OUTLIER: Final = 4.5
 _ROUNDS: Final = 4
 _ROUNDING: Final = 1e-9
+_EVEN: Final = 1e-3
+"""Share of an interval by which samples may miss equal spacing and still count as even."""
+_BLOCK: Final = 4096
+"""Windows of uneven samples that are solved at a time: some megabytes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -198,17 +202,55 @@ def smoothed_velocity(
     velocity, stderr : ndarray, shape (N,)
         rad/s, and 1/s.
     """
-    reach = max(round(half / float(np.median(np.diff(time)))), degree // 2 + 2)
+    step = float(np.median(np.diff(time)))
+    reach = max(round(half / step), degree // 2 + 2)
     width = 2 * reach + 1
     if time.size < width:
         raise ValueError(f"{time.size} samples are fewer than a window of {width}")
-    first = np.clip(np.arange(time.size) - reach, 0, time.size - width)
-    windows = np.lib.stride_tricks.sliding_window_view
-    t, x = windows(time, width)[first], windows(theta, width)[first]
     scale = half if half > 0 else 1.0
-    rows = ((t - time[:, None]) / scale)[..., None] ** np.arange(degree + 1)
-    across = np.swapaxes(rows, 1, 2)
-    normal = np.linalg.inv(across @ rows)
-    moments = (across @ x[..., None])[..., 0]
+    slope, stderr = np.empty(time.size), np.empty(time.size)
+    # Where samples are evenly spaced one set of weights serves all windows.
+    lags = np.arange(-reach, reach + 1) * (step / scale)
+    rows = lags[:, None] ** np.arange(degree + 1)
+    normal = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
+    inside = slice(reach, time.size - reach)
+    slope[inside] = np.correlate(theta, rows @ normal[1], "valid") / scale
+    stderr[inside] = math.sqrt(normal[1, 1]) / scale
+    odd = np.flatnonzero(~_evenly(time, step, reach))
+    for begin in range(0, odd.size, _BLOCK):
+        some = odd[begin : begin + _BLOCK]
+        slope[some], stderr[some] = _slopes(time, theta, some, width, scale, degree)
+    return slope, stderr
+
+
+def _evenly(time: Floats, step: float, reach: int) -> NDArray[np.bool_]:
+    """Return around which samples a window of so many to each side is evenly spaced."""
+    even = np.zeros(time.size, bool)
+    # All intervals of the window together may be off by no more than one may.
+    off = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(time) / step - 1.0) > _EVEN)))
+    drift = np.abs(time[2 * reach :] - time[: time.size - 2 * reach] - 2 * reach * step)
+    even[reach : time.size - reach] = (off[2 * reach :] == off[: time.size - 2 * reach]) & (
+        drift < _EVEN * step * math.sqrt(2 * reach)
+    )
+    return even
+
+
+def _slopes(  # noqa: PLR0913, PLR0917 (samples, window, form)
+    time: Floats, theta: Floats, at: NDArray[np.intp], width: int, scale: float, degree: int
+) -> tuple[Floats, Floats]:
+    """Return slopes and their errors at some samples, each from a window of its own spacing."""
+    # At the ends the window is the last one that is whole.
+    first = np.clip(at - width // 2, 0, time.size - width)
+    within = first[:, None] + np.arange(width)
+    s, x = (time[within] - time[at, None]) / scale, theta[within]
+    sums, moments = np.empty((at.size, 2 * degree + 1)), np.empty((at.size, degree + 1))
+    power = np.ones_like(s)
+    for k in range(2 * degree + 1):
+        sums[:, k] = power.sum(axis=1)
+        if k <= degree:
+            moments[:, k] = np.einsum("ij,ij->i", power, x)
+        power *= s
+    order = np.arange(degree + 1)
+    normal = np.linalg.inv(sums[:, order[:, None] + order])
     slope = np.sum(normal[:, 1, :] * moments, axis=1) / scale
     return slope, np.sqrt(np.maximum(normal[:, 1, 1], 0.0)) / scale

@@ -33,6 +33,7 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
     reading: Reading = "ends",
     cut: float = CUT,
 ) -> Identification:
@@ -51,6 +52,8 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional
         Samples that may be used.
+    peaks : Peaks, optional
+        Those of the record, where they are known; by default found.
     reading : {"ends", "line"}
         Between the first and the last peak, as in the textbooks (the mean of all decrements is the
         same), or the slope of a straight line through all ``ln abs(th_k)``.
@@ -62,7 +65,8 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     Identification
         ``w0`` and ``c_over_m``; there is no ``Tr``.
     """
-    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    if peaks is None:
+        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     return from_peaks(peaks, reading=reading, cut=cut)
 
 

@@ -16,7 +16,7 @@ from pendmap.identification import (
     trajectory,
 )
 from pendmap.identification.clock import from_first
-from pendmap.identification.peaks import samples
+from pendmap.identification.peaks import find_peaks, samples
 from pendmap.identification.result import Identification
 
 if TYPE_CHECKING:
@@ -36,17 +36,21 @@ class Method:
     Parameters
     ----------
     identify : callable
-        Of ``time``, ``theta``, ``sigma=`` and ``trusted=``, as :func:`identify` has them.
+        Of ``time``, ``theta``, ``sigma=`` and ``trusted=``, as :func:`identify` has them, and of
+        ``peaks=`` where it reads peaks.
     from_peaks : callable or None
         Of :class:`Peaks`, for records of peaks alone; none where it needs every sample.
+    reads_peaks : bool
+        Whether it takes the peaks of the record, which are then found once for all methods.
     """
 
     identify: Callable[..., Identification]
     from_peaks: Callable[[Peaks], Identification] | None = None
+    reads_peaks: bool = True
 
 
 METHODS: Final[dict[str, Method]] = {
-    "trajectory": Method(trajectory.identify),
+    "trajectory": Method(trajectory.identify, reads_peaks=False),
     "combined": Method(combined.identify, combined.from_peaks),
     "combined_odd_ends": Method(
         combined.identify_odd_ends, functools.partial(combined.from_peaks, reading="odd_ends")
@@ -80,13 +84,15 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
     return names
 
 
-def identify(
+def identify(  # noqa: PLR0913 (the record, and what is known of it)
     time: ArrayLike,
     theta: ArrayLike,
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
     methods: Iterable[str] | None = None,
+    peaks: Peaks | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Identification]:
     """Identify the damping of a pendulum from one free decay by several methods.
 
@@ -100,6 +106,10 @@ def identify(
         Samples that may be used; by default all.
     methods : iterable of str, optional
         Names of :data:`METHODS`; by default all.
+    peaks : Peaks, optional
+        Those of the record, where they are known; by default found.
+    progress : callable, optional
+        Called with the methods done and those to do.
 
     Returns
     -------
@@ -114,14 +124,19 @@ def identify(
     names = check_names(methods)
     if samples(time, theta, trusted)[0].size == 0:
         raise InputError("time has no sample that may be used: allowed is a record of a decay")
-    elapsed, _ = from_first(time)
-    # The trajectory method names the times that it used, and counts from the first one itself.
-    return {
-        name: METHODS[name].identify(
-            time if name == trajectory.METHOD else elapsed, theta, sigma=sigma, trusted=trusted
-        )
-        for name in names
-    }
+    elapsed, first = from_first(time)
+    if any(METHODS[name].reads_peaks for name in names):
+        if peaks is None:
+            peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+        peaks = peaks.later(-first)
+    found = {}
+    for name in names:
+        # The trajectory method names the times that it used, and counts from the first one itself.
+        own, known = (elapsed, {"peaks": peaks}) if METHODS[name].reads_peaks else (time, {})
+        found[name] = METHODS[name].identify(own, theta, sigma=sigma, trusted=trusted, **known)
+        if progress is not None:
+            progress(len(found), len(names))
+    return found
 
 
 def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[str, Identification]:

@@ -14,6 +14,8 @@ from pendmap.records.noise import noise_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pendmap.records.jitter import SpeedLaw
+
 __all__ = ["Reading", "reading_of"]
 
 DITHERED: Final = 0.45
@@ -31,12 +33,17 @@ class Reading:
     count : float
         The step of the sensor, rad; 0 where none is seen.
     each : ndarray of float, shape (n,)
-        For a fit: readings that stay on one count, undisturbed by noise, all have the same error,
-        so that together they say what one of them says.
+        For a fit, by the noise at their speed: readings that stay on one count, undisturbed by
+        noise, all have the same error, so that together they say what one of them says.
     doubt : float
         Relative standard error of ``sigma``.
     coarse : bool
         Whether the count is coarser than the noise.
+    law : SpeedLaw or None
+        How the noise grows with speed, where the record shows that it does; ``each`` follows it.
+    shift : float or ndarray of float, shape (n,)
+        By how much instants that miss their stamps move the readings on average, rad; a fit takes
+        it off.
     """
 
     sigma: float
@@ -44,6 +51,8 @@ class Reading:
     each: NDArray[np.float64]
     doubt: float
     coarse: bool
+    law: SpeedLaw | None = None
+    shift: NDArray[np.float64] | float = 0.0
 
 
 def reading_of(
@@ -56,8 +65,8 @@ def reading_of(
 ) -> Reading:
     """Return the standard errors of readings.
 
-    The noise is that of :func:`pendmap.noise_floor`; it is at least that of the count,
-    ``count / sqrt(12)``.
+    The noise is that of :func:`pendmap.noise_floor`, by its law where it grows with speed; it is at
+    least that of the count, ``count / sqrt(12)``.
 
     Parameters
     ----------
@@ -72,17 +81,22 @@ def reading_of(
     """
     if count is None:
         count = count_of(theta)
-    doubt = 0.0
+    doubt, law = 0.0, None
     if sigma is None:
         floor = noise_of(time, theta, trusted=trusted, count=count)
         known = math.isfinite(floor.sigma) and floor.sigma > 0
         sigma = floor.sigma if known else 0.0
+        law = floor.law
         doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
-    sigma = max(sigma, count / math.sqrt(12), 1e-15)
+    least = max(count / math.sqrt(12), 1e-15)
+    sigma = max(sigma, least)
     coarse = sigma < DITHERED * count
-    each = np.full(theta.shape, sigma)
-    if coarse:
+    each = np.full(theta.shape, sigma) if law is None else law.sigma(time, theta)
+    each = np.maximum(each, least)
+    stuck = each < DITHERED * count
+    if stuck.any():
         change = np.flatnonzero(np.diff(theta) != 0) + 1
         lengths = np.diff(np.concatenate([[0], change, [len(theta)]]))
-        each = sigma * np.sqrt(np.repeat(lengths, lengths))
-    return Reading(sigma, count, each, doubt, coarse)
+        each = each * np.where(stuck, np.sqrt(np.repeat(lengths, lengths)), 1.0)
+    shift = 0.0 if law is None else law.shift(time, theta)
+    return Reading(sigma, count, each, doubt, coarse, law, shift)

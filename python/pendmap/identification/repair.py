@@ -29,12 +29,13 @@ _FEWEST = 6
 _MISFIT = 2.0
 
 
-def identify(
+def identify(  # noqa: PLR0913 (the record, and what is known of it)
     time: ArrayLike,
     theta: ArrayLike,
     *,
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
     cut: float = CUT,
 ) -> Identification:
     """Identify viscous damping and Coulomb friction by the repaired combined decrement.
@@ -53,6 +54,8 @@ def identify(
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional
         Samples that may be used.
+    peaks : Peaks, optional
+        Those of the record, where they are known; by default found.
     cut : float
         Peaks above are dropped, rad.
 
@@ -65,7 +68,9 @@ def identify(
     ----------
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eqs. 2.4 to 2.6.
     """
-    return from_peaks(find_peaks(time, theta, sigma=sigma, trusted=trusted), cut=cut)
+    if peaks is None:
+        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    return from_peaks(peaks, cut=cut)
 
 
 def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:

@@ -25,7 +25,7 @@ from pendmap.records.experiment import Experiment
 from pendmap.words import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from pendmap.model import Effect
     from pendmap.records import Run
@@ -143,6 +143,7 @@ def identify_experiment(
     methods: Iterable[str] | None = None,
     start: Rig | None = None,
     effects: Sequence[Effect | str] = (),
+    progress: Callable[[int, int], object] | None = None,
 ) -> IdentificationReport:
     """Identify damping from an experiment by every method.
 
@@ -159,6 +160,8 @@ def identify_experiment(
         Where the trajectory method begins, with its effects; by default found from the record.
     effects : sequence of Effect or str
         Further effects, or their names, that it fits the sizes of.
+    progress : callable, optional
+        Called with the steps done and those to do: one for each method, the peaks and the table.
 
     Raises
     ------
@@ -169,6 +172,7 @@ def identify_experiment(
     checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
     if start is not None:
         checks.of_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
+    checks.call("progress", progress)
     names = check_names(methods)
     for effect in effects:
         name = effect if isinstance(effect, str) else effect.name
@@ -182,15 +186,29 @@ def identify_experiment(
         peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
         found = identify_peaks(peaks, names)
         return IdentificationReport(experiment, run, peaks, found, None, table_of(peaks, found))
+    others = [name for name in names if name != BEST]
+    steps, before = len(names) + 2, len(names) - len(others) + 1
+    report = progress or (lambda _done, _total: None)
     sigma, joint, found = None, None, {}
     if BEST in names:
         joint, found[BEST] = _best(experiment, run, start, effects)
         if joint is not None:
             sigma = joint.readings[0].sigma
-    others = [name for name in names if name != BEST]
-    found |= identify(run.time, run.theta, sigma=sigma, trusted=run.trusted, methods=others)
+    report(before - 1, steps)
     peaks = find_peaks(run.time, run.theta, sigma=sigma, trusted=run.trusted)
-    return IdentificationReport(experiment, run, peaks, found, joint, table_of(peaks, found))
+    report(before, steps)
+    found |= identify(
+        run.time,
+        run.theta,
+        sigma=sigma,
+        trusted=run.trusted,
+        methods=others,
+        peaks=peaks,
+        progress=lambda done, _total: report(before + done, steps),
+    )
+    table = table_of(peaks, found)
+    report(steps, steps)
+    return IdentificationReport(experiment, run, peaks, found, joint, table)
 
 
 def _best(

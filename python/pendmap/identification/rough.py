@@ -70,22 +70,12 @@ def _half_swings(
     time: NDArray[np.float64], theta: NDArray[np.float64], least: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the times of the zero crossings and the peak between each pair of them."""
-    side = 0
-    crossings: list[float] = []
-    peaks: list[float] = []
-    last = 0
-    highest = 0.0
-    for k in range(len(theta)):
-        if abs(theta[k]) < least:
-            continue
-        now = 1 if theta[k] > 0 else -1
-        if side not in (0, now):
-            part = theta[last] / (theta[last] - theta[k])
-            crossings.append(time[last] + part * (time[k] - time[last]))
-            peaks.append(highest)
-            highest = 0.0
-        side, last, highest = now, k, max(highest, abs(float(theta[k])))
-    # What came before the first crossing is no half swing.
-    if len(crossings) < FEWEST_SWINGS:
+    clear = np.flatnonzero(np.abs(theta) >= least)
+    after = 1 + np.flatnonzero(np.diff(theta[clear] > 0))
+    if after.size < FEWEST_SWINGS:
         return np.array([]), np.array([])
-    return np.array(crossings), np.minimum(np.array(peaks[1:]), math.pi - 1e-3)
+    a, b = clear[after - 1], clear[after]
+    # What came before the first crossing is no half swing, nor is what follows the last.
+    crossings = time[a] + theta[a] / (theta[a] - theta[b]) * (time[b] - time[a])
+    peaks = np.maximum.reduceat(np.abs(theta[clear]), after)[:-1]
+    return crossings, np.minimum(peaks, math.pi - 1e-3)

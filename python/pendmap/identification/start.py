@@ -84,10 +84,10 @@ def starting_values(
     InputError
         If the record does not swing at all.
     """
-    balance = energy_balance.identify(time, theta, sigma=sigma, trusted=trusted)
+    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    balance = energy_balance.identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks)
     if _sound(balance):
         return _clipped(balance)
-    peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     mended = repair.from_peaks(peaks)
     if _sound(mended):
         return _clipped(mended)

@@ -184,7 +184,7 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
         raise InputError("trusted and time differ in length: they must be as many")
     elapsed, first = from_first(time)
     reading = reading_of(elapsed, theta, sigma, trusted=good)
-    run = FitRun(elapsed, theta, reading.each, trusted=good, lab_time_s=first)
+    run = FitRun(elapsed, theta - reading.shift, reading.each, trusted=good, lab_time_s=first)
     found = fit_from_start(
         [run],
         [reading],
@@ -227,6 +227,7 @@ def _warnings(
     lost = [name for name, e in wanted.items() if e.ci95 is None]
     if lost:
         found.append(f"no end was found for the interval of {', '.join(lost)}")
+    found += [f"{r.law}: each reading counts by the noise at its speed" for r in readings if r.law]
     coarse = [reading.count for reading in readings if reading.coarse]
     if coarse:
         found.append(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.records.local_fit import local_fit
-from pendmap.records.noise import normal_scale
+from pendmap.records.robust import normal_scale
 from pendmap.records.runs_of import true_runs
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["POINTS", "LocalFit", "local_fit"]
+__all__ = ["POINTS", "LocalFit", "even_weights", "local_fit"]
 
 POINTS: Final = 9
 """Samples a polynomial goes through."""
@@ -48,6 +48,8 @@ class LocalFit:
     sum_of_squares : float
         Sum of the squared autocorrelations of the residuals of white noise: M residuals are worth
         M over this many independent ones.
+    shares : ndarray, shape (points,)
+        Parts that the samples of a window have in the variance of a residual; they add up to 1.
     """
 
     middle: NDArray[np.intp]
@@ -55,6 +57,7 @@ class LocalFit:
     slope: Floats
     neighbours: int
     sum_of_squares: float
+    shares: Floats
 
 
 def local_fit(
@@ -76,12 +79,12 @@ def local_fit(
     half = points // 2
     reach = half * stride
     count = time.size - 2 * reach
-    weights, slopes = _even(degree, points)
+    weights, slopes = even_weights(degree, points)
     gain = np.sqrt(weights[half])
-    spread = _spread(weights / gain)
+    spread, shares = _spread(weights / gain), (weights / gain) ** 2
     if count <= 0:
         none = np.empty(0)
-        return LocalFit(np.empty(0, np.intp), none, none, reach, spread)
+        return LocalFit(np.empty(0, np.intp), none, none, reach, spread, shares)
     middle = np.arange(reach, time.size - reach)
     offsets = np.arange(-half, half + 1) * stride
     residual, slope = np.zeros(count), np.zeros(count)
@@ -106,12 +109,12 @@ def local_fit(
         residual[block], slope[block] = _uneven(lag, theta[rows] - here[block, None], degree)
         slope[block] /= interval
     good = ~across & np.isfinite(residual) & np.isfinite(slope)
-    return LocalFit(middle[good], residual[good], slope[good], reach, spread)
+    return LocalFit(middle[good], residual[good], slope[good], reach, spread, shares)
 
 
 @functools.cache
-def _even(degree: int, points: int) -> tuple[Floats, Floats]:
-    """Weights of the residual and of the slope in the middle of equally spaced samples."""
+def even_weights(degree: int, points: int) -> tuple[Floats, Floats]:
+    """Return the weights of residual and slope in the middle of equally spaced samples."""
     half = points // 2
     x = np.arange(-half, half + 1) / half
     inverse = np.linalg.pinv(np.vander(x, degree + 1, increasing=True))

@@ -11,8 +11,8 @@ from pendmap.errors import InputError
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
 from pendmap.records.local_fit import local_fit
-from pendmap.records.noise import normal_scale
 from pendmap.records.releases import enough, held_short, releases
+from pendmap.records.robust import normal_scale
 from pendmap.records.runs_of import true_runs
 from pendmap.records.scale import periods_of
 from pendmap.records.swings import after_turns, swings

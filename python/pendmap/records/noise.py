@@ -10,9 +10,9 @@ gain, is noise. Three things spoil that, and each has its remedy here:
   pendulum passes at least a count from one to the next; slower than that nothing can be said but
   that an even error within a count has the standard deviation count/sqrt(12), and that is the
   least that is reported.
-- Outliers: what is beyond eight standard deviations (robust, from quantiles) is left out with all
-  windows that it is part of, then a plain root mean square is taken. The median alone would be
-  wrong by a tenth for the even errors of a counter.
+- Outliers: what is beyond eight standard deviations (robust, from quantiles, among samples of
+  similar speed) is left out with all windows that it is part of, then a plain root mean square is
+  taken. The median alone would be wrong by a tenth for the even errors of a counter.
 
 Noise that is not white is read too small: ``colour`` says by how much the reading depends on the
 filter.
@@ -27,7 +27,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records.jitter import SpeedLaw, law_of, speed_of
 from pendmap.records.local_fit import LocalFit, local_fit
+from pendmap.records.robust import broad_scale
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,11 +41,8 @@ if TYPE_CHECKING:
 __all__ = [
     "NoiseFloor",
     "SpeedRange",
-    "broad_scale",
     "noise_floor",
     "noise_of",
-    "normal_scale",
-    "outlying",
 ]
 
 DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
@@ -52,6 +51,9 @@ DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
 EVERY: Final = 0.06
 """Radians of its own phase that a motion may pass between samples and be followed by a quartic:
 the next term, x^6/720 over nine samples, is then under 1e-8 of the amplitude."""
+
+LAG: Final = 0.25
+"""Radians of phase over which a way is measured, where that is more than an interval."""
 
 FARTHEST: Final = 0.25
 """Radians of phase between samples that are taken further apart because of coarse counts."""
@@ -69,6 +71,9 @@ real encoders has longer tails, which are part of it."""
 
 FEWEST: Final = 40
 """Residuals that a standard deviation is taken from; half a dozen would be wrong by a third."""
+
+KINDS: Final = 16
+"""Kinds of speed, with equally many samples, that have outliers of their own."""
 
 RANGES: Final = 4
 """Ranges of speed, with equally many samples."""
@@ -115,6 +120,8 @@ class NoiseFloor:
         is correlated from sample to sample or the motion is not followed.
     samples : int
         How many residuals it comes from.
+    law : SpeedLaw or None
+        How the noise grows with speed, where the record shows that it does.
     """
 
     sigma: float
@@ -123,6 +130,7 @@ class NoiseFloor:
     limited_by_count: bool = False
     colour: float = 1.0
     samples: int = 0
+    law: SpeedLaw | None = None
 
 
 def noise_floor(run: Run) -> NoiseFloor:
@@ -163,32 +171,47 @@ def noise_of(
 
 
 def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) -> NoiseFloor | None:
-    first = _clean(local_fit(time, theta), bad)
-    if first.middle.size < FEWEST:
+    if time.size < FEWEST:
         return None
     interval = float(np.median(np.diff(time)))
-    swing = _frequency(time, theta, count)
+    swing, phase = _frequencies(time, theta, count)
+    speed = speed_of(time, theta, phase)
+    first = _clean(local_fit(time, theta), bad, speed)
+    if first.middle.size < FEWEST:
+        return None
     fit = first
     if swing * interval > EVERY:
-        fit = _followed(time, theta, bad, first)
-    next_fit = _clean(local_fit(time, theta, degree=6, points=11), bad)
+        fit = _followed(time, theta, bad, speed, first)
+    next_fit = _clean(local_fit(time, theta, degree=6, points=11), bad, speed)
     colour = _rms(first) / max(_rms(next_fit), 1e-300) if next_fit.middle.size >= FEWEST else 1.0
     least = count / math.sqrt(12)
     slowest = 0.0
     if count and _rms(fit) < DITHERED * count:
-        apart = _apart(time, theta, bad, count, interval, swing)
+        nearest = fit if swing * interval > EVERY else None
+        apart = _apart(time, theta, bad, speed, count, interval, swing, nearest)
         if apart is None:
             return NoiseFloor(max(least, _rms(fit)), least / 10, (), True, colour)  # noqa: FBT003
         fit, slowest = apart
+        law = None
+    else:
+        # A residual holds the noise of all its window, each with its own speed.
+        square = np.convolve(speed**2, fit.shares, "same")[fit.middle]
+        law = law_of(
+            fit.residual, square, worth=fit.sum_of_squares, fastest=phase, count=count,
+            interval=interval,
+        )  # fmt: skip
     sigma, error = _rms(fit), _stderr(fit)
     limited = sigma < least
     sigma = max(sigma, least)
     ranges = tuple(_ranges(fit, least, slowest))
-    return NoiseFloor(sigma, error, ranges, limited, colour, fit.middle.size)
+    return NoiseFloor(sigma, error, ranges, limited, colour, fit.middle.size, law)
 
 
-def _frequency(time: Floats, theta: Floats, count: float) -> float:
-    """Return the fastest phase of the motion, rad/s: that of the swing, or of the rotation."""
+def _frequencies(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
+    """Return the fastest phase of the motion, rad/s: that of the swing, or of the rotation.
+
+    First with large swings counted for rotations, whose bends are as sharp; then without.
+    """
     interval = float(np.median(np.diff(time)))
     lag = 1
     while True:
@@ -196,43 +219,63 @@ def _frequency(time: Floats, theta: Floats, count: float) -> float:
         if way >= CLEAR * count or 8 * lag > theta.size:
             break
         lag *= 2
-    fast = way / (lag * interval)
-    reach = float(np.quantile(np.abs(theta - np.median(theta)), 0.99))
-    swing = fast / max(reach, 1e-300)
-    turning = fast if float(np.ptp(theta)) > math.pi else 0.0
-    slowest = 1.0 / (time[-1] - time[0])
-    return float(np.clip(max(swing, turning), slowest, math.pi / interval))
+    reach = max(float(np.quantile(np.abs(theta - np.median(theta)), 0.99)), 1e-300)
+    # A rotation's phase is its angle.
+    length = min(reach, 1.0) if float(np.ptp(theta)) > math.pi else reach
+    slowest = 1.0 / float(time[-1] - time[0])
+    phase = max(way / (lag * interval * length), slowest)
+    # What noise makes of neighbours looks like speed: over longer ways it is less.
+    while lag < (longer := min(int(LAG / (phase * interval)), theta.size // 8)):
+        lag = longer
+        way = float(np.quantile(np.abs(theta[lag:] - theta[:-lag]), 0.98))
+        phase = max(way / (lag * interval * length), slowest)
+    swing = phase if float(np.ptp(theta)) > math.tau else phase * length / reach
+    return min(phase, math.pi / interval), min(max(swing, slowest), math.pi / interval)
 
 
-def _followed(time: Floats, theta: Floats, bad: NDArray[np.bool_], first: LocalFit) -> LocalFit:
+def _followed(
+    time: Floats, theta: Floats, bad: NDArray[np.bool_], speed: Floats, first: LocalFit
+) -> LocalFit:
     """Return the fit of the lowest degree above which no degree leaves less."""
     chosen = first
     for degree, points in DEGREES[1:]:
-        higher = _clean(local_fit(time, theta, degree=degree, points=points), bad)
+        higher = _clean(local_fit(time, theta, degree=degree, points=points), bad, speed)
         if higher.middle.size < FEWEST:
             break
-        enough = LESS + 2 * _stderr(higher) / max(_rms(higher), 1e-300)
-        if _rms(chosen) <= enough * _rms(higher):
+        if not _less(higher, chosen):
             break
         chosen = higher
     return chosen
+
+
+def _less(fit: LocalFit, other: LocalFit) -> bool:
+    """Return whether a fit leaves less than another beyond its error: it follows the motion."""
+    enough = LESS + 2 * _stderr(fit) / max(_rms(fit), 1e-300)
+    return fit.middle.size >= FEWEST and _rms(other) > enough * _rms(fit)
 
 
 def _apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
     time: Floats,
     theta: Floats,
     bad: NDArray[np.bool_],
+    speed: Floats,
     count: float,
     interval: float,
     swing: float,
+    nearest: LocalFit | None,
 ) -> tuple[LocalFit, float] | None:
-    """Return a fit of samples at least a count apart, and the slowest speed where they are."""
+    """Return a fit of samples at least a count apart, and the slowest speed where they are.
+
+    Where sampling is slow against the motion, ``nearest`` is the fit of neighbours that follows it.
+    """
     most = max(int(FARTHEST / (swing * interval)), 1)
     stride = 1
     while True:
         # Even slower motion keeps neighbours within a count, whose errors are alike.
         slowest = count / (stride * interval)
-        fit = _clean(local_fit(time, theta, degree=6, points=11, stride=stride), bad)
+        fit = _clean(local_fit(time, theta, degree=6, points=11, stride=stride), bad, speed)
+        if stride == 1 and nearest is not None and _less(nearest, fit):
+            fit = nearest
         quick = np.abs(fit.slope) >= slowest
         if np.count_nonzero(quick) >= max(FEWEST, quick.size // 3) or stride >= most:
             break
@@ -242,35 +285,23 @@ def _apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
     return _only(fit, quick), slowest
 
 
-def _clean(fit: LocalFit, bad: NDArray[np.bool_]) -> LocalFit:
+def _clean(fit: LocalFit, bad: NDArray[np.bool_], speed: Floats) -> LocalFit:
     """Leave out windows with samples that are not trusted, then those with outliers."""
     fit = _only(fit, ~_near(bad, fit.neighbours)[fit.middle])
-    return _only(fit, ~outlying(fit, bad.size)[fit.middle])
+    return _only(fit, ~_outlying(fit, speed)[fit.middle])
 
 
-def outlying(fit: LocalFit, size: int) -> NDArray[np.bool_]:
-    """Return which of ``size`` samples share a window with an outlier."""
-    false = np.zeros(size, bool)
-    scale = broad_scale(np.abs(fit.residual))
-    false[fit.middle[np.abs(fit.residual) > FALSE * scale]] = scale > 0
+def _outlying(fit: LocalFit, speed: Floats) -> NDArray[np.bool_]:
+    """Return which samples share a window with an outlier among residuals of similar speed."""
+    false = np.zeros(speed.size, bool)
+    sizes = np.abs(fit.residual)
+    whole = broad_scale(sizes)
+    order = np.argsort(speed[fit.middle], kind="stable")
+    for part in np.array_split(order, max(min(KINDS, order.size // (5 * FEWEST)), 1)):
+        # Noise that grows with speed is many times stronger at the quickest.
+        scale = max(whole, broad_scale(sizes[part]))
+        false[fit.middle[part[sizes[part] > FALSE * scale]]] = scale > 0
     return _near(false, fit.neighbours)
-
-
-def normal_scale(values: Floats) -> float:
-    """Return the standard deviation of normal values from the median of their sizes, robust."""
-    return 1.4826 * float(np.median(np.abs(values))) if values.size else 0.0
-
-
-def broad_scale(sizes: Floats) -> float:
-    """Return a standard deviation from sizes, robust, that knows of long tails.
-
-    The larger of those that the median and the 80 % quantile show: where noise changes with speed,
-    or has long tails, the median alone is half of it. A tenth of false samples changes neither.
-    """
-    if not sizes.size:
-        return 0.0
-    half, most = np.quantile(sizes, [0.5, 0.8])
-    return float(max(1.4826 * half, most / 1.2816))
 
 
 def _near(marked: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:

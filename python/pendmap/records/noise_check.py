@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,25 +13,11 @@ if TYPE_CHECKING:
 
 __all__ = ["check"]
 
-GROWS: Final = 2.0
-"""Times that the noise of the fastest quarter is that of the slowest before it is said."""
-
 
 def check(work: Work) -> None:
     """Say so where noise grows with speed."""
     floor = noise_of(work.time, work.theta, trusted=work.trusted, count=work.count)
-    if not math.isfinite(floor.sigma) or floor.limited_by_count or not floor.by_speed:
-        return
-    slow, fast = floor.by_speed[0], floor.by_speed[-1]
-    certain = fast.sigma - GROWS * slow.sigma > 4 * (fast.stderr + GROWS * slow.stderr)
-    # Where even the fastest quarter is at rest, no instant was missed.
-    if certain and fast.sigma > 2 * work.count and fast.speed_from > 0:
-        extra = math.sqrt(fast.sigma**2 - slow.sigma**2)
-        late = extra / ((fast.speed_from + min(fast.speed_to, 2 * fast.speed_from)) / 2)
+    if floor.law is not None:
         interval = float(np.median(np.diff(work.time)))
-        text = (
-            f"the noise grows with speed, {slow.sigma:.2g} to {fast.sigma:.2g} rad: as if the"
-            f" instants of sampling missed their stamps by {late:.1g} s"
-            f" ({100 * late / interval:.0f} % of the interval)"
-        )
-        work.say("noise-grows-with-speed", text)
+        part = f"{100 * floor.law.tau / interval:.0f} % of the interval"
+        work.say("noise-grows-with-speed", f"{floor.law} ({part})")

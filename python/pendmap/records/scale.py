@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.noise import normal_scale
+from pendmap.records.robust import normal_scale
 from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of, turn_to_rest
 
