@@ -10,7 +10,7 @@ import pytest
 from decays import decay, record
 from pendmap import InputError
 from pendmap.identification import Peaks, find_peaks
-from pendmap.identification.local_fit import count_of
+from pendmap.identification.window_fit import count_of
 from pendmap.identification.reading import reading_of
 
 WIDE = decay()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from pendmap.identification.local_fit import fit_around
+from pendmap.identification.window_fit import fit_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,7 +10,7 @@ import numpy as np
 from pendmap.identification.chain import chain_covariance, chain_least_squares
 from pendmap.identification.combined import unphysical
 from pendmap.identification.envelope import viscous_work
-from pendmap.identification.local_fit import smoothed_velocity
+from pendmap.identification.window_fit import smoothed_velocity
 from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.period import frequency
 from pendmap.identification.result import Identification

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -9,12 +10,14 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.identification.ends import End, release, stop
-from pendmap.identification.local_fit import count_of, fit_around
+from pendmap.identification.window_fit import fit_around
+from pendmap.records.steps import levels_shared
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.identification.local_fit import LocalFit
+    from pendmap.identification.reading import Reading
+    from pendmap.identification.window_fit import WindowFit
     from pendmap.identification.turning import Outline
 
     Floats = NDArray[np.float64]
@@ -34,10 +37,13 @@ _RESOLVED: Final = 8.0
 class Finder:
     """One record, its noise and its rough course."""
 
-    def __init__(self, time: Floats, theta: Floats, sigma: float, course: Outline) -> None:
-        self.time, self.theta, self.sigma, self.course = time, theta, sigma, course
-        self.count = count_of(theta)
-        late = float(np.median(np.abs(theta[course.turns[course.turns.size // 2 :]])))
+    def __init__(self, time: Floats, theta: Floats, reading: Reading, course: Outline) -> None:
+        # An unwrapped angle may rest some turns away from where it began.
+        away = math.tau * round(float(np.mean(theta[course.turns[-2:]])) / math.tau)
+        self.time, self.theta = time, theta - away
+        self.course = dataclasses.replace(course, smooth=course.smooth - away)
+        self.sigma, self.count = reading.sigma, reading.count
+        late = float(np.median(np.abs(self.theta[course.turns[course.turns.size // 2 :]])))
         self.w0 = 4 * float(ellipk(math.sin(min(late, 3.0) / 2) ** 2)) / course.period
         self.step = float(np.median(np.diff(time)))
 
@@ -90,7 +96,7 @@ class Finder:
         # An instant less certain than the window is wide: no bend is seen, and nothing turns there.
         return end if end.stderr_time <= 2 * fit.half else None
 
-    def _end(self, fit: LocalFit, time: float) -> End:
+    def _end(self, fit: WindowFit, time: float) -> End:
         (value, gain), (_, slope_gain), (bend, _) = (fit.at(time, j) for j in range(3))
         sigma = self._effective(fit)
         bend = bend or math.inf
@@ -104,13 +110,12 @@ class Finder:
             fit.half,
         )
 
-    def _effective(self, fit: LocalFit) -> float:
+    def _effective(self, fit: WindowFit) -> float:
         """The noise of a sample, counted as often as samples are independent."""
         if self.count <= 2 * self.sigma:
             return self.sigma
         inside = np.abs(self.time - fit.centre) <= fit.half
-        levels = np.unique(np.round(self.theta[inside] / self.count)).size
-        return self.sigma * math.sqrt(max(fit.points / (3 * levels), 1.0))
+        return self.sigma * levels_shared(self.theta[inside], self.count)
 
     def _clipped(self, k: int) -> End | None:
         """A top that was cut off: the extreme of the record for longer than the swing stays."""

@@ -12,6 +12,7 @@ from scipy.special import ellipk
 
 from pendmap.errors import InputError
 from pendmap.identification.clock import from_first
+from pendmap.identification.coarse import CoarseFinder, is_coarse
 from pendmap.identification.finder import Finder
 from pendmap.identification.reading import reading_of
 from pendmap.identification.turning import outline
@@ -189,15 +190,10 @@ def find_peaks(
     """
     t, x = samples(time, theta, trusted)
     t, first = from_first(t)
-    noise = reading_of(t, x, sigma).sigma
-    course = outline(t, x, noise)
-    if course is None:
+    finder, noise = _finder(t, x, sigma)
+    if finder is None:
         none = np.empty(0)
         return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
-    # An unwrapped angle may rest some turns away from where it began.
-    away = math.tau * round(float(np.mean(x[course.turns[-2:]])) / math.tau)
-    x, course = x - away, dataclasses.replace(course, smooth=course.smooth - away)
-    finder = Finder(t, x, noise, course)
     ends = finder.found()
     index = _numbered(ends, finder.w0)
     crossings = finder.crossings(ends, index)
@@ -217,6 +213,18 @@ def find_peaks(
         window=np.array([e.window for e in ends]),
     )
     return found.later(first)
+
+
+def _finder(
+    time: Floats, theta: Floats, sigma: float | None
+) -> tuple[Finder | CoarseFinder | None, float]:
+    """What suits the samples, or nothing where the record does not swing; and the noise."""
+    if is_coarse(time, theta):
+        coarse = CoarseFinder(time, theta, sigma)
+        return (coarse if coarse.swings else None), coarse.sigma
+    reading = reading_of(time, theta, sigma)
+    course = outline(time, theta, reading.sigma)
+    return (None if course is None else Finder(time, theta, reading, course)), reading.sigma
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:

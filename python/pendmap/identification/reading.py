@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.local_fit import count_of
 from pendmap.records.noise import noise_of
+from pendmap.records.steps import step_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,7 +71,7 @@ def reading_of(
         The step of the sensor, rad, where it is known.
     """
     if count is None:
-        count = count_of(theta)
+        count = step_of(theta)
     doubt = 0.0
     if sigma is None:
         floor = noise_of(time, theta, trusted=trusted, count=count)

@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap.records import false_samples
 from pendmap.records.runs_of import equal_runs
+from pendmap.records.steps import step_of
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -18,13 +19,10 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["check", "say_steps", "step_of"]
+__all__ = ["check", "say_steps"]
 
 SAME: Final = 5
 """Equal readings in a row that may be a clipped or frozen sensor."""
-
-LATTICE: Final = 0.12
-"""Root mean square distance from multiples of a step, in steps, that shows it; 0.29 is chance."""
 
 FINEST: Final = 3e-5
 """A step under this, in rad, says nothing: it is how many digits were written."""
@@ -69,33 +67,6 @@ def say_steps(work: Work) -> None:
             f" encoder_counts says {counts}"
         )
         work.say("counts-differ", text)
-
-
-def step_of(theta: Floats) -> float:
-    """Return the step that readings come in, rad; 0 where there is none to be seen.
-
-    The least distance between different readings is tried, then refined by all of them; a step is
-    believed where the readings repeat and lie on its multiples.
-    """
-    values = np.unique(np.round(theta, 12))
-    if values.size < 3 or values.size > 0.7 * theta.size:
-        return 0.0
-    apart = np.diff(values)
-    # Written digits round multiples of a step: neighbours differ by it, give or take a digit.
-    least = float(np.quantile(apart, 0.02))
-    near = apart[(apart >= 0.5 * least) & (apart < 1.5 * least)]
-    step = float(np.median(near)) if near.size else least
-    multiples = np.round(apart / step)
-    small = multiples < 50
-    if step <= 0 or not np.any(multiples[small] > 0):
-        return 0.0
-    step = float(np.sum(apart[small]) / max(np.sum(multiples[small]), 1.0))
-    away = (values - values[0]) / step
-    away = away - np.round(away)
-    phase = np.angle(np.mean(np.exp(2j * np.pi * away))) / (2 * np.pi)
-    away = away - phase
-    away -= np.round(away)
-    return step if float(np.sqrt(np.mean(away**2))) < LATTICE else 0.0
 
 
 def _clipped(work: Work) -> None:
