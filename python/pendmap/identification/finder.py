@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.identification.ends import End, release, stop
+from pendmap.identification.rough import rough_damping
 from pendmap.identification.window_fit import fit_around
 from pendmap.records.steps import levels_shared
 
@@ -28,6 +29,8 @@ _BIAS: Final = 0.25
 """Bias allowed in a peak's amplitude, in standard errors."""
 _WIDEST: Final = 1.3
 """Half width of a peak's window at most, in radians of phase w0 t: a quarter swing is 1.57."""
+_SHOW: Final = 6
+"""Peaks from which friction is told."""
 _CROSSING: Final = 0.6
 _FEWEST: Final = 8
 _RESOLVED: Final = 8.0
@@ -64,7 +67,19 @@ class Finder:
                 continue
             result.append(end)
         end = stop(self.time, self.theta, self.sigma, self.course, result)
+        result = self._in_time(result)
         return result if end is None else [*result, end]
+
+    @staticmethod
+    def _in_time(ends: list[End]) -> list[End]:
+        """Take off what friction makes turns late, as far as their sizes show friction."""
+        sizes = np.array([e.angle for e in ends if math.isfinite(e.stderr_angle)])
+        if sizes.size < _SHOW:
+            return ends
+        middle = (sizes[:-2] + 2 * sizes[1:-1] + sizes[2:]) / 4
+        sizes = np.abs(sizes - float(np.median(middle)))
+        theta_r = rough_damping(np.minimum(sizes, 3.1))[1]
+        return [e.late(theta_r) for e in ends]
 
     def window(self, amplitude: float) -> float:
         """Half width of the window of a peak, s."""

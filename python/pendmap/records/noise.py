@@ -40,6 +40,7 @@ __all__ = [
     "NoiseFloor",
     "SpeedRange",
     "broad_scale",
+    "fastest",
     "noise_floor",
     "noise_of",
     "normal_scale",
@@ -163,7 +164,7 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
     if first.middle.size < FEWEST:
         return None
     interval = float(np.median(np.diff(time)))
-    swing = _frequency(time, theta, count)
+    swing = fastest(time, theta, count)
     fit = first
     if swing * interval > EVERY:
         fit = _followed(time, theta, bad, first)
@@ -183,7 +184,7 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
     return NoiseFloor(sigma, error, ranges, limited, colour, fit.middle.size)
 
 
-def _frequency(time: Floats, theta: Floats, count: float) -> float:
+def fastest(time: Floats, theta: Floats, count: float) -> float:
     """Return the fastest phase of the motion, rad/s: that of the swing, or of the rotation."""
     interval = float(np.median(np.diff(time)))
     lag = 1

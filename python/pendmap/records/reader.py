@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.records import angle, clock, motion, noise_check, samples, scale, signs
+from pendmap.records import angle, clock, motion, noise_check, resampled, samples, scale, signs
 from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
@@ -102,6 +102,7 @@ def _run(
     work.cut(plan.from_s, plan.to_s)
     angle.make(work)
     if not work.peaks_only:
+        resampled.check(work)
         samples.check(work)
         moves = motion.moves(work)
         if moves:

@@ -72,8 +72,6 @@ def say_steps(work: Work) -> None:
 def _clipped(work: Work) -> None:
     """Mark plateaus at the ends of the range that the motion runs into at speed."""
     marked = np.zeros(work.theta.size, bool)
-    share, count = _as_read(work.theta)
-    count = max(count, work.count)
     ends = []
     for end in (float(work.theta.max()), float(work.theta.min())):
         low, high = equal_runs(work.theta, SAME)
@@ -81,8 +79,8 @@ def _clipped(work: Work) -> None:
         hits = [
             (a, b)
             for a, b in zip(low[at_end], high[at_end], strict=True)
-            if a > 0 and b < work.theta.size and (b - a - 1) * share + 1 > SAME - 0.5
-            if _abrupt(work, a, b) and _cut_off(work, a, b, count)
+            if a > 0 and b < work.theta.size and b - a > SAME - 0.5
+            if _abrupt(work, a, b) and _cut_off(work, a, b)
         ]
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * SAME):
             ends.append(f"{end:.4g}")
@@ -98,23 +96,7 @@ def _clipped(work: Work) -> None:
         work.say("clipped", text, at=at)
 
 
-def _as_read(theta: Floats) -> tuple[float, float]:
-    """Return the readings a sample, 1 unless lines were drawn between readings, and their step."""
-    bend = np.abs(np.diff(theta, 2))
-    if bend.size < 100:
-        return 1.0, 0.0
-    knees = np.flatnonzero(bend > 4 * float(np.quantile(bend, 0.6)) + 1e-9) + 1
-    if knees.size < 20:
-        return 1.0, 0.0
-    apart = np.diff(knees)
-    usual = float(np.quantile(apart, 0.25))
-    even = np.abs(apart / usual - np.round(apart / usual)) * usual < 0.5
-    if usual < 3 or np.mean(even) < 0.9:
-        return 1.0, 0.0
-    return 1 / usual, step_of(theta[knees])
-
-
-def _cut_off(work: Work, low: int, high: int, count: float) -> bool:
+def _cut_off(work: Work, low: int, high: int) -> bool:
     """Whether the motion on both sides goes on beyond a plateau, by a parabola through them."""
     if low < 3 or work.theta.size - high < 3:
         return False
@@ -132,7 +114,7 @@ def _cut_off(work: Work, low: int, high: int, count: float) -> bool:
     answer = np.polyfit(time, away, 2)
     noise = float(np.sqrt(np.mean((away - np.polyval(answer, time)) ** 2)))
     beyond = float(answer[2]) * -math.copysign(1, float(np.median(away)))
-    return beyond > 2 * count + FIT * noise
+    return beyond > 2 * work.count + FIT * noise
 
 
 def _frozen(work: Work) -> None:
