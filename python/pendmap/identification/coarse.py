@@ -17,12 +17,14 @@ from scipy.special import ellipk
 
 from pendmap.identification.ends import End, stop
 from pendmap.identification.swing import Windows
-from pendmap.identification.swing_fit import SwingFit, fit_swings
+from pendmap.identification.swing_fit import fit_swings
 from pendmap.identification.turning import Outline, median_of_five, outline, zigzags
 from pendmap.records.steps import levels_shared, step_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from pendmap.identification.swing_fit import SwingFit
 
     Floats = NDArray[np.float64]
 
@@ -139,7 +141,10 @@ class CoarseFinder:
         high = at + np.minimum(half, 0.85 * apart[1:])
         low[0] = t[0] if held else low[0]
         windows = Windows.around(
-            (self.time, self.theta), list(zip(low, high, strict=True)), np.sign(size), held=held
+            (self.time, self.theta),
+            list(zip(low, high, strict=True)),
+            np.sign(size).tolist(),
+            held=held,
         )
         form = np.tile([self.w0**2, 0.01 * self.w0, 0.0, zero], (at.size, 1))
         return fit_swings(windows, (at, size, form), sigma=sigma), begins, held
@@ -149,7 +154,8 @@ class CoarseFinder:
         if self.course is None:
             return []
         fit, begins, held = self._turns(self.sigma)
-        self.fit, result, rows = fit, [], []
+        result: list[End] = []
+        self.fit, rows = fit, []
         for k, (instant, angle) in enumerate(zip(fit.instant, fit.state, strict=True)):
             stderr_time, stderr_angle = (
                 float(part[k]) * self._shared(instant) for part in (
@@ -175,8 +181,8 @@ class CoarseFinder:
         if rest is not None:
             later = int(np.searchsorted(t, self.fine[0][rest]))
             course = dataclasses.replace(self.course, rest=min(later, t.size - 1))
-            end = stop(t, x, self.sigma, course, result)
-            result = result if end is None else [*result, end]
+            last = stop(t, x, self.sigma, course, result)
+            result = result if last is None else [*result, last]
         return result
 
     def _shared(self, instant: float) -> float:
@@ -212,13 +218,9 @@ class CoarseFinder:
             rows.append(row)
         if not spans:
             return np.empty(0), np.empty(0), np.empty(0, np.int64)
-        chosen = {
-            f.name: part[rows] if isinstance(part := getattr(self.fit, f.name), np.ndarray) else part
-            for f in dataclasses.fields(self.fit)
-        }
-        known = SwingFit(**chosen)
+        known = self.fit.rows(rows)
         windows = Windows.around(
-            (self.time, self.theta), spans, np.sign(speed), crossing=True
+            (self.time, self.theta), spans, np.sign(speed).tolist(), crossing=True
         )
         start = np.array(at), np.array(speed), known.form
         fit = fit_swings(windows, start, sigma=self.sigma, known=known)

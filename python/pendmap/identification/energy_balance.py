@@ -10,11 +10,11 @@ import numpy as np
 from pendmap.identification.chain import chain_covariance, chain_least_squares
 from pendmap.identification.combined import unphysical
 from pendmap.identification.envelope import viscous_work
-from pendmap.identification.window_fit import smoothed_velocity
 from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.period import frequency
 from pendmap.identification.result import Identification
 from pendmap.identification.uncertainty import estimates
+from pendmap.identification.window_fit import smoothed_velocity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.identification.reading import Reading
-    from pendmap.identification.window_fit import WindowFit
     from pendmap.identification.turning import Outline
+    from pendmap.identification.window_fit import WindowFit
 
     Floats = NDArray[np.float64]
 

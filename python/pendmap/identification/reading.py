@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.identification.coarse import CoarseFinder, is_coarse
 from pendmap.records.noise import noise_of
 from pendmap.records.steps import step_of
 
@@ -56,8 +57,8 @@ def reading_of(
 ) -> Reading:
     """Return the standard errors of readings.
 
-    The noise is that of :func:`pendmap.noise_floor`; it is at least that of the count,
-    ``count / sqrt(12)``.
+    The noise is that of :func:`pendmap.noise_floor`, with few samples a period what the swings of
+    a pendulum leave, if that is less; it is at least that of the count, ``count / sqrt(12)``.
 
     Parameters
     ----------
@@ -78,6 +79,10 @@ def reading_of(
         known = math.isfinite(floor.sigma) and floor.sigma > 0
         sigma = floor.sigma if known else 0.0
         doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
+        use = np.ones(time.size, bool) if trusted is None else trusted
+        if known and is_coarse(time[use], theta[use]):
+            # No polynomial follows so few samples a period: what it leaves is motion.
+            sigma = min(sigma, CoarseFinder(time[use], theta[use], None).sigma)
     sigma = max(sigma, count / math.sqrt(12), 1e-15)
     coarse = sigma < DITHERED * count
     each = np.full(theta.shape, sigma)

@@ -59,7 +59,7 @@ def rough_start(
 
 
 def rough_damping(peaks: NDArray[np.float64]) -> tuple[float, float]:
-    """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from the sizes of peaks in a row.
+    """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from peaks in a row.
 
     Parameters
     ----------

@@ -72,9 +72,7 @@ class Windows:
         return cls(t[rows], x[rows], used, np.full(len(spans), crossing), was_held, signs)
 
 
-def curves(
-    windows: Windows, instant: Floats, state: Floats, form: Floats
-) -> tuple[Floats, Floats]:
+def curves(windows: Windows, instant: Floats, state: Floats, form: Floats) -> tuple[Floats, Floats]:
     """Return angle and velocity at the samples of windows.
 
     Each window's curve solves ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0`` from
@@ -150,8 +148,6 @@ def _between(
         y0, y1 = (np.take_along_axis(value, low + k, 1) for k in (0, 1))
         d0, d1 = (h * np.take_along_axis(slope, low + k, 1) for k in (0, 1))
         rest = y1 - y0
-        return np.asarray(
-            y0 + s * (d0 + s * (3 * rest - 2 * d0 - d1 + s * (d0 + d1 - 2 * rest)))
-        )
+        return np.asarray(y0 + s * (d0 + s * (3 * rest - 2 * d0 - d1 + s * (d0 + d1 - 2 * rest))))
 
     return cubic(angle, speed), cubic(speed, bend)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Final
+import itertools
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap.identification.swing import FORM, Windows, curves
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
@@ -19,6 +22,8 @@ __all__ = ["SwingFit", "fit_swings"]
 BLOCK: Final = 12
 """Turns in a row that share their form: ``w0^2``, both dampings and the rest position."""
 _ROUNDS: Final = 12
+_SETTLED: Final = 6
+"""Rounds after which no more samples are left out."""
 _LOSS: Final = 4
 """Turns that show what a swing loses."""
 _OUTLIER: Final = 5.0
@@ -59,6 +64,14 @@ class SwingFit:
     factor: Floats
     points: NDArray[np.intp]
 
+    def rows(self, which: Sequence[int]) -> SwingFit:
+        """Return some of the windows, in the order given; one may be asked for again."""
+        parts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        some: dict[str, Any] = {
+            name: part[list(which)] if name != "sigma" else part for name, part in parts.items()
+        }
+        return SwingFit(**some)
+
 
 def fit_swings(
     windows: Windows,
@@ -70,9 +83,9 @@ def fit_swings(
     """Fit instants and states of all windows, and the form that each block of them shares.
 
     Least squares by Gauss and Newton. Within a block of 12 turns each has its instant and its
-    state; the form is common, held by wide priors (10 % of ``w0^2``, the damping that turns show give
-    or take all of it), for what a few swings do not tell. Nothing ties one block to the next: a damping of any law shows
-    as forms that change. Samples 5 standard deviations off are left out.
+    state; the form is common, held by wide priors (10 % of ``w0^2``, the damping that turns show
+    give or take all of it), for what a few swings do not tell. Nothing ties one block to the next:
+    a damping of any law shows as forms that change. Samples 5 standard deviations off are left out.
 
     Parameters
     ----------
@@ -93,7 +106,7 @@ def fit_swings(
     scale = np.ones(instant.size)
     for turn in range(_ROUNDS):
         local, shared, residual = _rows(trial, instant, state, form)
-        if turn in {4, 8}:
+        if turn in {3, _SETTLED}:
             scale = _scales(residual, used, blocks)
             far = np.abs(residual) > _OUTLIER * np.maximum(scale, sigma or 0.0)[:, None]
             far &= (used & ~far).sum(axis=1, keepdims=True) > 2  # noqa: PLR2004 (unknowns)
@@ -112,6 +125,8 @@ def fit_swings(
         state = np.where(windows.crossing, state, np.clip(state, -3.13, 3.13))
         form += move[:, 2:]
         form[:, 0] = np.clip(form[:, 0], 0.25 * start[2][:, 0], 4 * start[2][:, 0])
+        if turn > _SETTLED and np.all(np.abs(move[:, 0]) * np.sqrt(form[:, 0]) < 1e-5):  # noqa: PLR2004
+            break
     rows = _rows(trial, instant, state, form)
     return _errors(rows, blocks, (instant, state, form), used, prior, sigma, known)
 
@@ -119,7 +134,7 @@ def fit_swings(
 def _blocks(count: int) -> list[slice]:
     parts = max(round(count / BLOCK), 1)
     edges = np.linspace(0, count, parts + 1).round().astype(int)
-    return [slice(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
 def _prior(
@@ -189,11 +204,11 @@ def _step(
     """
     local, shared, residual = rows
     across = np.swapaxes(local, 1, 2)
-    inverse = np.linalg.pinv(across @ local, hermitian=True)
+    inverse = np.asarray(np.linalg.pinv(across @ local, hermitian=True), np.float64)
     alone = (inverse @ (across @ residual[..., None]))[..., 0]
     follows = inverse @ (across @ shared)
-    move = np.zeros((residual.shape[0], 2 + FORM))
-    form_inverse = np.zeros((residual.shape[0], FORM, FORM))
+    move: Floats = np.zeros((residual.shape[0], 2 + FORM))
+    form_inverse: Floats = np.zeros((residual.shape[0], FORM, FORM))
     if prior is None:
         move[:, :2] = alone
         return move, (inverse, follows, form_inverse)
@@ -207,7 +222,9 @@ def _step(
         pull += hold * (centre[block][0] - form[block][0])
         # The parameters differ by orders of magnitude: scaled, the matrix is a sound one.
         unit = 1 / np.sqrt(np.diag(normal))
-        solved = np.linalg.pinv(normal * np.outer(unit, unit), hermitian=True) * np.outer(unit, unit)
+        solved = np.linalg.pinv(normal * np.outer(unit, unit), hermitian=True) * np.outer(
+            unit, unit
+        )
         move[block, 2:] = solved @ pull
         form_inverse[block] = solved
     move[:, :2] = alone - (follows @ move[:, 2:, None])[..., 0]
@@ -237,7 +254,6 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     instant, state, form = found
     points = used.sum(axis=1)
     square = np.sum(rows[2] ** 2, axis=1)
-    unknown = 2 * points.size + (FORM * len(blocks) if known is None else 0)
     freedom = np.array([
         max(float(points[b].sum()) - 2 * (b.stop - b.start) - (FORM if known is None else 0), 1.0)
         for b in blocks
@@ -254,7 +270,7 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
             sigma = float(np.sqrt(np.sum((freedom * noise**2)[even]) / freedom[even].sum()))
         sigma = max(sigma, 1e-15)
         doubt = noise / sigma > 1 + _DOUBT * np.sqrt(0.5 / freedom)
-        each = np.where(doubt & (unknown > 0), noise / sigma, 1.0)
+        each = np.where(doubt, noise / sigma, 1.0)
         factor = np.concatenate([
             np.full(b.stop - b.start, f) for b, f in zip(blocks, each, strict=True)
         ])  # fmt: skip

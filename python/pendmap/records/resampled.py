@@ -111,7 +111,7 @@ def _share(theta: Floats, ratio: int, order: int, blocks: int = BLOCKS) -> tuple
     for _ in range(order):
         change = change[stride:] - change[:-stride]
     count = change.size // ratio
-    if count < 10:  # noqa: PLR2004
+    if count < 10:
         return 1.0, 0
     sizes = np.abs(change[: count * ratio]).reshape(count, ratio).mean(axis=0)
     # Of a held reading the last sample is no longer alike the next.
@@ -161,4 +161,4 @@ def check(work: Work) -> None:
 
 
 def _hertz(rate: float) -> str:
-    return f"{rate / 1000:.4g} kHz" if rate >= 1000 else f"{rate:.4g} Hz"  # noqa: PLR2004
+    return f"{rate / 1000:.4g} kHz" if rate >= 1000 else f"{rate:.4g} Hz"
