@@ -1,4 +1,4 @@
-"""Peaks of records with few samples a period, and of records with samples drawn between readings."""
+"""Peaks of records with few samples a period, and of samples drawn between readings."""
 
 from __future__ import annotations
 

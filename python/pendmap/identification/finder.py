@@ -142,7 +142,7 @@ class Finder:
             return None
         bend = self.w0**2 * max(math.sin(min(abs(extreme), math.pi)), 0.05)
         lasts = float(self.time[near[-1]] - self.time[near[0]])
-        if lasts < 3 * self.step + 4 * math.sqrt((self.count + 4 * self.sigma) / bend):
+        if lasts < 3 * self.step + 3 * math.sqrt((self.count + 2 * self.sigma) / bend):
             return None
         middle = float(self.time[near[0]] + self.time[near[-1]]) / 2
         return End(middle, float(extreme), self.step, math.inf, "clipped")

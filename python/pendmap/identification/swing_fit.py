@@ -147,11 +147,11 @@ def _prior(
     """
     centre, wide = form.copy(), np.empty(form.shape)
     for block in blocks:
-        size = float(np.median(np.abs(state[block])))
+        size = max(float(np.median(np.abs(state[block]))), 1e-9)
         w2 = float(form[block][0, 0])
         w, loss = np.sqrt(w2), 0.0
         if block.stop - block.start > _LOSS:
-            here = np.abs(state[block])
+            here = np.maximum(np.abs(state[block]), 1e-12)
             each = 2 * np.log(here[:-2] / here[2:]) / (instant[block][2:] - instant[block][:-2])
             loss = max(float(np.median(each)), 0.0)
         centre[block, 1] = loss

@@ -41,8 +41,15 @@ BLOCKS: Final = 60
 SLOWEST: Final = 5.0
 """Readings a period at least: with fewer the places within an interval are phases of the swing."""
 
+SMOOTH: Final = 0.3
+"""Noise between neighbours over the most at any spacing, below which samples were drawn between
+readings; a sensor's own smoothness leaves more, and each of its samples tells something."""
+
 GROWN: Final = 0.7
 """Noise over the most at any spacing from which readings count as independent."""
+
+LEAST: Final = 3e-6
+"""Noise over the whole way below which it is that of digits, which nothing is judged by."""
 
 FOLLOWED: Final = 1.3
 """What a quartic leaves over what a sextic leaves of noise, at most; of motion it is more."""
@@ -125,7 +132,7 @@ def _share(theta: Floats, ratio: int, order: int, blocks: int = BLOCKS) -> tuple
 def _independent(time: Floats, theta: Floats, farthest: float) -> int:
     """The spacing from which the noise no longer grows, in samples; 1 if it does not grow."""
     strides = [1 << k for k in range(12) if 1 << k <= min(farthest, theta.size / FEWEST)]
-    noise = []
+    noise, whole = [], []
     for stride in strides:
         part = slice(0, max(10, 2 * stride) * FEWEST)
         t, x = time[part], theta[part]
@@ -135,9 +142,10 @@ def _independent(time: Floats, theta: Floats, farthest: float) -> int:
         )  # fmt: skip
         # What a quartic leaves and a sextic follows is motion.
         noise.append(high if low < FOLLOWED * high else 0.0)
+        whole.append(high)
     most = max(noise, default=0.0)
     count = step_of(theta)
-    if most == 0 or most <= DITHERED * count:
+    if most <= max(DITHERED * count, LEAST * float(np.ptp(theta))) or whole[0] > SMOOTH * most:
         return 1
     return strides[next((k for k, one in enumerate(noise) if one > GROWN * most), 0)]
 
