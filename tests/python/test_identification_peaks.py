@@ -10,8 +10,8 @@ import pytest
 from decays import decay, record
 from pendmap import InputError
 from pendmap.identification import Peaks, find_peaks
-from pendmap.identification.local_fit import count_of
 from pendmap.identification.reading import reading_of
+from pendmap.records.steps import step_of
 
 WIDE = decay()
 
@@ -50,8 +50,7 @@ def test_standard_errors_are_honest(noise_deg: float, rate: float, counts: int) 
         wrong = turned.amplitude - WIDE.peak[turned.index]
         off["amplitude"] += list(wrong / turned.stderr_amplitude)
         moved = turned.index > 0
-        lateness = 5 / 32 * turned.window * 0.08 / 6.2**2 / np.sin(np.abs(turned.amplitude))
-        wrong = turned.time - lateness - WIDE.peak_time[turned.index]
+        wrong = turned.time - WIDE.peak_time[turned.index]
         off["time"] += list((wrong / turned.stderr_time)[moved])
         wide = peaks.crossing_index < 120
         at = peaks.crossing_index[wide]
@@ -165,9 +164,9 @@ def test_the_noise_floor_and_the_count_are_seen() -> None:
     for noise_deg in (0.05, 0.1, 0.5):
         time, angle = record(WIDE, noise_deg=noise_deg)
         assert reading_of(time, angle).sigma == pytest.approx(math.radians(noise_deg), rel=0.03)
-        assert count_of(angle) == 0
+        assert step_of(angle) == 0
     time, angle = record(WIDE, noise_deg=0.1, counts=4096)
-    assert count_of(angle) == pytest.approx(math.tau / 4096, rel=1e-6)
+    assert step_of(angle) == pytest.approx(math.tau / 4096, rel=1e-6)
 
 
 @pytest.mark.parametrize(

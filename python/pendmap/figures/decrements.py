@@ -17,10 +17,11 @@ from matplotlib.patches import Patch
 from pendmap.figures import blocks, sides, style
 from pendmap.identification.combined import CUT
 from pendmap.identification.decrement import triplets
+from pendmap.identification.digits import with_error
 from pendmap.identification.result import Estimate
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.pictures.methods import EVEN, MEASURED, ODD, look
-from pendmap.pictures.table1 import estimate
+from pendmap.pictures.table1 import MINUS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -169,7 +170,7 @@ def _draw(
 
 def _removed(zero: Estimate) -> str:
     error = None if zero.stderr is None else 1e3 * zero.stderr
-    return f"{estimate(Estimate(1e3 * zero.value, error))} mrad"
+    return f"{with_error(Estimate(1e3 * zero.value, error), minus=MINUS)} mrad"
 
 
 def _delta(found: Identification) -> float:

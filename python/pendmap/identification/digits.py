@@ -31,8 +31,15 @@ def interval(estimate: Estimate) -> str:
     return f"[{low:.{places}f}, {high:.{places}f}]"
 
 
-def with_error(estimate: Estimate) -> str:
-    """Return a number with its standard error in the last digits: ``6.2047(12)``, +- 0.0012."""
+def with_error(estimate: Estimate, *, minus: str = "-") -> str:
+    """Return a number with its standard error in the last digits: ``6.2047(12)``, +- 0.0012.
+
+    Pictures write another ``minus``.
+    """
+    return _with_error(estimate).replace("-", minus)
+
+
+def _with_error(estimate: Estimate) -> str:
     value, error = estimate.value, estimate.stderr
     if error is None or not math.isfinite(error) or error <= 0:
         return f"{value:.5g}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from pendmap.identification.local_fit import fit_around
+from pendmap.identification.window_fit import fit_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 __all__ = ["End", "release", "stop"]
 
 _SURE: Final = 4.0
+_LATENESS: Final = 5 / 32
+"""What a quartic makes of ``s abs(s)``: half the slope that it has at 0, over the window."""
+_DOUBT: Final = 0.2
 _STILL: Final = 1e-3
 """A velocity below this, over amplitude and w0, is none: the even form itself is off by as much."""
 
@@ -35,6 +38,20 @@ class End:
     stderr_angle: float
     kind: str
     window: float = 0.0
+
+    def late(self, theta_r: float) -> End:
+        """Return the turn as it is without the lateness that friction gives a quartic's turn.
+
+        ``5/32 h theta_r / sin A`` for a window of half width ``h``; what is not known of it (the
+        law of friction, the next order) is in the error.
+        """
+        size = abs(self.angle)
+        bend = math.sin(min(max(size, 2 * theta_r + 1e-9), 3.0))
+        shift = _LATENESS * self.window * theta_r / bend
+        # The next order is larger by theta_r / A: near the end it is all that is known.
+        unsure = shift * min(_DOUBT + theta_r / max(size, 1e-9), 1.0)
+        error = math.hypot(self.stderr_time, unsure)
+        return dataclasses.replace(self, time=self.time - shift, stderr_time=error)
 
 
 def release(

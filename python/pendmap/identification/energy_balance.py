@@ -10,12 +10,12 @@ import numpy as np
 from pendmap.identification.chain import chain_covariance, chain_least_squares
 from pendmap.identification.combined import unphysical
 from pendmap.identification.envelope import viscous_work
-from pendmap.identification.local_fit import smoothed_velocity
 from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.period import frequency
 from pendmap.identification.result import Identification
 from pendmap.identification.too_few import too_few
 from pendmap.identification.uncertainty import estimates
+from pendmap.identification.window_fit import smoothed_velocity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -89,15 +89,13 @@ def identify(
         return Identification(_NAME, warnings=(text,), applicable=False)
     w0 = frequency(small).w0
     work = _measured_work((t, x), turned, pairs, w0)
-    theta_r = 0.0
     zero, values, covariance, misfit = 0.0, np.empty(0), np.empty((0, 0)), 1.0
     for _ in range(5):
-        w0 = frequency(small, theta_r=theta_r, offset=zero).w0
+        w0 = frequency(small, offset=zero).w0
         values, covariance, misfit = _balance(turned, pairs, work, w0, zero)
         zero += float(values[2])
-        theta_r = float(values[1]) / w0**2
     zeta = float(values[0]) / (2 * w0)
-    period = frequency(small, zeta=min(abs(zeta), 0.9), theta_r=theta_r, offset=zero)
+    period = frequency(small, zeta=min(abs(zeta), 0.9), offset=zero)
     names = ("w0", "c_over_m", "Tr", "offset")
     found = np.array([period.w0, values[0], values[1], zero])
     # Energies are counted in w0^2: its error goes over to both dampings.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -9,13 +10,16 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.identification.ends import End, release, stop
-from pendmap.identification.local_fit import count_of, fit_around
+from pendmap.identification.rough import rough_damping
+from pendmap.identification.window_fit import fit_around
+from pendmap.records.steps import levels_shared
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.identification.local_fit import LocalFit
+    from pendmap.identification.reading import Reading
     from pendmap.identification.turning import Outline
+    from pendmap.identification.window_fit import WindowFit
 
     Floats = NDArray[np.float64]
 
@@ -25,6 +29,8 @@ _BIAS: Final = 0.25
 """Bias allowed in a peak's amplitude, in standard errors."""
 _WIDEST: Final = 1.3
 """Half width of a peak's window at most, in radians of phase w0 t: a quarter swing is 1.57."""
+_SHOW: Final = 6
+"""Peaks from which friction is told."""
 _CROSSING: Final = 0.6
 _FEWEST: Final = 8
 _RESOLVED: Final = 8.0
@@ -34,10 +40,13 @@ _RESOLVED: Final = 8.0
 class Finder:
     """One record, its noise and its rough course."""
 
-    def __init__(self, time: Floats, theta: Floats, sigma: float, course: Outline) -> None:
-        self.time, self.theta, self.sigma, self.course = time, theta, sigma, course
-        self.count = count_of(theta)
-        late = float(np.median(np.abs(theta[course.turns[course.turns.size // 2 :]])))
+    def __init__(self, time: Floats, theta: Floats, reading: Reading, course: Outline) -> None:
+        # An unwrapped angle may rest some turns away from where it began.
+        away = math.tau * round(float(np.mean(theta[course.turns[-2:]])) / math.tau)
+        self.time, self.theta = time, theta - away
+        self.course = dataclasses.replace(course, smooth=course.smooth - away)
+        self.sigma, self.count = reading.sigma, reading.count
+        late = float(np.median(np.abs(self.theta[course.turns[course.turns.size // 2 :]])))
         self.w0 = 4 * float(ellipk(math.sin(min(late, 3.0) / 2) ** 2)) / course.period
         self.step = float(np.median(np.diff(time)))
         self.bottom, self.top = float(theta.min()), float(theta.max())
@@ -59,7 +68,19 @@ class Finder:
                 continue
             result.append(end)
         end = stop(self.time, self.theta, self.sigma, self.course, result)
+        result = self._in_time(result)
         return result if end is None else [*result, end]
+
+    @staticmethod
+    def _in_time(ends: list[End]) -> list[End]:
+        """Take off what friction makes turns late, as far as their sizes show friction."""
+        sizes = np.array([e.angle for e in ends if math.isfinite(e.stderr_angle)])
+        if sizes.size < _SHOW:
+            return ends
+        middle = (sizes[:-2] + 2 * sizes[1:-1] + sizes[2:]) / 4
+        sizes = np.abs(sizes - float(np.median(middle)))
+        theta_r = rough_damping(np.minimum(sizes, 3.1))[1]
+        return [e.late(theta_r) for e in ends]
 
     def window(self, amplitude: float) -> float:
         """Half width of the window of a peak, s."""
@@ -91,7 +112,7 @@ class Finder:
         # An instant less certain than the window is wide: no bend is seen, and nothing turns there.
         return end if end.stderr_time <= 2 * fit.half else None
 
-    def _end(self, fit: LocalFit, time: float) -> End:
+    def _end(self, fit: WindowFit, time: float) -> End:
         (value, gain), (_, slope_gain), (bend, _) = (fit.at(time, j) for j in range(3))
         sigma = self._effective(fit)
         bend = bend or math.inf
@@ -105,13 +126,12 @@ class Finder:
             fit.half,
         )
 
-    def _effective(self, fit: LocalFit) -> float:
+    def _effective(self, fit: WindowFit) -> float:
         """The noise of a sample, counted as often as samples are independent."""
         if self.count <= 2 * self.sigma:
             return self.sigma
         inside = self._between(fit.centre - fit.half, fit.centre + fit.half)
-        levels = np.unique(np.round(self.theta[inside] / self.count)).size
-        return self.sigma * math.sqrt(max(fit.points / (3 * levels), 1.0))
+        return self.sigma * levels_shared(self.theta[inside], self.count)
 
     def _clipped(self, k: int) -> End | None:
         """A top that was cut off: the extreme of the record for longer than the swing stays."""
@@ -123,7 +143,7 @@ class Finder:
             return None
         bend = self.w0**2 * max(math.sin(min(abs(extreme), math.pi)), 0.05)
         lasts = float(self.time[near[-1]] - self.time[near[0]])
-        if lasts < 3 * self.step + 4 * math.sqrt((self.count + 4 * self.sigma) / bend):
+        if lasts < 3 * self.step + 3 * math.sqrt((self.count + 2 * self.sigma) / bend):
             return None
         middle = float(self.time[near[0]] + self.time[near[-1]]) / 2
         return End(middle, extreme, self.step, math.inf, "clipped")

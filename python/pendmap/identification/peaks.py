@@ -5,16 +5,18 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import ellipk
 
 from pendmap.errors import InputError
 from pendmap.identification.clock import from_first
+from pendmap.identification.coarse import CoarseFinder, is_coarse
 from pendmap.identification.finder import Finder
 from pendmap.identification.reading import reading_of
 from pendmap.identification.turning import outline
+from pendmap.records.resampled import measured
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -23,10 +25,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["LATENESS", "Peaks", "find_peaks", "samples"]
-
-LATENESS: Final = 5 / 32
-"""What the quartic makes of ``s abs(s)``: half the slope that it has at 0, over the window."""
+__all__ = ["Peaks", "find_peaks", "samples"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,9 +53,6 @@ class Peaks:
         Number of the half cycle in which the recorded angle is zero.
     sigma : float
         Standard deviation of the noise of a sample that the errors were computed with, rad.
-    window : array, shape (P,)
-        Half widths of the windows in which the peaks were fitted, s; 0 where friction makes no
-        time late.
     """
 
     time: Floats
@@ -71,11 +67,6 @@ class Peaks:
         default_factory=lambda: np.empty(0, np.int64)
     )
     sigma: float = 0.0
-    window: Floats = dataclasses.field(default_factory=lambda: np.empty(0))
-
-    def __post_init__(self) -> None:
-        if self.window.size != self.time.size:
-            object.__setattr__(self, "window", np.zeros(self.time.size))
 
     @classmethod
     def of(
@@ -117,7 +108,7 @@ class Peaks:
 
     def select(self, which: NDArray[np.bool_]) -> Peaks:
         """Return some of the peaks, and all crossings."""
-        names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index", "window")
+        names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index")
         some = {name: getattr(self, name)[which] for name in names}
         kind = tuple(k for k, keep in zip(self.kind, which, strict=True) if keep)
         return dataclasses.replace(self, **some, kind=kind)
@@ -159,9 +150,16 @@ def find_peaks(
     at a peak ``A``; it shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half width
     ``h``. The window is as wide as lets this be a quarter of the standard error, and 1.3 rad of
     phase at most. Coulomb friction bends the two sides of a peak differently, which makes its time
-    late by ``5/32 h theta_r / sin A``, alike for all peaks of one size.
+    late by ``5/32 h theta_r / sin A``: this is taken off, with ``theta_r`` from the sizes of the
+    peaks, and a fifth of it counts as error.
     Amplitudes are freed of the excess ``stderr(v)^2 / (2 abs(theta''))`` that the highest point of
     a noisy curve has on average.
+
+    With fewer than 20 samples a period (of small swings) no quartic has samples enough. Peaks and
+    crossings are then those of a pendulum's swings,
+    ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0``, fitted to the samples within
+    half a swing, with parameters that 12 turns in a row share, and found again for the next 12.
+    Errors hold the noise, that of these parameters, and what the form misses.
 
     Parameters
     ----------
@@ -185,19 +183,18 @@ def find_peaks(
     Notes
     -----
     Where the count is coarser than the noise, neighbouring samples share their error, and the
-    standard errors count three samples for each count that the window sees.
+    standard errors count three samples for each count that the window sees. Of a record with
+    samples drawn between the readings only the readings are used.
     """
     t, x = samples(time, theta, trusted)
     t, first = from_first(t)
-    noise = reading_of(t, x, sigma).sigma
-    course = outline(t, x, noise)
-    if course is None:
+    drawn = measured(t, x)
+    if drawn is not None:
+        t, x = t[drawn.places], x[drawn.places]
+    finder, noise = _finder(t, x, sigma)
+    if finder is None:
         none = np.empty(0)
         return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
-    # An unwrapped angle may rest some turns away from where it began.
-    away = math.tau * round(float(np.mean(x[course.turns[-2:]])) / math.tau)
-    x, course = x - away, dataclasses.replace(course, smooth=course.smooth - away)
-    finder = Finder(t, x, noise, course)
     ends = finder.found()
     index = _numbered(ends, finder.w0)
     crossings = finder.crossings(ends, index)
@@ -214,9 +211,20 @@ def find_peaks(
         crossing_stderr=crossings[1],
         crossing_index=crossings[2].astype(np.int64),
         sigma=noise,
-        window=np.array([e.window for e in ends]),
     )
     return found.later(first)
+
+
+def _finder(
+    time: Floats, theta: Floats, sigma: float | None
+) -> tuple[Finder | CoarseFinder | None, float]:
+    """What suits the samples, or nothing where the record does not swing; and the noise."""
+    if is_coarse(time, theta):
+        coarse = CoarseFinder(time, theta, sigma)
+        return (coarse if coarse.swings else None), coarse.sigma
+    reading = reading_of(time, theta, sigma)
+    course = outline(time, theta, reading.sigma)
+    return (None if course is None else Finder(time, theta, reading, course)), reading.sigma
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:

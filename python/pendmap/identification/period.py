@@ -10,7 +10,6 @@ import numpy as np
 from scipy.special import ellipe, ellipkm1
 
 from pendmap.identification.chain import chain_covariance, chain_least_squares
-from pendmap.identification.peaks import LATENESS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,9 +46,7 @@ def quarters(amplitude: Floats) -> tuple[Floats, Floats]:
     return quarter, (ellipe(m) - rest * quarter) / (2 * m * rest) * np.sin(size) / 2
 
 
-def frequency(
-    peaks: Peaks, *, zeta: float = 0.0, theta_r: float = 0.0, offset: float = 0.0
-) -> Frequency:
+def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Frequency:
     """Fit the amplitude-corrected period ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, to all peaks.
 
     A half cycle between the peaks ``A`` and ``B`` takes a quarter period of each,
@@ -64,9 +61,6 @@ def frequency(
         Three or more.
     zeta : float
         Damping ratio, which makes small swings slower.
-    theta_r : float
-        ``Tr / w0^2``, rad: friction makes measured peaks late, see
-        :func:`pendmap.identification.peaks.find_peaks`.
     offset : float
         Zero error of the angle, rad.
 
@@ -77,8 +71,7 @@ def frequency(
     """
     amplitude = peaks.amplitude - offset
     quarter, slope = quarters(amplitude)
-    bend = np.sin(np.clip(np.abs(amplitude), 2 * abs(theta_r) + 1e-9, 3.0))
-    time = peaks.time - LATENESS * peaks.window * theta_r / bend
+    time = peaks.time
     pairs = np.flatnonzero(np.diff(peaks.index) == 1)
     if pairs.size == 0:
         raise ValueError("no two peaks follow one another")

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.local_fit import count_of
+from pendmap.identification.coarse import CoarseFinder, is_coarse
 from pendmap.records.noise import noise_of
+from pendmap.records.steps import step_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,8 +66,9 @@ def reading_of(
 ) -> Reading:
     """Return the standard errors of readings.
 
-    The noise is that of :func:`pendmap.noise_floor`, by its law where it grows with speed; it is at
-    least that of the count, ``count / sqrt(12)``.
+    The noise is that of :func:`pendmap.noise_floor`, by its law where it grows with speed, with few
+    samples a period what the swings of a pendulum leave, if that is less; it is at least that of
+    the count, ``count / sqrt(12)``.
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ def reading_of(
         The step of the sensor, rad, where it is known.
     """
     if count is None:
-        count = count_of(theta)
+        count = step_of(theta)
     doubt, law = 0.0, None
     if sigma is None:
         floor = noise_of(time, theta, trusted=trusted, count=count)
@@ -88,6 +90,12 @@ def reading_of(
         sigma = floor.sigma if known else 0.0
         law = floor.law
         doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
+        use = np.ones(time.size, bool) if trusted is None else trusted
+        if known and is_coarse(time[use], theta[use]):
+            # No polynomial follows so few samples a period: what it leaves is motion.
+            left = CoarseFinder(time[use], theta[use], None).sigma
+            if left < sigma:
+                sigma, law = left, None
     least = max(count / math.sqrt(12), 1e-15)
     sigma = max(sigma, least)
     coarse = sigma < DITHERED * count

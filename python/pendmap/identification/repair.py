@@ -120,7 +120,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         stderr_amplitude=np.zeros(count),
         stderr_time=times if np.all(times > 0) else np.ones(count),
     )
-    period = frequency(smooth, zeta=zeta, theta_r=theta_r)
+    period = frequency(smooth, zeta=zeta)
     period_error = period.stderr
     if not np.all(small.stderr_time > 0):
         period_error *= math.sqrt(min(period.misfit, 1.0))

@@ -6,11 +6,14 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.special import ellipe, ellipk
+
+from pendmap.records.swings import swings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["rough_start"]
+__all__ = ["rough_damping", "rough_start"]
 
 FEWEST_SWINGS: Final = 2
 """Half swings that a start needs."""
@@ -39,43 +42,37 @@ def rough_start(
     dict or None
         None where there are fewer than three swings.
     """
-    from scipy.optimize import nnls  # noqa: PLC0415 (heavy)
-    from scipy.special import ellipe, ellipk  # noqa: PLC0415 (heavy)
-
     tail = theta[-max(len(theta) // 10, 1) :]
     # Of a motion that goes on at the end the mean says little.
     centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0
-    times, peaks = _half_swings(time, theta - centre, 4.0 * sigma)
+    half = swings(time, theta - centre, least=4.0 * sigma)
+    peaks = np.minimum(np.abs(half.peak), math.pi - 1e-3)
     if len(peaks) < FEWEST_SWINGS:
         return None
     m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
-    w0 = float(np.median(2 * ellipk(m) / np.diff(times)))
+    w0 = float(np.median(2 * ellipk(m) / np.diff(half.crossing)))
     if len(peaks) < FEWEST_SWINGS + 1:
         return {"w0": w0, "c_over_m": 0.02 * w0, "Tr": 1e-3 * w0**2}
+    viscous, friction = rough_damping(peaks)
+    # Neither begins at 0, where a step may be too large.
+    return {"w0": w0, "c_over_m": max(viscous, 1e-4) * w0, "Tr": max(friction, 1e-5) * w0**2}
+
+
+def rough_damping(peaks: NDArray[np.float64]) -> tuple[float, float]:
+    """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from peaks in a row.
+
+    Parameters
+    ----------
+    peaks : ndarray of float, shape (n,)
+        Three or more, rad, in (0, pi).
+    """
+    from scipy.optimize import nnls  # noqa: PLC0415 (heavy)
+
+    m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
     action = 8 * (ellipe(m) - (1 - m) * ellipk(m))
-    lost = w0**2 * -np.diff(1 - np.cos(peaks))
-    columns = np.stack([0.5 * w0 * (action[1:] + action[:-1]), peaks[1:] + peaks[:-1]], axis=1)
+    columns = np.stack([0.5 * (action[1:] + action[:-1]), peaks[1:] + peaks[:-1]], axis=1)
+    lost = np.diff(np.cos(peaks))
     # Energies of small swings are known better: their error is about A sigma.
     weight = 1 / (peaks[1:] + peaks[:-1])
-    (c_over_m, friction), _ = nnls(columns * weight[:, None], lost * weight)
-    # Neither begins at 0, where a step may be too large.
-    return {
-        "w0": w0,
-        "c_over_m": max(float(c_over_m), 1e-4 * w0),
-        "Tr": max(float(friction), 1e-5 * w0**2),
-    }
-
-
-def _half_swings(
-    time: NDArray[np.float64], theta: NDArray[np.float64], least: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the times of the zero crossings and the peak between each pair of them."""
-    clear = np.flatnonzero(np.abs(theta) >= least)
-    after = 1 + np.flatnonzero(np.diff(theta[clear] > 0))
-    if after.size < FEWEST_SWINGS:
-        return np.array([]), np.array([])
-    a, b = clear[after - 1], clear[after]
-    # What came before the first crossing is no half swing, nor is what follows the last.
-    crossings = time[a] + theta[a] / (theta[a] - theta[b]) * (time[b] - time[a])
-    peaks = np.maximum.reduceat(np.abs(theta[clear]), after)[:-1]
-    return crossings, np.minimum(peaks, math.pi - 1e-3)
+    (viscous, friction), _ = nnls(columns * weight[:, None], lost * weight)
+    return float(viscous), float(friction)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.local_fit import count_of
+from pendmap.records.steps import step_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Outline", "outline"]
+__all__ = ["Outline", "median_of_five", "outline", "zigzags"]
 
 _SMOOTHING: Final = 0.1
 """Half width of the running mean over the period."""
@@ -71,12 +71,12 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     """
     if time.size < _FEWEST:
         return None
-    calm = _median_of_five(theta)
-    step = count_of(theta)
+    calm = median_of_five(theta)
+    step = step_of(theta)
     span = float(np.ptp(calm))
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
-    rough = _zigzags(calm, max(8 * sigma + 2 * step, 1e-6 * span), gaps)
+    rough = zigzags(calm, max(8 * sigma + 2 * step, 1e-6 * span), gaps)
     if rough.size < 2:  # noqa: PLR2004 (a half cycle lies between two)
         return None
     halves = np.diff(time[rough])
@@ -87,7 +87,7 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     gaps = np.flatnonzero(steps > _SMOOTHING * period) + 1
     # Towards the end the mean is over ever fewer samples: what it does there is noise.
     ahead = int(np.searchsorted(time, time[-1] - _SMOOTHING * period))
-    turns = _zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
+    turns = zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
     turns = _far_apart(turns, time, period)
     level = float(np.median(smooth[time > time[-1] - 0.5 * period]))
     off = np.flatnonzero(np.abs(smooth[:ahead] - level) > 4 * noise + 0.5 * step)
@@ -102,7 +102,7 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     return Outline(turns, period, smooth, noise, rest, int(np.argmax(runs)))
 
 
-def _median_of_five(x: Floats) -> Floats:
+def median_of_five(x: Floats) -> Floats:
     """The median of five neighbours: single outliers vanish, a monotone run stays as it is."""
     padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
@@ -144,7 +144,7 @@ def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
     return np.array(found, dtype=np.intp)
 
 
-def _zigzags(x: Floats, threshold: float, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
+def zigzags(x: Floats, threshold: float, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
     """The same for each part between two gaps: what is next to a gap need not be a turn."""
     begins = np.concatenate(([0], gaps))
     parts = [_zigzag(part, threshold) for part in np.split(x, gaps)]

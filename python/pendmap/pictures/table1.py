@@ -9,12 +9,14 @@ from pendmap.identification.digits import with_error
 from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:
-    from pendmap.identification import Estimate, IdentificationReport
+    from pendmap.identification import IdentificationReport
 
-__all__ = ["QUANTITIES", "RESTS", "columns", "estimate", "refused", "rows"]
+__all__ = ["MINUS", "QUANTITIES", "RESTS", "columns", "refused", "rows"]
 
 QUANTITIES: Final = (("w0", "w0 (rad/s)"), ("c_over_m", "c/m (1/s)"), ("Tr", "Tr (rad/s\u00b2)"))
 """What methods find: the name in a report, and that of the column."""
+MINUS: Final = "\N{MINUS SIGN}"
+"""How numbers in pictures are written."""
 RESTS: Final = "at rest"
 """What stands for an error where a simulation has come to rest before."""
 _MANY: Final = 100.0
@@ -37,7 +39,9 @@ def rows(report: IdentificationReport) -> list[list[str]]:
             continue
         cells = [look(name).label]
         cells += [
-            estimate(found.estimates[key]) if key in found.estimates else "\N{EN DASH}"
+            with_error(found.estimates[key], minus=MINUS)
+            if key in found.estimates
+            else "\N{EN DASH}"
             for key, _ in QUANTITIES
         ]
         cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
@@ -57,11 +61,6 @@ def refused(report: IdentificationReport) -> list[tuple[str, str]]:
             why = found.warnings[-1] if found.warnings else "not applicable"
             made.append((look(name).label, why))
     return made
-
-
-def estimate(found: Estimate) -> str:
-    """Return a number with its standard error in brackets, as it is written in pictures."""
-    return with_error(found).replace("-", "\N{MINUS SIGN}")
 
 
 def _percent(value: float) -> str:

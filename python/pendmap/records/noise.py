@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NoiseFloor",
     "SpeedRange",
+    "fastest",
     "noise_floor",
     "noise_of",
 ]
@@ -174,7 +175,7 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
     if time.size < FEWEST:
         return None
     interval = float(np.median(np.diff(time)))
-    swing, phase = _frequencies(time, theta, count)
+    swing, phase = fastest(time, theta, count)
     speed = speed_of(time, theta, phase)
     first = _clean(local_fit(time, theta), bad, speed)
     if first.middle.size < FEWEST:
@@ -207,7 +208,7 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
     return NoiseFloor(sigma, error, ranges, limited, colour, fit.middle.size, law)
 
 
-def _frequencies(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
+def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
     """Return the fastest phase of the motion, rad/s: that of the swing, or of the rotation.
 
     First with large swings counted for rotations, whose bends are as sharp; then without.

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.records import angle, clock, motion, noise_check, samples, scale, signs, trigger
+from pendmap.records import (
+    angle,
+    clock,
+    motion,
+    noise_check,
+    resampled,
+    samples,
+    scale,
+    signs,
+    trigger,
+)
 from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
@@ -111,6 +121,7 @@ def _runs(
     if work.peaks_only:
         work.refuse_short()
         return [_run(work, name, channels, digest)], []
+    resampled.check(work)
     samples.check(work)
     moves = motion.moves(work)
     if moves and work.made_of is None:

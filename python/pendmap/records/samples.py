@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap.records import false_samples
 from pendmap.records.runs_of import equal_runs
+from pendmap.records.steps import step_of
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -18,13 +19,10 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["check", "say_steps", "step_of"]
+__all__ = ["check", "say_steps"]
 
 SAME: Final = 5
 """Equal readings in a row that may be a clipped or frozen sensor."""
-
-LATTICE: Final = 0.12
-"""Root mean square distance from multiples of a step, in steps, that shows it; 0.29 is chance."""
 
 FINEST: Final = 3e-5
 """A step under this, in rad, says nothing: it is how many digits were written."""
@@ -75,38 +73,9 @@ def say_steps(work: Work) -> None:
         work.say("counts-differ", text)
 
 
-def step_of(theta: Floats) -> float:
-    """Return the step that readings come in, rad; 0 where there is none to be seen.
-
-    The least distance between different readings is tried, then refined by all of them; a step is
-    believed where the readings repeat and lie on its multiples.
-    """
-    values = np.unique(np.round(theta, 12))
-    if values.size < 3 or values.size > 0.7 * theta.size:
-        return 0.0
-    apart = np.diff(values)
-    # Written digits round multiples of a step: neighbours differ by it, give or take a digit.
-    least = float(np.quantile(apart, 0.02))
-    near = apart[(apart >= 0.5 * least) & (apart < 1.5 * least)]
-    step = float(np.median(near)) if near.size else least
-    multiples = np.round(apart / step)
-    small = multiples < 50
-    if step <= 0 or not np.any(multiples[small] > 0):
-        return 0.0
-    step = float(np.sum(apart[small]) / max(np.sum(multiples[small]), 1.0))
-    away = (values - values[0]) / step
-    away = away - np.round(away)
-    phase = np.angle(np.mean(np.exp(2j * np.pi * away))) / (2 * np.pi)
-    away = away - phase
-    away -= np.round(away)
-    return step if float(np.sqrt(np.mean(away**2))) < LATTICE else 0.0
-
-
 def _clipped(work: Work) -> None:
     """Mark plateaus at the ends of the range that the motion runs into at speed."""
     marked = np.zeros(work.theta.size, bool)
-    share, count = _as_read(work.theta)
-    count = max(count, work.count)
     ends = []
     for end in (float(work.theta.max()), float(work.theta.min())):
         low, high = equal_runs(work.theta, SAME)
@@ -114,8 +83,8 @@ def _clipped(work: Work) -> None:
         hits = [
             (a, b)
             for a, b in zip(low[at_end], high[at_end], strict=True)
-            if a > 0 and b < work.theta.size and (b - a - 1) * share + 1 > SAME - 0.5
-            if _abrupt(work, a, b) and _cut_off(work, a, b, count)
+            if a > 0 and b < work.theta.size and b - a > SAME - 0.5
+            if _abrupt(work, a, b) and _cut_off(work, a, b)
         ]
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * SAME):
             ends.append(f"{end:.4g}")
@@ -131,23 +100,7 @@ def _clipped(work: Work) -> None:
         work.say("clipped", text, at=at)
 
 
-def _as_read(theta: Floats) -> tuple[float, float]:
-    """Return the readings a sample, 1 unless lines were drawn between readings, and their step."""
-    bend = np.abs(np.diff(theta, 2))
-    if bend.size < 100:
-        return 1.0, 0.0
-    knees = np.flatnonzero(bend > 4 * float(np.quantile(bend, 0.6)) + 1e-9) + 1
-    if knees.size < 20:
-        return 1.0, 0.0
-    apart = np.diff(knees)
-    usual = float(np.quantile(apart, 0.25))
-    even = np.abs(apart / usual - np.round(apart / usual)) * usual < 0.5
-    if usual < 3 or np.mean(even) < 0.9:
-        return 1.0, 0.0
-    return 1 / usual, step_of(theta[knees])
-
-
-def _cut_off(work: Work, low: int, high: int, count: float) -> bool:
+def _cut_off(work: Work, low: int, high: int) -> bool:
     """Whether the motion on both sides goes on beyond a plateau, by a parabola through them."""
     if low < 3 or work.theta.size - high < 3:
         return False
@@ -165,7 +118,7 @@ def _cut_off(work: Work, low: int, high: int, count: float) -> bool:
     answer = np.polyfit(time, away, 2)
     noise = float(np.sqrt(np.mean((away - np.polyval(answer, time)) ** 2)))
     beyond = float(answer[2]) * -math.copysign(1, float(np.median(away)))
-    return beyond > 2 * count + FIT * noise
+    return beyond > 2 * work.count + FIT * noise
 
 
 def _frozen(work: Work) -> None:

@@ -1,4 +1,4 @@
-"""Polynomials fitted to a few samples around an instant, and the step of a counting sensor."""
+"""Polynomials fitted to a few samples around an instant."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["LocalFit", "count_of", "fit_around", "smoothed_velocity"]
+__all__ = ["WindowFit", "fit_around", "smoothed_velocity"]
 
 _NORMAL_MAD: Final = 0.674489750196
 """Median of the absolute value of a standard normal variable."""
 _OUTLIER: Final = 4.5
 _ROUNDS: Final = 4
-_ROUNDING: Final = 1e-9
 _EVEN: Final = 1e-3
 """Share of an interval by which samples may miss equal spacing and still count as even."""
 _BLOCK: Final = 4096
@@ -27,7 +26,7 @@ _BLOCK: Final = 4096
 
 
 @dataclasses.dataclass(frozen=True)
-class LocalFit:
+class WindowFit:
     """A polynomial ``sum_j c_j ((t - centre) / half)**j`` fitted to samples of unit weight.
 
     Parameters
@@ -112,7 +111,7 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
     *,
     sigma: float = 0.0,
     begin: float = -math.inf,
-) -> LocalFit | None:
+) -> WindowFit | None:
     """Fit a polynomial of these powers to the samples within ``half`` of ``centre``.
 
     Samples that lie 4.5 times the noise off are left out and the fit is repeated, some times over:
@@ -133,7 +132,7 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
 
     Returns
     -------
-    LocalFit or None
+    WindowFit or None
         ``None`` where there are no more samples than powers.
     """
     first, last = np.searchsorted(time, (max(centre - half, begin), centre + half * (1 + 1e-9)))
@@ -155,7 +154,7 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
     every[list(powers)] = coefficients
     square[np.ix_(powers, powers)] = inverse
     freedom = x.size - len(powers)
-    return LocalFit(
+    return WindowFit(
         centre, half, every, square, x.size, math.sqrt(float(residual @ residual) / freedom)
     )
 
@@ -166,21 +165,6 @@ def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     coefficients = inverse @ (rows.T @ x)
     return inverse, coefficients, x - rows @ coefficients
-
-
-def count_of(theta: Floats) -> float:
-    """Return the step in which the angle is counted, rad; 0 if it has none.
-
-    A step is believed if all differences of the values that occur are multiples of it.
-    """
-    levels = np.unique(theta)
-    gaps = np.diff(levels)
-    gaps = gaps[gaps > _ROUNDING]
-    if gaps.size < 10 or levels.size > 0.98 * theta.size:  # noqa: PLR2004 (too few to tell)
-        return 0.0
-    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
-    multiples = gaps / step
-    return step if np.all(np.abs(multiples - np.round(multiples)) < 0.1) else 0.0  # noqa: PLR2004
 
 
 def smoothed_velocity(

@@ -1,0 +1,286 @@
+"""Peaks and crossings from few samples each: fits of a pendulum's own swings, some together."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.identification.swing import FORM, Windows, curves
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["SwingFit", "fit_swings"]
+
+BLOCK: Final = 12
+"""Turns in a row that share their form: ``w0^2``, both dampings and the rest position."""
+_ROUNDS: Final = 12
+_SETTLED: Final = 6
+"""Rounds after which no more samples are left out."""
+_LOSS: Final = 4
+"""Turns that show what a swing loses."""
+_OUTLIER: Final = 5.0
+_DOUBT: Final = 3.0
+"""Standard errors of a block's noise beyond which its misfit is taken for the form's."""
+_NORMAL_MAD: Final = 0.674489750196
+
+
+@dataclasses.dataclass(frozen=True)
+class SwingFit:
+    """Turns, or crossings, that were fitted by swings.
+
+    Parameters
+    ----------
+    instant, state : array, shape (W,)
+        s; angle at a turn, rad, or velocity at a crossing, rad/s.
+    stderr_instant, stderr_state : array, shape (W,)
+        Standard errors: of the noise, of the shared form, and of what the form misses.
+    form : array, shape (W, 4)
+        ``w0^2``, ``c_over_m``, ``Tr`` and ``zero``, alike within a block.
+    form_covariance : array, shape (W, 4, 4)
+        Of the form.
+    sigma : float
+        Noise of a sample as the fits leave it, or as it was given, rad.
+    factor : array, shape (W,)
+        Noise of each block over ``sigma``: above 1 where the form misses something.
+    points : array of int, shape (W,)
+        Samples that were used.
+    """
+
+    instant: Floats
+    state: Floats
+    stderr_instant: Floats
+    stderr_state: Floats
+    form: Floats
+    form_covariance: Floats
+    sigma: float
+    factor: Floats
+    points: NDArray[np.intp]
+
+    def rows(self, which: Sequence[int]) -> SwingFit:
+        """Return some of the windows, in the order given; one may be asked for again."""
+        parts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        some: dict[str, Any] = {
+            name: part[list(which)] if name != "sigma" else part for name, part in parts.items()
+        }
+        return SwingFit(**some)
+
+
+def fit_swings(
+    windows: Windows,
+    start: tuple[Floats, Floats, Floats],
+    *,
+    sigma: float | None = None,
+    known: SwingFit | None = None,
+) -> SwingFit:
+    """Fit instants and states of all windows, and the form that each block of them shares.
+
+    Least squares by Gauss and Newton. Within a block of 12 turns each has its instant and its
+    state; the form is common, held by wide priors (10 % of ``w0^2``, the damping that turns show
+    give or take all of it), for what a few swings do not tell. Nothing ties one block to the next:
+    a damping of any law shows as forms that change. Samples 5 standard deviations off are left out.
+
+    Parameters
+    ----------
+    windows : Windows
+        W windows, in order of time.
+    start : tuple of array
+        Instants (W,), states (W,) and forms (W, 4) to begin with.
+    sigma : float, optional
+        Noise of a sample, rad; by default that of the quiet half of the blocks.
+    known : SwingFit, optional
+        Forms that are taken as they are, with their errors, row by row.
+    """
+    instant, state, form = (part.copy() for part in start)
+    blocks = _blocks(instant.size)
+    prior = None if known is not None else _prior(instant, state, form, blocks)
+    used = windows.used.copy()
+    trial = dataclasses.replace(windows, used=used)
+    scale = np.ones(instant.size)
+    for turn in range(_ROUNDS):
+        local, shared, residual = _rows(trial, instant, state, form)
+        if turn in {3, _SETTLED}:
+            scale = _scales(residual, used, blocks)
+            far = np.abs(residual) > _OUTLIER * np.maximum(scale, sigma or 0.0)[:, None]
+            far &= (used & ~far).sum(axis=1, keepdims=True) > 2  # noqa: PLR2004 (unknowns)
+            used &= ~far
+            trial = dataclasses.replace(windows, used=used)
+            local, shared, residual = (part * used[..., None] for part in (
+                local, shared, residual[..., None]
+            ))  # fmt: skip
+            residual = residual[..., 0]
+        move, _ = _step((local, shared, residual), blocks, None if prior is None else (
+            prior[0], prior[1], form, _scales(residual, used, blocks),
+        ))  # fmt: skip
+        instant += np.clip(move[:, 0], -0.1 / np.sqrt(form[:, 0]), 0.1 / np.sqrt(form[:, 0]))
+        reach = 0.2 * np.abs(state) + 1e-9
+        state += np.clip(move[:, 1], -reach, reach)
+        state = np.where(windows.crossing, state, np.clip(state, -3.13, 3.13))
+        form += move[:, 2:]
+        form[:, 0] = np.clip(form[:, 0], 0.25 * start[2][:, 0], 4 * start[2][:, 0])
+        if turn > _SETTLED and np.all(np.abs(move[:, 0]) * np.sqrt(form[:, 0]) < 1e-5):  # noqa: PLR2004
+            break
+    rows = _rows(trial, instant, state, form)
+    return _errors(rows, blocks, (instant, state, form), used, prior, sigma, known)
+
+
+def _blocks(count: int) -> list[slice]:
+    parts = max(round(count / BLOCK), 1)
+    edges = np.linspace(0, count, parts + 1).round().astype(int)
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+
+
+def _prior(
+    instant: Floats, state: Floats, form: Floats, blocks: list[slice]
+) -> tuple[Floats, Floats]:
+    """Where the form is held, and how tightly: standard deviations, one row a window.
+
+    Damping is held about what the turns of a block lose; how that is shared between ``c_over_m``
+    and ``Tr`` is left open.
+    """
+    centre, wide = form.copy(), np.empty(form.shape)
+    for block in blocks:
+        size = max(float(np.median(np.abs(state[block]))), 1e-9)
+        w2 = float(form[block][0, 0])
+        w, loss = np.sqrt(w2), 0.0
+        if block.stop - block.start > _LOSS:
+            here = np.maximum(np.abs(state[block]), 1e-12)
+            each = 2 * np.log(here[:-2] / here[2:]) / (instant[block][2:] - instant[block][:-2])
+            loss = max(float(np.median(each)), 0.0)
+        centre[block, 1] = loss
+        spread = 0.01 * w + loss
+        wide[block] = 0.1 * w2, spread, spread * w * size, 0.2 * size
+    return centre, wide
+
+
+def _rows(
+    windows: Windows, instant: Floats, state: Floats, form: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Derivatives by instant and state, (W, M, 2), by the form, (W, M, 4), and the residuals."""
+    count = instant.size
+    each = np.stack((
+        1e-5 * np.maximum(np.abs(state), 1e-3),
+        1e-5 * form[:, 0],
+        1e-5 * np.sqrt(form[:, 0]),
+        1e-6 * form[:, 0],
+        np.full(count, 1e-6),
+    ))  # fmt: skip
+    states, forms = [state], [form]
+    for k in range(1 + FORM):
+        states.append(state + each[0] if k == 0 else state)
+        forms.append(form + (np.eye(FORM)[k - 1] * each[k][:, None] if k else 0.0))
+    fields = {f.name: getattr(windows, f.name) for f in dataclasses.fields(windows)}
+    copies = {name: np.concatenate([part] * (2 + FORM)) for name, part in fields.items()}
+    angle, speed = curves(
+        Windows(**copies),
+        np.concatenate([instant] * (2 + FORM)),
+        np.concatenate(states),
+        np.concatenate(forms),
+    )
+    angle = angle.reshape(2 + FORM, count, -1)
+    change = np.stack([(angle[k + 1] - angle[0]) / each[k][:, None] for k in range(1 + FORM)], -1)
+    used = windows.used
+    local = np.stack((-speed[:count], change[..., 0]), -1) * used[..., None]
+    shared = change[..., 1:] * used[..., None]
+    return local, shared, (windows.theta - angle[0]) * used
+
+
+def _step(
+    rows: tuple[Floats, Floats, Floats],
+    blocks: list[slice],
+    prior: tuple[Floats, Floats, Floats, Floats] | None,
+) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
+    """The Gauss-Newton step, (W, 6), and the parts of the covariance for unit noise.
+
+    The parts: ``(L'L)^-1`` of the local unknowns, how they follow the form, and its inverse normal
+    matrix, each a row a window.
+    """
+    local, shared, residual = rows
+    across = np.swapaxes(local, 1, 2)
+    inverse = np.asarray(np.linalg.pinv(across @ local, hermitian=True), np.float64)
+    alone = (inverse @ (across @ residual[..., None]))[..., 0]
+    follows = inverse @ (across @ shared)
+    move: Floats = np.zeros((residual.shape[0], 2 + FORM))
+    form_inverse: Floats = np.zeros((residual.shape[0], FORM, FORM))
+    if prior is None:
+        move[:, :2] = alone
+        return move, (inverse, follows, form_inverse)
+    free = shared - local @ follows
+    left = residual - (local @ alone[..., None])[..., 0]
+    centre, wide, form, scale = prior
+    for block in blocks:
+        hold = np.square(max(float(scale[block][0]), 1e-12) / wide[block][0])
+        normal = np.einsum("wmi,wmj->ij", free[block], free[block]) + np.diag(hold)
+        pull = np.einsum("wmi,wm->i", free[block], left[block])
+        pull += hold * (centre[block][0] - form[block][0])
+        # The parameters differ by orders of magnitude: scaled, the matrix is a sound one.
+        unit = 1 / np.sqrt(np.diag(normal))
+        solved = np.linalg.pinv(normal * np.outer(unit, unit), hermitian=True) * np.outer(
+            unit, unit
+        )
+        move[block, 2:] = solved @ pull
+        form_inverse[block] = solved
+    move[:, :2] = alone - (follows @ move[:, 2:, None])[..., 0]
+    return move, (inverse, follows, form_inverse)
+
+
+def _scales(residual: Floats, used: NDArray[np.bool_], blocks: list[slice]) -> Floats:
+    """A robust noise of each block's samples, rad, shape (W,)."""
+    scale = np.ones(residual.shape[0])
+    for block in blocks:
+        some = np.abs(residual[block][used[block]])
+        points, windows = some.size, block.stop - block.start
+        freedom = max(points - 2 * windows - FORM, 1)
+        scale[block] = float(np.median(some)) / _NORMAL_MAD * np.sqrt(points / freedom)
+    return scale
+
+
+def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
+    rows: tuple[Floats, Floats, Floats],
+    blocks: list[slice],
+    found: tuple[Floats, Floats, Floats],
+    used: NDArray[np.bool_],
+    prior: tuple[Floats, Floats] | None,
+    sigma: float | None,
+    known: SwingFit | None,
+) -> SwingFit:
+    instant, state, form = found
+    points = used.sum(axis=1)
+    square = np.sum(rows[2] ** 2, axis=1)
+    freedom = np.array([
+        max(float(points[b].sum()) - 2 * (b.stop - b.start) - (FORM if known is None else 0), 1.0)
+        for b in blocks
+    ])  # fmt: skip
+    noise = np.sqrt(np.array([float(square[b].sum()) for b in blocks]) / freedom)
+    if known is not None:
+        sigma, factor = known.sigma, known.factor
+    else:
+        if sigma is None:
+            quiet = noise <= np.median(noise)
+            some = freedom[quiet]
+            sigma = float(np.sqrt(np.sum(some * noise[quiet] ** 2) / some.sum()))
+            even = noise**2 <= sigma**2 * (1 + 2 * _DOUBT * np.sqrt(2 / freedom))
+            sigma = float(np.sqrt(np.sum((freedom * noise**2)[even]) / freedom[even].sum()))
+        sigma = max(sigma, 1e-15)
+        doubt = noise / sigma > 1 + _DOUBT * np.sqrt(0.5 / freedom)
+        each = np.where(doubt, noise / sigma, 1.0)
+        factor = np.concatenate([
+            np.full(b.stop - b.start, f) for b, f in zip(blocks, each, strict=True)
+        ])  # fmt: skip
+    held = None if prior is None else (*prior, form, np.full(points.size, sigma))
+    _, (inverse, follows, form_inverse) = _step(rows, blocks, held)
+    scale = (sigma * factor) ** 2
+    shared = form_inverse * scale[:, None, None] if known is None else known.form_covariance
+    covariance = inverse * scale[:, None, None] + follows @ shared @ np.swapaxes(follows, 1, 2)
+    error = np.sqrt(np.maximum(np.einsum("wii->wi", covariance), 0.0))
+    # What too few samples leave open is not known at all.
+    open_ = points < 2  # noqa: PLR2004 (instant and state)
+    error[open_] = np.inf
+    return SwingFit(instant, state, error[:, 0], error[:, 1], form, shared, sigma, factor, points)
