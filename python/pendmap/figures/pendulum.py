@@ -44,7 +44,7 @@ def figure(
     """
     width, height = size or SIZE
     equation = f"th'' + (c/m) th' + w0\u00b2 (1 + p {_DRIVE}) sin th = \u2212Tr sign(th')"
-    known = "w0\u00b2 = g/l,   p = Y\u03a9\u00b2/g"
+    known = "w0\u00b2 = g/l, p = Y\u03a9\u00b2/g"
     equation = f"{equation};   {known}".replace("th", "\u03b8").replace("w0", "\u03c9\u2080")
     made = sheets.headed((width, height), dpi, title or TITLE, equation, left=0.3)
     scale = min((width - 0.2) / 5.8, (height - 0.75) / 4.85)
