@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.coarse import CoarseFinder, is_coarse
+from pendmap.identification.coarse import coarse_finder, is_coarse
 from pendmap.records.noise import noise_of
 from pendmap.records.steps import step_of
 
@@ -82,7 +82,7 @@ def reading_of(
         use = np.ones(time.size, bool) if trusted is None else trusted
         if known and is_coarse(time[use], theta[use]):
             # No polynomial follows so few samples a period: what it leaves is motion.
-            sigma = min(sigma, CoarseFinder(time[use], theta[use], None).sigma)
+            sigma = min(sigma, coarse_finder(time[use], theta[use], None).sigma)
     sigma = max(sigma, count / math.sqrt(12), 1e-15)
     coarse = sigma < DITHERED * count
     each = np.full(theta.shape, sigma)
