@@ -7,6 +7,7 @@ joins them here is the equation of motion, with parameters that are found again 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 from typing import TYPE_CHECKING, Final
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["CoarseFinder", "is_coarse"]
+__all__ = ["CoarseFinder", "coarse_finder", "is_coarse"]
 
 COARSE: Final = 20.0
 """Samples a period of small swings below which nine of them, which a quartic needs for errors that
@@ -68,6 +69,16 @@ def _natural(time: Floats, theta: Floats) -> float | None:
         return None
     size = np.minimum(np.abs(np.diff(theta[turns])) / 2, 3.1)
     return float(np.median(2 * ellipk(np.sin(size / 2) ** 2) / np.diff(time[turns])))
+
+
+def coarse_finder(time: Floats, theta: Floats, sigma: float | None) -> CoarseFinder:
+    """Return the finder of a record; every method asks for that of the same one."""
+    return _finder(time.tobytes(), theta.tobytes(), sigma)
+
+
+@functools.lru_cache(maxsize=4)
+def _finder(time: bytes, theta: bytes, sigma: float | None) -> CoarseFinder:
+    return CoarseFinder(np.frombuffer(time), np.frombuffer(theta), sigma)
 
 
 class CoarseFinder:
@@ -151,6 +162,10 @@ class CoarseFinder:
 
     def found(self) -> list[End]:
         """All peaks, in order of time."""
+        return list(self._found)
+
+    @functools.cached_property
+    def _found(self) -> list[End]:
         if self.course is None:
             return []
         fit, begins, held = self._turns(self.sigma)

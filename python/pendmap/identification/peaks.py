@@ -12,7 +12,7 @@ from scipy.special import ellipk
 
 from pendmap.errors import InputError
 from pendmap.identification.clock import from_first
-from pendmap.identification.coarse import CoarseFinder, is_coarse
+from pendmap.identification.coarse import coarse_finder, is_coarse
 from pendmap.identification.finder import Finder
 from pendmap.identification.reading import reading_of
 from pendmap.identification.turning import outline
@@ -21,6 +21,7 @@ from pendmap.records.resampled import measured
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.identification.coarse import CoarseFinder
     from pendmap.identification.ends import End
 
     Floats = NDArray[np.float64]
@@ -220,7 +221,7 @@ def _finder(
 ) -> tuple[Finder | CoarseFinder | None, float]:
     """What suits the samples, or nothing where the record does not swing; and the noise."""
     if is_coarse(time, theta):
-        coarse = CoarseFinder(time, theta, sigma)
+        coarse = coarse_finder(time, theta, sigma)
         return (coarse if coarse.swings else None), coarse.sigma
     reading = reading_of(time, theta, sigma)
     course = outline(time, theta, reading.sigma)

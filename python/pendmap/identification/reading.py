@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.coarse import CoarseFinder, is_coarse
+from pendmap.identification.coarse import coarse_finder, is_coarse
 from pendmap.records.noise import noise_of
 from pendmap.records.steps import step_of
 
@@ -93,7 +93,7 @@ def reading_of(
         use = np.ones(time.size, bool) if trusted is None else trusted
         if known and is_coarse(time[use], theta[use]):
             # No polynomial follows so few samples a period: what it leaves is motion.
-            left = CoarseFinder(time[use], theta[use], None).sigma
+            left = coarse_finder(time[use], theta[use], None).sigma
             if left < sigma:
                 sigma, law = left, None
     least = max(count / math.sqrt(12), 1e-15)
