@@ -9,7 +9,7 @@ import pytest
 
 from driven_decays import motion
 from pendmap.identification.from_start import fit_from_start
-from pendmap.identification.local_fit import smoothed_velocity
+from pendmap.identification.window_fit import smoothed_velocity
 from pendmap.identification.reading import reading_of
 from pendmap.identification.runs import FitRun
 from pendmap.identification.trajectory import identify
