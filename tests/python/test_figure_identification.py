@@ -23,6 +23,7 @@ from pendmap.figures.half_cycles import course_of
 from pendmap.figures.sides import signed_log_axis
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
 from pendmap.identification.decrement import recursion
+from pendmap.identification.summary import with_error
 from pendmap.pictures import methods, table1
 from pendmap.records import Experiment, Run
 
@@ -210,7 +211,8 @@ def test_the_table_says_what_was_found() -> None:
     assert [len(row) for row in rows] == [len(table1.columns(found))] * len(rows)
     assert rows[0][0] == "trajectory"
     assert float(rows[0][1].partition("(")[0]) == pytest.approx(6.2, abs=1e-3)
-    assert table1.estimate(Estimate(-0.0123456, 0.00123)) == "\u22120.0123(12)"
+    said = with_error(Estimate(-0.0123456, 0.00123), minus=table1.MINUS)
+    assert said == "\u22120.0123(12)"
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])

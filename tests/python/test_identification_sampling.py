@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from decays import Decay, decay, record
@@ -65,6 +66,32 @@ def test_all_peaks_are_found_at_any_rate_and_their_errors_are_honest(
         # Some hundred ratios, whose errors blocks of swings share in part.
         assert 0.89 < np.mean(np.abs(ratios) < 1.96) <= 1.0, what
         assert 0.6 < np.std(ratios) < 1.15, what
+
+
+@pytest.mark.parametrize("samples", [8.0, 10.0, 15.0, 25.0])
+def test_a_run_that_goes_over_the_top_first(samples: float) -> None:
+    def rate(_: float, y: Floats) -> list[float]:
+        friction = 0.0496 * y[1] + 0.08 * math.tanh(y[1] / 1e-3)
+        return [y[1], -friction - 6.2**2 * math.sin(y[0])]
+
+    def turn(_: float, y: Floats) -> float:
+        return float(y[1])
+
+    made = solve_ivp(
+        rate, (0, 30), [0.0, 20.0], rtol=1e-9, atol=1e-11, events=turn, dense_output=True,
+        max_step=0.02,
+    )  # fmt: skip
+    at, true = made.t_events[0], made.y_events[0][:, 0]
+    away = math.tau * round(true[-1] / math.tau)
+    assert away > 2 * math.tau
+    time = np.arange(0, 30, SMALL_PERIOD / samples)
+    noise = math.radians(0.1) * np.random.default_rng(2).standard_normal(time.size)
+    found = find_peaks(time, made.sol(time)[0] + noise)
+    count = np.count_nonzero(at < 29.5)
+    assert found.kind[0] == "turn"
+    times, sizes = found.time[:count] - at[:count], found.amplitude[:count] - (true[:count] - away)
+    assert np.mean(np.abs(times) < 2.5 * found.stderr_time[:count]) > 0.85
+    assert np.mean(np.abs(sizes) < 2.5 * found.stderr_amplitude[:count]) > 0.85
 
 
 @pytest.mark.parametrize("samples", [6.3, 8.0, 10.0])

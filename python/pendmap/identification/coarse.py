@@ -21,6 +21,7 @@ from pendmap.identification.swing import Windows
 from pendmap.identification.swing_fit import fit_swings
 from pendmap.identification.turning import Outline, median_of_five, outline, zigzags
 from pendmap.records.steps import levels_shared, step_of
+from pendmap.records.swings import after_turns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,12 +53,21 @@ _RESOLVED: Final = 8.0
 
 def is_coarse(time: Floats, theta: Floats) -> bool:
     """Whether a record swings with fewer than 20 samples a period, that of small swings."""
+    _, swing = _swinging(theta)
+    time, theta = time[swing:], theta[swing:]
     raw = _natural(time, theta)
     if raw is None or 2 * math.pi / raw >= COARSE * float(np.median(np.diff(time))):
         return False
     # Spikes of single samples are gone from the median; quick swings are gone as well, or slower.
     calm = _natural(time, median_of_five(theta))
     return calm is None or calm > 0.6 * raw
+
+
+def _swinging(theta: Floats) -> tuple[float, int]:
+    """Where a record rests, in whole turns, rad, and from which sample it swings about that."""
+    tail = theta[-max(theta.size // 4, 1) :]
+    rest = math.tau * round(float(np.median(tail)) / math.tau) if theta.size else 0.0
+    return rest, after_turns(theta - rest)
 
 
 def _natural(time: Floats, theta: Floats) -> float | None:
@@ -93,6 +103,10 @@ class CoarseFinder:
     """
 
     def __init__(self, time: Floats, theta: Floats, sigma: float | None) -> None:
+        # What goes over the top before has no turns, and no part in how far swings go.
+        rest, swing = _swinging(theta)
+        self.rotated = swing > 0
+        time, theta = time[swing:], theta[swing:] - rest
         self.step = float(np.median(np.diff(time)))
         self.time, self.theta, self.count = time, theta, step_of(theta)
         self.w0 = _natural(time, theta) or 1.0
@@ -118,11 +132,6 @@ class CoarseFinder:
         t, x = self.fine
         points = max(0.2 * math.tau / self.w0 / float(np.median(np.diff(t))), 1.0)
         self.course = outline(t, x, sigma * math.sqrt(points))
-        if self.course is not None:
-            away = math.tau * round(float(np.mean(x[self.course.turns[-2:]])) / math.tau)
-            smooth = self.course.smooth - away
-            self.theta, self.fine = self.theta - away, (t, x - away)
-            self.course = dataclasses.replace(self.course, smooth=smooth)
 
     def _turns(self, sigma: float | None) -> tuple[SwingFit, bool, bool]:
         """Fit all turns; whether the first is where the record begins, and whether it was held."""
@@ -134,7 +143,9 @@ class CoarseFinder:
         first = int(course.turns[0])
         extreme = int(np.argmax(np.abs(x[: first // 2 + 1] - x[first])))
         leaves = float(t[max(course.left - 1, 0)])
-        if leaves - t[0] > 3 * self.step:
+        if self.rotated:
+            begins = False
+        elif leaves - t[0] > 3 * self.step:
             held = True
             instants, states = [leaves, *instants], [float(np.median(x[: course.left])), *states]
         elif t[extreme] - t[0] > 0.75 * self.step:
