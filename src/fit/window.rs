@@ -22,8 +22,8 @@ pub struct Window {
     pub start: State,
 }
 
-/// Windows of about `length` of all records, one after the other; none is longer than its record
-/// allows. `state` tells the state at a sample of a record.
+/// Windows of about `length` of all records, one after the other, from the first sample that counts;
+/// none is longer than its record allows. `state` tells the state at a sample of a record.
 pub fn cut(
     problem: &Problem,
     length: f64,
@@ -31,12 +31,15 @@ pub fn cut(
 ) -> Vec<Window> {
     let mut windows = Vec::new();
     for (index, record) in problem.records.iter().enumerate() {
-        let span = record.times[record.times.len() - 1] - record.times[0];
+        // Before it the pendulum was held: followed backward, a swing grows and may turn over.
+        let first = record.weights.iter().position(|weight| *weight > 0.0).unwrap_or(0);
+        let begin = record.times[first];
+        let span = record.times[record.times.len() - 1] - begin;
         let count =
             (span / length.min(record.longest)).ceil().clamp(1.0, record.times.len() as f64);
-        let mut from = 0;
+        let mut from = first;
         for k in 1..=count as usize {
-            let end = record.times[0] + span * k as f64 / count;
+            let end = begin + span * k as f64 / count;
             let mut to = record.times.partition_point(|time| *time < end);
             if k == count as usize || trusted(record, to, record.times.len()) < FEWEST {
                 to = record.times.len();

@@ -109,3 +109,19 @@ def test_what_is_left_out_is_said() -> None:
     assert said == "1 run read; 2 forced runs and 1 run held out are not used"
     assert left_out(there, [runs[0], runs[3]]) == "2 runs read; 2 forced runs are not used"
     assert not left_out(there, runs)
+
+
+def test_a_long_hold_before_the_release_does_no_harm(tmp_path: Path) -> None:
+    # Followed backward through a hold of 15 s this swing would grow until it turns over.
+    time, angle = record(decay(release=2.0, until=40.0), seconds=30, seed=3)
+    held = np.full(1500, angle[0])
+    rows = np.column_stack([np.arange(1500 + time.size) * 0.01, np.concatenate([held, angle])])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    experiment = pendmap.read_experiment(tmp_path / "a.csv")
+    report = identify_experiment(experiment, methods=["trajectory"])
+    assert report.best.converged
+    for name, true in BOTH.items():
+        found = report.best.estimates[name]
+        assert found.stderr is not None
+        assert abs(found.value - true) < 4 * found.stderr
+    assert np.isnan(report.joint.fit.curves[0][0][1400])  # type: ignore[union-attr]

@@ -33,8 +33,13 @@ POOR: Final = 0.1
 """Residuals above this part of the record's own scatter are no fit: the search went astray."""
 
 
+LACKING: Final = 4.0
+"""Where the sum of squares is so many times what noise makes of it, the model lacks more than the
+noise: by its law the slowest readings alone would say what the model is."""
+
+
 class TooShortError(InputError):
-    """The record holds fewer than two half swings."""
+    """The record gives no start: fewer than two half swings, or none that fall."""
 
 
 def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
@@ -46,11 +51,12 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     friction: bool = True,
     effects: Sequence[Effect | str] = (),
     free: Sequence[str] | None = None,
-) -> TrajectoryFit:
-    """Return the fit to several records, from a start that the first of them gives.
+) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
+    """Return the fit to several records, from a start that the first gives, and their readings.
 
     Where a rough start leads to a poor fit, a second one begins where the methods of peaks, or a
-    global search over their envelope, say; the better one counts.
+    global search over their envelope, say; the better one counts. Readings whose noise grows with
+    speed count by it, unless the model lacks more than the noise: then they count alike.
 
     Parameters
     ----------
@@ -62,7 +68,7 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     Raises
     ------
     TooShortError
-        If the first record holds fewer than two half swings and no start is given.
+        If the first record gives no start and none is given.
     """
     first = runs[0]
     good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
@@ -85,14 +91,21 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
         return fit_runs(runs, model, [*names, *wanted, *_sizes(more)], sigma_doubt=doubt)
 
     found = fitted(start)
+    if found.widening > LACKING and any(reading.law for reading in readings):
+        readings = [dataclasses.replace(r, each=r.alike, law=None) for r in readings]
+        runs = [
+            dataclasses.replace(run, sigma=r.each) for run, r in zip(runs, readings, strict=True)
+        ]
+        found = fitted(start)
     poor = not found.converged or found.rms > POOR * float(np.std(theta))
     if isinstance(start, Rig) or not poor:
-        return found
+        return found, tuple(readings)
     try:
         again = fitted(_by_peaks(time, theta, readings[0].sigma))
     except InputError:
-        return found
-    return again if (again.converged, -again.chi2) > (found.converged, -found.chi2) else found
+        return found, tuple(readings)
+    better = (again.converged, -again.chi2) > (found.converged, -found.chi2)
+    return again if better else found, tuple(readings)
 
 
 def _sizes(effects: Sequence[Effect]) -> list[str]:
@@ -111,7 +124,7 @@ def _start_of(
     Raises
     ------
     TooShortError
-        If ``w0`` is not known and the record holds fewer than two half swings.
+        If ``w0`` is not known and the record gives no start.
     """
     if isinstance(start, Rig):
         return start
@@ -130,5 +143,8 @@ def _by_peaks(
     except InputError:
         start = None
     if start is None or start.source == "guess":
-        raise TooShortError("the record holds fewer than two half swings: there is no start")
+        raise TooShortError(
+            "the record gives no start: allowed is a free decay that shows three half swings or"
+            " more, or a natural frequency: w0 = 6.2 under [rig] in experiment.toml"
+        )
     return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}

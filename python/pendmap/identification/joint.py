@@ -123,15 +123,15 @@ def fit_together(
     InputError
         If no run can be fitted.
     TooShortError
-        If the first holds fewer than two half swings and there is no start.
+        If the first gives no start and none is given.
     """
     if not runs:
         raise InputError("runs is empty: allowed is one record or more")
     readings = [reading_of_run(run) for run in runs]
-    fit = fit_from_start(
+    fit, worth = fit_from_start(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
         readings,
         start=start or known,
         effects=effects,
     )
-    return JointFit(fit, tuple(runs), tuple(readings))
+    return JointFit(fit, tuple(runs), worth)

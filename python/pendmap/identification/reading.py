@@ -42,6 +42,8 @@ class Reading:
         Whether the count is coarser than the noise.
     law : SpeedLaw or None
         How the noise grows with speed, where the record shows that it does; ``each`` follows it.
+    alike : ndarray of float, shape (n,)
+        ``each`` without the law: for a model that lacks more than the noise.
     shift : float or ndarray of float, shape (n,)
         By how much instants that miss their stamps move the readings on average, rad; a fit takes
         it off.
@@ -52,6 +54,7 @@ class Reading:
     each: NDArray[np.float64]
     doubt: float
     coarse: bool
+    alike: NDArray[np.float64]
     law: SpeedLaw | None = None
     shift: NDArray[np.float64] | float = 0.0
 
@@ -99,12 +102,20 @@ def reading_of(
     least = max(count / math.sqrt(12), 1e-15)
     sigma = max(sigma, least)
     coarse = sigma < DITHERED * count
-    each = np.full(theta.shape, sigma) if law is None else law.sigma(time, theta)
-    each = np.maximum(each, least)
-    stuck = each < DITHERED * count
-    if stuck.any():
-        change = np.flatnonzero(np.diff(theta) != 0) + 1
-        lengths = np.diff(np.concatenate([[0], change, [len(theta)]]))
-        each = each * np.where(stuck, np.sqrt(np.repeat(lengths, lengths)), 1.0)
-    shift = 0.0 if law is None else law.shift(time, theta)
-    return Reading(sigma, count, each, doubt, coarse, law, shift)
+    each = alike = _on_one_count(np.full(theta.shape, sigma), theta, count)
+    if law is None:
+        return Reading(sigma, count, each, doubt, coarse, alike)
+    each = _on_one_count(np.maximum(law.sigma(time, theta), least), theta, count)
+    return Reading(sigma, count, each, doubt, coarse, alike, law, law.shift(time, theta))
+
+
+def _on_one_count(
+    errors: NDArray[np.float64], theta: NDArray[np.float64], count: float
+) -> NDArray[np.float64]:
+    """Return errors with those of readings that stay on one count taken for one reading's."""
+    stuck = errors < DITHERED * count
+    if not stuck.any():
+        return errors
+    change = np.flatnonzero(np.diff(theta) != 0) + 1
+    lengths = np.diff(np.concatenate([[0], change, [len(theta)]]))
+    return errors * np.where(stuck, np.sqrt(np.repeat(lengths, lengths)), 1.0)

@@ -168,7 +168,7 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     Raises
     ------
     TooShortError
-        If the record holds fewer than two half swings and no start is given.
+        If the record gives no start and none is given.
     """
     time, theta = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, theta))
     if time.shape != theta.shape or time.ndim != 1:
@@ -185,7 +185,7 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
     elapsed, first = from_first(time)
     reading = reading_of(elapsed, theta, sigma, trusted=good)
     run = FitRun(elapsed, theta - reading.shift, reading.each, trusted=good, lab_time_s=first)
-    found = fit_from_start(
+    found, (reading,) = fit_from_start(
         [run],
         [reading],
         start=start,

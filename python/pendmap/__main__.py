@@ -1,0 +1,6 @@
+"""``python -m pendmap`` is the command ``pendmap``."""
+
+from pendmap.cli import run
+
+if __name__ == "__main__":
+    run()
