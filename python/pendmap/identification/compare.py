@@ -43,7 +43,8 @@ class RunComparison:
     sigma : float
         Its noise, rad.
     start : (float, float)
-        Angle (rad) and velocity (rad/s) at its first free sample from which the model comes nearest.
+        Angle (rad) and velocity (rad/s) at its first free sample, from which the model comes
+        nearest.
     curve : ndarray, shape (2, N)
         Angle and velocity of the model at each sample.
     residual : ndarray, shape (N,)
@@ -113,8 +114,8 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
     """Compare a model with every free decay of an experiment.
 
     Nothing of the model is adapted. Where a record begins is not known better than its noise, so
-    that angle and velocity of the first free sample are adapted for the residual; periods and peaks are
-    those of a motion from the first peak as it was measured.
+    that angle and velocity of the first free sample are adapted for the residual; periods and
+    peaks are those of a motion from the first peak as it was measured.
 
     Parameters
     ----------
