@@ -93,6 +93,11 @@ class Discrepancy:
         classes = (standing.equivalent for standing in self.judgement.standings)
         return [names for names in classes if len(names) > 1]
 
+    @property
+    def adds(self) -> bool:
+        """Whether the best model is another than the baseline."""
+        return self.best is not self.base
+
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:
         """How the error of both models grows with the horizon, on what was held back."""

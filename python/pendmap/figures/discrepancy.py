@@ -34,7 +34,7 @@ def figure(found: Discrepancy, *, dpi: float) -> Figure:
     gap.draw_by_run(left.panel(made), found)
     if found.forecasts:
         axes = right.panel(made)
-        gap.draw_forecast(axes, max(found.forecasts, key=lambda f: f.starts))
+        gap.draw_forecast(axes, found, max(found.forecasts, key=lambda f: f.starts))
         axes.legend(loc="upper left", ncols=3, columnspacing=1.0, handlelength=1.4)
     cells = Box(0.85, 3.75, 7.45, 1.6).columns(2, 0.75)
     for box, over in zip(cells, ("angle", "velocity"), strict=True):

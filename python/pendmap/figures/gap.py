@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.horizon import Forecast
     from pendmap.figures.blocks import Box
 
-__all__ = ["AFTER", "BEFORE", "draw_by_run", "draw_forecast", "draw_residuals", "short"]
+__all__ = ["AFTER", "BEFORE", "draw_by_run", "draw_forecast", "draw_residuals", "models", "short"]
 
 BEFORE, AFTER = look("before").colour, look("after").colour
 
@@ -35,6 +35,11 @@ WIDE: Final = 8.0
 def short(name: str) -> str:
     """Return a run's name as there is room for it under an axis."""
     return name.removesuffix(".csv")[-6:]
+
+
+def models(found: Discrepancy) -> list[tuple[str, str]]:
+    """Return what the models are called, and their colours; the baseline alone where it stays."""
+    return [("before", BEFORE), ("after", AFTER)] if found.adds else [("baseline", BEFORE)]
 
 
 def draw_residuals(made: Figure, box: Box, found: Discrepancy) -> None:
@@ -54,11 +59,9 @@ def draw_residuals(made: Figure, box: Box, found: Discrepancy) -> None:
         axes.axhspan(
             -2 * floor, 2 * floor, color=blocks.NOISE, lw=0, label="noise, 2 standard errors"
         )
-        for name, colour, trial in (
-            ("before", BEFORE, found.base.trial),
-            ("after", AFTER, found.best.trial),
-        ):
-            residual = 1e3 * trial.fit.residuals[k]
+        fits = (found.base.trial.fit, found.best.trial.fit)
+        for (name, colour), fit in zip(models(found), fits, strict=False):
+            residual = 1e3 * fit.residuals[k]
             if run.trusted is not None:
                 residual = np.where(run.trusted, residual, math.nan)
             mean = _smoothed(residual, every)
@@ -100,9 +103,10 @@ def draw_by_run(axes: Axes, found: Discrepancy) -> None:
         for values in ([row.before for row in rows], [row.after for row in rows])
     )
     axes.vlines(places, after, before, color="#bbbbbb", lw=1.0, zorder=1)
-    axes.plot(places, before, "o", color=BEFORE, mfc="white", ms=5, label="before")
-    axes.plot(places, after, "s", color=AFTER, ms=4, label="after")
-    axes.hlines(noise, places - 0.32, places + 0.32, color=style.INK, lw=1.1, label="noise")
+    axes.plot(places, before, "o", color=BEFORE, mfc="white", ms=5)
+    if found.adds:
+        axes.plot(places, after, "s", color=AFTER, ms=4)
+    axes.hlines(noise, places - 0.32, places + 0.32, color=style.INK, lw=1.1)
     every = np.concatenate([noise, before, after])
     every = every[np.isfinite(every)]
     low, high = float(every.min()), float(every.max())
@@ -116,14 +120,12 @@ def draw_by_run(axes: Axes, found: Discrepancy) -> None:
     axes.set_title("Residual by run" + (", shaded: held out" if back else ""))
 
 
-def draw_forecast(axes: Axes, forecast: Forecast) -> None:
+def draw_forecast(axes: Axes, found: Discrepancy, forecast: Forecast) -> None:
     """Draw the error of forecasts against their horizon, and the noise."""
     axes.axhline(1e3 * forecast.noise_floor, color=style.INK, lw=1.1, label="noise")
-    for name, colour, error, width in (
-        ("before", BEFORE, forecast.before, 1.6),
-        ("after", AFTER, forecast.after, 1.2),
-    ):
-        axes.plot(forecast.horizon, 1e3 * error, color=colour, lw=width, label=name)
+    errors = (forecast.before, forecast.after)
+    for (name, colour), error in zip(models(found), errors, strict=False):
+        axes.plot(forecast.horizon, 1e3 * error, color=colour, lw=1.4, label=name)
     every = 1e3 * np.concatenate([forecast.before, forecast.after, [forecast.noise_floor]])
     every = every[np.isfinite(every)]
     low, high = float(every.min()), float(every.max())

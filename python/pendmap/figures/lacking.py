@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.figures import style
-from pendmap.figures.gap import AFTER, BEFORE
+from pendmap.figures.gap import models
 from pendmap.pictures.diagnosis import OVER_SAID
 
 if TYPE_CHECKING:
@@ -29,10 +29,8 @@ def shown_over(found: Discrepancy) -> list[str]:
 def draw_torque(axes: Axes, found: Discrepancy, over: str) -> None:
     """Draw the torque that both models lack over one of these, with bands of 95 %."""
     rows: list[dict[str, Any]] = []
-    for name, colour, torque in (
-        ("before", BEFORE, found.torque_before),
-        ("after", AFTER, found.torque_after),
-    ):
+    torques = (found.torque_before, found.torque_after)
+    for (name, colour), torque in zip(models(found), torques, strict=False):
         own = torque.rows.get(over, [])
         rows += own
         if not own:

@@ -66,15 +66,17 @@ def rms(found: Discrepancy, dpi: float) -> Figure:
     said = f"forecasts from {starts} starts on what was held back" if forecasts else ""
     made = _empty(3.6, dpi, "The gap", said)
     handles = [
-        Line2D([], [], color=gap.BEFORE, marker="o", mfc="white", ms=5, lw=1.4),
-        Line2D([], [], color=gap.AFTER, marker="s", ms=4, lw=1.4),
-        Line2D([], [], color=style.INK, lw=1.1),
+        Line2D([], [], color=colour, lw=1.4, label=name, marker=mark, mfc=fill, ms=4.5)
+        for (name, colour), mark, fill in zip(
+            gap.models(found), "os", ("white", gap.AFTER), strict=False
+        )
     ]
-    made.legend(handles, ["before", "after", "noise"], loc="upper right", ncols=3)
+    handles.append(Line2D([], [], color=style.INK, lw=1.1, label="noise"))
+    made.legend(handles=handles, loc="upper right", ncols=3)
     cells = Box(LEFT, BELOW, ROOM, 1.85).columns(1 + len(forecasts), APART[0])
     gap.draw_by_run(cells[0].panel(made), found)
     for cell, forecast in zip(cells[1:], forecasts, strict=True):
-        gap.draw_forecast(cell.panel(made), forecast)
+        gap.draw_forecast(cell.panel(made), found, forecast)
     return made
 
 
@@ -87,8 +89,8 @@ def torque(found: Discrepancy, dpi: float) -> Figure | None:
     high = 1.5
     height = 0.75 + rows * high + (rows - 1) * APART[1] + 0.6
     made = _empty(height, dpi, "Torque that the model lacks", "per moment of inertia; bands: 95 %")
-    handles = [Line2D([], [], color=c, lw=1.4) for c in (gap.BEFORE, gap.AFTER)]
-    made.legend(handles, ["before", "after"], loc="upper right", ncols=2)
+    handles = [Line2D([], [], color=c, lw=1.4, label=name) for name, c in gap.models(found)]
+    made.legend(handles=handles, loc="upper right", ncols=2)
     lines = Box(LEFT, 0.6, ROOM, rows * high + (rows - 1) * APART[1]).rows(
         [1.0] * rows, [APART[1]] * (rows - 1)
     )
@@ -111,7 +113,10 @@ def figure_7(found: Discrepancy, dpi: float) -> Figure | None:
     for one in runs:
         top -= high
         title = one.name + (", held out" if one.held_out else "")
-        draw_errors(made, Box(0.0, top, WIDTH, high), one.errors, one.peaks, letters, title)
+        errors = one.errors
+        if not found.adds:
+            errors = {"baseline": errors["before"]} if "before" in errors else {}
+        draw_errors(made, Box(0.0, top, WIDTH, high), errors, one.peaks, letters, title)
     return made
 
 

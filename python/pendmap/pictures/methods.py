@@ -47,6 +47,7 @@ _LOOKS: Final = {
     "energy_balance": Look("energy balance", "#56b4e9", "--"),
     "model": Look("model", "#0072b2"),
     "before": Look("before", "#d55e00"),
+    "baseline": Look("baseline", "#d55e00"),
     "after": Look("after", "#0072b2"),
 }
 """Okabe and Ito's colours, for the methods that stand beside one another."""

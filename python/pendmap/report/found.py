@@ -12,7 +12,7 @@ from pendmap.discrepancy.summary import ranking_table
 from pendmap.model.effects import definition
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Formula, Items, Name, Paragraph, Picture, Section, Table
-from pendmap.report.wording import gained, joined, mrad, own_parameters, values
+from pendmap.report.wording import compared, gained, joined, mrad, own_parameters, share, values
 from pendmap.words import written
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def _parameters(found: Discrepancy) -> Table:
             )
         )
     head = ("parameter", "unit", "before", "after", "moved, standard errors")
-    return Table(head, tuple(rows), words=("unit",))
+    return compared(found, Table(head, tuple(rows), words=("unit",)))
 
 
 def _said(estimate: Estimate) -> str:
@@ -222,7 +222,7 @@ def run_by_run(found: Discrepancy) -> Section:
         shown = [(n, v, e) for n, (v, e) in zip(names, pairs, strict=True) if math.isfinite(e)]
         blind = [n for n, (_, e) in zip(names, pairs, strict=True) if not math.isfinite(e)]
         differ = (
-            f" Beyond noise they differ by {spread:.0%} of it."
+            f" Beyond noise they differ by {share(spread)} of it."
             if spread
             else " They differ by no more than noise."
         )
@@ -241,5 +241,6 @@ def run_by_run(found: Discrepancy) -> Section:
         ]
         if blind:
             blocks.append(Paragraph(("It does not show in ", *joined(blind), ".")))
-    blocks.append(Picture("runs", "Each run's own value, with bars of 95 %."))
+    if sizes:
+        blocks.append(Picture("runs", "Each run's own value, with bars of 95 %."))
     return Section("Run by run", tuple(blocks))

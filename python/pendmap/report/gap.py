@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.torque import STANDS_OUT
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
-from pendmap.report.wording import chance, joined, mrad, values
+from pendmap.report.wording import chance, compared, gained, joined, mrad, values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,7 +52,7 @@ def verdict(found: Discrepancy) -> Section:
     judged = found.judgement
     rests = [
         (
-            f"The slow part of what is left differs from that of noise by {judged.left:.2g} "
+            f"The slow part of what is left differs from that of noise by {gained(judged.left)} "
             "standard errors; above 5 something is left."
         ),
         (
@@ -66,8 +66,8 @@ def verdict(found: Discrepancy) -> Section:
     ]
     if len(found.evidence.fitted) > 1:
         rests.append(
-            f"The runs, each by itself, differ in their parameters by {judged.uneven:.2g} standard "
-            "errors; above 5 they do not agree."
+            f"The runs, each by itself, differ in their parameters by {gained(judged.uneven)} "
+            "standard errors; above 5 they do not agree."
         )
     blocks += [Paragraph("It rests on this:"), Items(tuple(rests))]
     return Section("Verdict", tuple(blocks))
@@ -94,24 +94,20 @@ def gap(found: Discrepancy) -> Iterator[Section]:
         )
         for run in own.by_run
     ]
-    parts = "Stretches of the free runs were held back" if found.evidence.inside else "Held back"
-    names = dict.fromkeys(run.name for run in found.evidence.held)
-    whole = not found.evidence.inside
-    back = (f"{parts}: ", *joined(names), ".") if whole else (f"{parts}.",)
+    names = joined(dict.fromkeys(run.name for run in found.evidence.held))
+    parts = "Stretches were held back of " if found.evidence.inside else "Held back: "
+    after = "; before is the baseline, after the model found" if found.adds else ""
     yield Section(
         "The gap",
         (
             Paragraph(
                 (
-                    (
-                        "Root mean squares of record less model; before is the baseline, after the "
-                        "model found. "
-                    ),
-                    *back,
-                    " No parameter was fitted to what was held back.",
+                    f"Root mean squares of record less model{after}. {parts}",
+                    *names,
+                    ". No parameter was fitted to that.",
                 )
             ),
-            Table(("residual", "before", "after", "noise"), (*rows, *each)),
+            compared(found, Table(("residual", "before", "after", "noise"), (*rows, *each))),
             Picture("gap", "Residual by run, and the error of forecasts against their horizon."),
             Picture("residuals", "Record less model where the baseline misses most."),
         ),
@@ -125,9 +121,12 @@ def gap(found: Discrepancy) -> Iterator[Section]:
                     "reading; its state at the start comes from the swing before. Root mean square "
                     "errors:"
                 ),
-                Table(
-                    ("runs", "ahead", "before", "after", "noise"),
-                    tuple(row for f in found.forecasts for row in _ahead(f)),
+                compared(
+                    found,
+                    Table(
+                        ("runs", "ahead", "before", "after", "noise"),
+                        tuple(row for f in found.forecasts for row in _ahead(f)),
+                    ),
                 ),
                 *_chaotic(found),
             ),
@@ -174,7 +173,7 @@ def where(found: Discrepancy) -> Iterator[Section]:
                 f"{STANDS_OUT:g} standard errors."
             )
         )
-    blocks.append(Picture("torque", "Torque that both models lack, with bands of 95 %."))
+    blocks.append(Picture("torque", "Torque that is lacking, with bands of 95 %."))
     yield Section("Where the gap is", tuple(blocks))
     rows: list[tuple[Text, ...]] = [
         (
@@ -188,7 +187,7 @@ def where(found: Discrepancy) -> Iterator[Section]:
         for one in found.cycles
     ]
     if rows:
-        head = ("free run", "periods before", "after", "peaks before", "after")
+        head = ("free run", "periods, before", "after", "peaks, before", "after")
         yield Section(
             "Periods and peaks",
             (
@@ -196,8 +195,8 @@ def where(found: Discrepancy) -> Iterator[Section]:
                     "Each model runs forward from the first measured peak, as in the paper's "
                     "figure 7. Root mean square errors:"
                 ),
-                Table(head, tuple(rows)),
-                Picture("figure_7", "Errors of simulated periods and peaks, before and after."),
+                compared(found, Table(head, tuple(rows))),
+                Picture("figure_7", "Errors of simulated periods and peaks."),
             ),
         )
 

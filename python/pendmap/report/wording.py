@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from pendmap.discrepancy.candidates import own_name
 from pendmap.pictures.names import unit_of
-from pendmap.report.document import Name, Strong
+from pendmap.report.document import Name, Strong, Table
 from pendmap.words import written
 
 if TYPE_CHECKING:
@@ -16,12 +16,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "chance",
+    "compared",
     "gained",
     "joined",
     "lead",
     "mrad",
     "own_parameters",
     "quantity",
+    "share",
     "unit",
     "values",
 ]
@@ -44,6 +46,11 @@ def chance(probability: float) -> str:
     if probability > 0.999:  # noqa: PLR2004 (as far as it is known)
         return "above 99.9 %"
     return f"{100 * probability:.3g} %" if probability >= 0.001 else "below 0.1 %"  # noqa: PLR2004
+
+
+def share(part: float) -> str:
+    """Return a part of something."""
+    return f"{100 * part:.0f} %"
 
 
 def joined(names: Iterable[str], last: str = "and") -> Parts:
@@ -93,11 +100,12 @@ def lead(found: Discrepancy) -> Parts:
             f"{mrad(gap.noise_floor)}.",
         )
     if found.verdict == "named":
+        with_it = "With them" if len(found.effects) > 1 else "With it"
         return (
             Strong("The model lacks"),
             " ",
             *names,
-            f". With it the residual on held-out data falls {to}; {noise}.",
+            f". {with_it} the residual on held-out data falls {to}; {noise}.",
         )
     if found.verdict == "ambiguous":
         alike = [joined(each, "or") for each in found.equivalent]
@@ -114,19 +122,30 @@ def lead(found: Discrepancy) -> Parts:
             ),
         )
     if found.verdict == "partial":
-        return (
-            Strong("The model lacks"),
-            " ",
-            *names,
-            f", and something more. It closes {closed:.0%} of the held-out gap, {to}; {noise}.",
-        )
+        verb = "They close" if len(found.effects) > 1 else "It closes"
+        end = f", and something more. {verb} {share(closed)} of the held-out gap, {to}; {noise}."
+        return (Strong("The model lacks"), " ", *names, end)
     near: Parts = ()
     if nearest:
-        near = (" What comes nearest is ", *joined(nearest), "; it is not claimed.")
+        verb = "close" if len(nearest) > 1 else "closes"
+        end = f", {verb} {share(closed)} of the gap; no name is claimed."
+        near = (" What comes nearest, ", *joined(nearest), end)
     return (
         Strong("Something is missing that no effect of the library explains"),
         f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}.",
         *near,
+    )
+
+
+def compared(found: Discrepancy, table: Table) -> Table:
+    """Return a table without what stands under ``after`` where the model stays the baseline."""
+    if found.adds:
+        return table
+    kept = [k for k, name in enumerate(table.head) if not name.startswith(("after", "moved"))]
+    return Table(
+        tuple(table.head[k].replace("before", "baseline") for k in kept),
+        tuple(tuple(row[k] for k in kept) for row in table.rows),
+        table.words,
     )
 
 

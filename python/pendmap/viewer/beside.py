@@ -140,9 +140,8 @@ _LEGEND: Final = rrb.Corner2D.RightTop
 
 def log(stream: rr.RecordingStream, root: str, one: Beside, larger: float) -> None:
     """Log one run."""
-    models = ((BEFORE, one.before), (AFTER, one.after))
     series.log(stream, f"{root}/angle/record", one.time, one.record, RECORD)
-    for look, left in models:
+    for look, left in ((BEFORE, one.before), (AFTER, one.after)):
         series.log(stream, f"{root}/angle/{look.name}", one.time, one.record - left, look)
     _residuals(stream, f"{root}/residual", one)
     _pendulums(stream, f"{root}/pendulum", one, larger)
