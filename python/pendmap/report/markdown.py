@@ -17,8 +17,10 @@ __all__ = ["as_markdown"]
 SPECIAL: Final = re.compile(r"([\\`*_{}\[\]<>#|~$&!])")
 """What Markdown would take for a mark."""
 
-AHEAD: Final = re.compile(r"^(\s*)([-+=]|\d+(?=[.)]))")
+AHEAD: Final = re.compile(r"^(\s*\d*)([-+=.)])")
 """What it would take for one where a line begins."""
+
+FENCE: Final = "```"
 
 
 def as_markdown(document: Document, pictures: Mapping[str, str]) -> str:
@@ -43,7 +45,8 @@ def _block(block: Block, pictures: Mapping[str, str]) -> Iterator[str]:
     if isinstance(block, Paragraph):
         yield _line(block.text)
     elif isinstance(block, Formula):
-        yield from (f"    {line}" for line in block.text.splitlines())
+        # A fence: indented lines after a list would belong to its last item.
+        yield from (FENCE, *block.text.splitlines(), FENCE)
     elif isinstance(block, Items):
         yield from (f"- {_line(text)}" for text in block.texts)
     elif isinstance(block, Table):
@@ -60,7 +63,7 @@ def _row(cells: tuple[Text, ...]) -> str:
 
 def _line(text: Text) -> str:
     """Return a text that stands at the beginning of a line."""
-    return AHEAD.sub(r"\1\\\2" if isinstance(text, str) else r"\g<0>", _inline(text))
+    return AHEAD.sub(r"\1\\\2", _inline(text))
 
 
 def _inline(text: Text, *, table: bool = False) -> str:
