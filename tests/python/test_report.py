@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 from markdown_it import MarkdownIt
+from matplotlib import rc_context
 
 from hidden import once
 from pendmap import InputError, figures, report
 from pendmap.discrepancy.summary import as_json
+from pendmap.figures import discrepancy, style
+from pendmap.figures.report import FIGURES
 from pendmap.report.document import (
     Document,
     Formula,
@@ -212,3 +215,19 @@ def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command
     text = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
     assert "Stretches were held back of `run_00`" in text
     assert "| forced |" not in text
+
+
+def test_nothing_of_its_figures_is_cut() -> None:
+    found = once("quadratic_drag")
+    with rc_context(style.RC):
+        drawn = [draw(found, 60.0) for draw in FIGURES.values()]
+        drawn.append(discrepancy.figure(found, dpi=60.0))
+        for figure in drawn:
+            assert figure is not None
+            figure.canvas.draw()
+            drawn_in = figure.get_tightbbox()
+            width, height = figure.get_size_inches()
+            assert drawn_in.x0 > 0
+            assert drawn_in.y0 > 0
+            assert drawn_in.x1 < width
+            assert drawn_in.y1 < height
