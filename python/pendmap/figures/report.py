@@ -106,7 +106,7 @@ def figure_7(found: Discrepancy, dpi: float) -> Figure | None:
     if not runs:
         return None
     high = 3.0
-    size, said = (WIDTH, high * len(runs) + 0.6), "from the first measured peak on"
+    size, said = (WIDTH, high * len(runs) + 0.72), "from the first measured peak on"
     made = sheets.headed(size, dpi, "Simulated periods and peaks", said, left=0.1)
     letters: Iterator[str] = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
     top = high * len(runs)
