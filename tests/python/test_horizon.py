@@ -11,6 +11,7 @@ import pytest
 from hidden import once
 from pendmap import Rig
 from pendmap.discrepancy import diagnosed_model
+from pendmap.discrepancy.horizon import forecasts_of
 from pendmap.discrepancy.replay import Motion, replayed
 from pendmap.discrepancy.strength import strength_of
 from pendmap.identification import compare
@@ -79,3 +80,24 @@ def test_the_strength_of_a_drag_is_its_torque(found: Discrepancy) -> None:
     assert strength.torque == pytest.approx(q * np.sqrt(np.mean(speeds**4)), rel=0.25)
     assert strength.greatest_torque <= 1.001 * q * np.max(speeds**2)
     assert strength.reading == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.1, 1e3 / 3])
+def test_a_forecast_is_compared_with_the_readings_of_its_time(
+    begin: float, found: Discrepancy
+) -> None:
+    """Wherever clocks begin: a reading early or late would be off by the way of a sample."""
+    evidence = found.evidence
+    held = tuple(
+        dataclasses.replace(
+            run,
+            time=run.time + begin,
+            # What the drive's phase counts from is its own clock.
+            drive=run.drive
+            and {**run.drive, "phi": float(run.drive["phi"]) - float(run.drive["Omega"]) * begin},
+        )
+        for run in evidence.held
+    )
+    moved = forecasts_of(dataclasses.replace(evidence, held=held), found.base, found.best)
+    for forecast, usual in zip(moved, found.forecasts, strict=True):
+        np.testing.assert_allclose(forecast.after, usual.after, rtol=0.1)

@@ -142,7 +142,7 @@ def _forecast(
     which, floors = [], []
     for stretch, at in starts:
         ahead = stretch.run.time - at
-        counts = stretch.held & (ahead > 0) & (ahead <= reach)
+        counts = _ahead(stretch, at, reach)
         bins = np.minimum((ahead[counts] / reach * count).astype(int), count - 1)
         which.append((counts, bins))
         sigma = np.broadcast_to(np.asarray(stretch.run.sigma, float), ahead.shape)
@@ -173,7 +173,12 @@ def _starts(stretch: _Stretch, reach: float, swing: float) -> list[float]:
 
 def _behind(stretch: _Stretch, at: float, swing: float) -> NDArray[np.bool_]:
     time = stretch.run.time
-    return np.asarray(stretch.good & (time > at - swing) & (time <= at))
+    return np.asarray(stretch.good & (time - at > -swing) & (time - at <= 0))
+
+
+def _ahead(stretch: _Stretch, at: float, reach: float) -> NDArray[np.bool_]:
+    ahead = stretch.run.time - at
+    return np.asarray(stretch.held & (ahead > 0) & (ahead <= reach))
 
 
 def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are sorted)
@@ -190,8 +195,7 @@ def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are so
         run = dataclasses.replace(stretch.run, drive=drives(found, stretch.run, stretch.place))
         behind = _behind(stretch, at, swing)
         before.append(_of(run, behind))
-        ahead = (run.time > at) & (run.time <= at + reach) & stretch.held
-        whole.append(_of(run, behind | ahead))
+        whole.append(_of(run, behind | _ahead(stretch, at, reach)))
     try:
         motion = Motion.of(found)
         states = settled(motion, before, [_guess(run, swing) for run in before])
