@@ -30,7 +30,7 @@ PLUS: Final = "\N{PLUS-MINUS SIGN}"
 RIVALS: Final = 4
 """Rivals of an effect that are shown."""
 
-EQUATION: Final = "th'' + (c/m) th' + w0^2 (1 + a(t)) sin th = -Tr sign(th')"
+EQUATION: Final = "theta'' + (c/m) theta' + w0^2 (1 + a(t)) sin(theta) = -Tr sign(theta')"
 """The model to begin with, as the paper has it."""
 
 
@@ -46,20 +46,26 @@ def added(found: Discrepancy) -> Section:
             ),
         )
     blocks: list[Block] = []
-    terms = []
+    terms, meant = [], ["v = theta'", "a the pivot's acceleration over gravity"]
     for effect in found.effects:
         entry = definition(effect.name)
         if entry["group"] not in {"drive", "reading"}:
-            terms.append(entry["formula"])
+            term, _, said = str(entry["formula"]).partition(", ")
+            terms.append((_signed(term), effect.name))
+            meant += [said] if said else []
+    if len(terms) == 1:
+        blocks.append(Formula(f"{EQUATION} {terms[0][0]}"))
+    elif terms:
+        wide = max(len(term) for term, _ in terms)
+        lines = (f"    {term:{wide}}   ({name})" for term, name in terms)
+        blocks.append(Formula("\n".join([EQUATION, *lines])))
     if terms:
-        blocks += [
-            Formula(" ".join([EQUATION, *map(_signed, terms)])),
-            Paragraph("with th the angle, v = th' and a the pivot's acceleration over gravity."),
-        ]
+        blocks.append(Paragraph(f"with {'; '.join(meant)}."))
     for effect in found.effects:
         entry = definition(effect.name)
         if entry["group"] in {"drive", "reading"}:
-            blocks.append(Paragraph((f"In the {entry['group']}: ", Name(entry["formula"]))))
+            where = "drive" if entry["group"] == "drive" else "sensor"
+            blocks.append(Paragraph((f"In the {where}: ", Name(entry["formula"]), ".")))
     blocks.append(
         Items(tuple((*values(effect), *_strength(found, effect)) for effect in found.effects))
     )

@@ -26,6 +26,9 @@ SAID: Final = {
     "unknown": "something is missing that no effect of the library explains. No name is claimed.",
 }
 
+RARE: Final = 1e-9
+"""Probabilities below this say no more than that."""
+
 PLACES: Final[dict[str, str]] = {
     "angle": "at an angle of",
     "velocity": "at a velocity of",
@@ -61,7 +64,7 @@ def verdict(found: Discrepancy) -> Section:
         ),
         (
             f"Noise alone would leave such a torque over angle, velocity, amplitude, phase or time "
-            f"with a probability of {judged.chance:.2g}."
+            f"with a probability {_rare(judged.chance)}."
         ),
     ]
     if len(found.evidence.fitted) > 1:
@@ -71,6 +74,10 @@ def verdict(found: Discrepancy) -> Section:
         )
     blocks += [Paragraph("It rests on this:"), Items(tuple(rests))]
     return Section("Verdict", tuple(blocks))
+
+
+def _rare(probability: float) -> str:
+    return f"of {probability:.2g}" if probability > RARE else f"below {RARE:g}"
 
 
 def _of(probability: float) -> str:

@@ -50,7 +50,7 @@ def chance(probability: float) -> str:
 
 def share(part: float) -> str:
     """Return a part of something."""
-    return f"{100 * part:.0f} %"
+    return f"{100 * part:.3g} %" if part > 0.99 else f"{100 * part:.0f} %"  # noqa: PLR2004
 
 
 def joined(names: Iterable[str], last: str = "and") -> Parts:
@@ -123,12 +123,12 @@ def lead(found: Discrepancy) -> Parts:
         )
     if found.verdict == "partial":
         verb = "They close" if len(found.effects) > 1 else "It closes"
-        end = f", and something more. {verb} {share(closed)} of the held-out gap, {to}; {noise}."
+        end = f", and something more. {verb} {share(closed)} of the squared gap, {to}; {noise}."
         return (Strong("The model lacks"), " ", *names, end)
     near: Parts = ()
     if nearest:
         verb = "close" if len(nearest) > 1 else "closes"
-        end = f", {verb} {share(closed)} of the gap; no name is claimed."
+        end = f", {verb} {share(closed)} of its squared gap; no name is claimed."
         near = (" What comes nearest, ", *joined(nearest), end)
     return (
         Strong("Something is missing that no effect of the library explains"),
