@@ -1,4 +1,4 @@
-"""Make the pictures of the README: `python docs/pictures.py`, from anywhere."""
+"""Make the pictures of the README and the pages here: `python docs/pictures.py`, from anywhere."""
 
 from __future__ import annotations
 
@@ -11,7 +11,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pendmap import Pendulum, Rig, basins, figures, paper_figures, read_experiment, simulate
+from pendmap import (
+    Pendulum,
+    Rig,
+    basins,
+    figures,
+    paper_figures,
+    read_experiment,
+    simulate,
+    virtual_rig,
+)
+from pendmap.discrepancy import diagnose
 from pendmap.figures import style
 
 HERE = Path(__file__).resolve().parent
@@ -94,9 +104,19 @@ def identification() -> None:
     )
 
 
+def diagnosis() -> None:
+    """The report of docs/diagnose.md: what is hidden is named, and the gap shrinks."""
+    with tempfile.TemporaryDirectory() as folder:
+        request = virtual_rig.Request("hidden", seed=3, effects=("quadratic_drag",))
+        places = virtual_rig.places(Path(folder) / "lab", replace=True)
+        virtual_rig.write(virtual_rig.make(request), places)
+        figures.write_report(diagnose(read_experiment(places.experiment)), HERE / "lab.md")
+
+
 if __name__ == "__main__":
     figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
     figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
     friction()
     record()
     identification()
+    diagnosis()

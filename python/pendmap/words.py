@@ -1,10 +1,29 @@
-"""Words that depend on numbers."""
+"""Words and digits that depend on numbers."""
 
 from __future__ import annotations
 
-__all__ = ["counted"]
+import math
+from typing import Final
+
+__all__ = ["counted", "written"]
+
+DIGITS: Final = 5
+"""Digits of a number whose uncertainty is not known."""
+
+PLACES: Final = 10
+"""Places after the point up to which a number is written out."""
 
 
 def counted(count: int, noun: str) -> str:
     """Return ``1 period``, ``2 periods``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def written(value: float, width: float) -> str:
+    """Return a number with two digits of its uncertainty, five where that is unknown: 0."""
+    if not (math.isfinite(value) and math.isfinite(width)):
+        return f"{value:g}"
+    if not width:
+        return f"{value:.{DIGITS}g}"
+    places = max(1 - math.floor(math.log10(width)), 0)
+    return f"{value:.{places}f}" if places <= PLACES else f"{value:.3g}"

@@ -4,7 +4,10 @@ before the diagnosis is there.
 
 from __future__ import annotations
 
+import functools
+import tempfile
 import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pendmap import virtual_rig
@@ -13,7 +16,6 @@ from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
 
 def diagnosed(
@@ -30,3 +32,10 @@ def diagnosed(
     found = diagnose(read_experiment(where.experiment), without=without)
     truth = tomllib.loads(where.truth.read_text(encoding="utf-8"))
     return found, {e["name"]: e["parameters"] for e in truth.get("effect", [])}
+
+
+@functools.cache
+def once(*effects: str, **given: Any) -> Discrepancy:  # noqa: ANN401 (what the rig is asked for)
+    """Hide effects and diagnose the experiment, once for all tests that look at the result."""
+    with tempfile.TemporaryDirectory() as folder:
+        return diagnosed(Path(folder), *effects, **given)[0]

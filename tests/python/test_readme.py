@@ -1,4 +1,4 @@
-"""What README.md promises is run."""
+"""What README.md and the pages in docs promise is run."""
 
 from __future__ import annotations
 
@@ -16,22 +16,27 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language: str, text: str = README) -> list[str]:
     """All code blocks in a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def commands() -> list[list[str]]:
+def commands(text: str = README) -> list[list[str]]:
     """All commands, as words."""
-    lines = [line for block in blocks("sh") for line in block.splitlines()]
+    lines = [line for block in blocks("sh", text) for line in block.splitlines()]
     return [shlex.split(line, comments=True) for line in lines]
 
 
-def test_every_command_runs(pendmap_command: Run) -> None:
-    words = [line for line in commands() if line[0] == "pendmap"]
-    assert len(words) >= 7
+SNIPPETS = [code for page in PAGES for code in blocks("python", page.read_text(encoding="utf-8"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_runs(page: Path, pendmap_command: Run) -> None:
+    words = [line for line in commands(page.read_text(encoding="utf-8")) if line[0] == "pendmap"]
+    assert len(words) >= {"README.md": 7, "diagnose.md": 5}.get(page.name, 0)
     for line in words:
         run = pendmap_command(*line[1:])
         assert run.returncode == 0, f"{line}: {run.stderr}"
@@ -50,7 +55,7 @@ def test_make_knows_the_other_commands() -> None:
             assert "pendmap basins --p 1.7" in run.stdout
 
 
-@pytest.mark.parametrize("code", blocks("python"))
+@pytest.mark.parametrize("code", SNIPPETS)
 def test_every_snippet_runs(code: str, tmp_path: Path) -> None:
     run = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
@@ -66,7 +71,8 @@ def test_every_model_file_is_one(text: str, tmp_path: Path, pendmap_command: Run
     assert run.returncode == 0, run.stderr
 
 
-def test_every_link_leads_somewhere() -> None:
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(<?([^)#>]+)>?\)", page.read_text(encoding="utf-8")):
         if not target.startswith("http"):
-            assert (ROOT / target).exists(), target
+            assert (page.parent / target).exists(), target

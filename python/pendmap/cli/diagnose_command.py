@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.show import plain, progress_bar, write_all, write_table
-from pendmap.cli.types import OutputFile, Whole
+from pendmap.cli.options import check_view
+from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
+from pendmap.cli.types import OutputFile, ReportFile, Whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-NAME = "diagnose.toml"
+NAME = "diagnose"
 
 
 @click.command("diagnose")
@@ -41,8 +42,18 @@ NAME = "diagnose.toml"
 @click.option(
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
-@click.option("--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}]")
+@click.option(
+    "--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}.toml]"
+)
 @click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@click.option(
+    "--report",
+    type=ReportFile(),
+    metavar="FILE|DIR",
+    help="Report: .html with its figures in it, .md with them beside it, or a folder with both.",
+)
+@click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd.")
+@click.option("--view", is_flag=True, help="Write the recording and open the viewer on it.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(  # noqa: PLR0913 (an option each)
@@ -53,6 +64,9 @@ def command(  # noqa: PLR0913 (an option each)
     without: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
+    report: Path | None,
+    rerun: Path | None,
+    view: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -61,7 +75,8 @@ def command(  # noqa: PLR0913 (an option each)
     EXPERIMENT is a file with times and angles, or a folder with an experiment.toml. Every effect of
     the library is scored; the verdict is none, named, partial, ambiguous or unknown. The model with
     the effects found is written to diagnose.toml, for --model of every other command; where no
-    output is named, a figure to diagnose.png too.
+    output is named, a figure, a report and a recording too: diagnose.png, diagnose.html and
+    diagnose.rrd.
     """
     # The matrices are tall and narrow: threads for them cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -71,9 +86,12 @@ def command(  # noqa: PLR0913 (an option each)
 
     for name in without:
         definition(name)
-    if out is None and plot is None and not as_json:
-        plot = OutputFile([".png"]).convert(f"{Path(NAME).stem}.png", None, None)
-    out = out or OutputFile([".toml"]).convert(NAME, None, None)
+    if not (out or plot or report or rerun or view or as_json):
+        plot, report, rerun = (_own(suffix) for suffix in (".png", ".html", ".rrd"))
+    if view:
+        check_view()
+        rerun = rerun or _own(".rrd")
+    outputs = (out or _own(".toml"), plot, report, rerun)
     model = None if model_path is None else _si(model_path)
     shown = sys.stderr.isatty() and not quiet
     with progress_bar("read", shown=shown):
@@ -83,7 +101,7 @@ def command(  # noqa: PLR0913 (an option each)
             experiment, model=model, max_effects=max_effects, without=without, progress=progress
         )
     with progress_bar("write", shown=shown):
-        written = write_all(_files(found, out, plot, "pendmap " + shlex.join(sys.argv[1:])))
+        written = write_all(_files(found, outputs, "pendmap " + shlex.join(sys.argv[1:])))
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 
@@ -91,6 +109,13 @@ def command(  # noqa: PLR0913 (an option each)
     elif not quiet:
         _say(found)
         click.echo("Written: " + ", ".join(written))
+    if view and rerun is not None:
+        open_recording(rerun)
+
+
+def _own(suffix: str) -> Path:
+    """Return a file under the command's own name, where one can be written."""
+    return OutputFile([suffix]).convert(f"{NAME}{suffix}", None, None)
 
 
 def _si(path: Path) -> Rig:
@@ -100,16 +125,25 @@ def _si(path: Path) -> Rig:
 
 
 def _files(
-    found: Discrepancy, out: Path, plot: Path | None, line: str
+    found: Discrepancy, outputs: tuple[Path, Path | None, Path | None, Path | None], line: str
 ) -> Iterator[tuple[Callable[[Path], Path], Path]]:
     from pendmap.discrepancy import diagnosed_model
     from pendmap.model import save_model
 
+    out, plot, report, rerun = outputs
     yield functools.partial(save_model, diagnosed_model(found, line)), out
     if plot is not None:
         from pendmap import figures
 
         yield functools.partial(figures.draw_discrepancy, found), plot
+    if report is not None:
+        from pendmap import figures
+
+        yield functools.partial(figures.write_report, found), report
+    if rerun is not None:
+        from pendmap import viewer
+
+        yield functools.partial(viewer.record_discrepancy, found), rerun
 
 
 def _say(found: Discrepancy) -> None:

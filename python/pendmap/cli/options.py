@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Command = Callable[..., Any]
     Decorator = Callable[[Command], Command]
 
-__all__ = ["RESULTS", "Outputs", "output_options", "progress_options"]
+__all__ = ["RESULTS", "Outputs", "check_view", "output_options", "progress_options"]
 
 
 def progress_options(function: Command) -> Command:
@@ -60,7 +60,7 @@ def output_options(suffixes: tuple[str, ...] = RESULTS, what: str = "Result") ->
     return add
 
 
-def _can_view() -> None:
+def check_view() -> None:
     """Refuse --view before anything is computed where no window can open."""
     from pendmap import viewer
 
@@ -98,7 +98,7 @@ class Outputs:
             rrd = OutputFile([".rrd"]).convert(f"{name}.rrd", None, None)
             outputs = dataclasses.replace(outputs, rerun=rrd)
         if outputs.view:
-            _can_view()
+            check_view()
         return outputs
 
     @property

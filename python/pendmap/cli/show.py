@@ -21,7 +21,15 @@ if TYPE_CHECKING:
 
     from pendmap.cli.options import Outputs
 
-__all__ = ["open_viewer", "plain", "progress_bar", "show", "write_all", "write_table"]
+__all__ = [
+    "open_recording",
+    "open_viewer",
+    "plain",
+    "progress_bar",
+    "show",
+    "write_all",
+    "write_table",
+]
 
 
 @contextlib.contextmanager
@@ -80,12 +88,17 @@ def write_all(files: Iterable[tuple[Callable[[Path], Path], Path]]) -> list[str]
 def open_viewer(outputs: Outputs) -> None:
     """Open the viewer on the recording, where that was asked for."""
     if outputs.view and outputs.rerun is not None:
-        from pendmap import viewer
+        open_recording(outputs.rerun)
 
-        try:
-            viewer.open_viewer(outputs.rerun)
-        except viewer.ViewerError as error:
-            raise click.ClickException(str(error)) from error
+
+def open_recording(path: Path) -> None:
+    """Open the viewer on a recording."""
+    from pendmap import viewer
+
+    try:
+        viewer.open_viewer(path)
+    except viewer.ViewerError as error:
+        raise click.ClickException(str(error)) from error
 
 
 def _files(outputs: Outputs) -> Iterator[tuple[Callable[[xr.Dataset, Path], Path], Path]]:

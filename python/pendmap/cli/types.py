@@ -14,7 +14,7 @@ from pendmap.checks import MOST_CELLS, shown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["AXIS", "NUMBER", "AxisText", "OutputFile", "Whole"]
+__all__ = ["AXIS", "NUMBER", "AxisText", "OutputFile", "ReportFile", "Whole"]
 
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
@@ -120,6 +120,28 @@ class OutputFile(click.ParamType[Path]):
         if path.is_dir() and path.suffix.lower() != ".zarr":
             self.fail(f"{str(path)!r}: is a folder", param, ctx)
         if not _writable(path):
+            self.fail(f"{str(path)!r}: cannot be written there", param, ctx)
+        return path
+
+
+class ReportFile(OutputFile):
+    """A report to write: a file, or a folder that is made where it does not exist."""
+
+    def __init__(self) -> None:
+        super().__init__([".html", ".md"])
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Path:
+        """Refuse what cannot be written."""
+        path = Path(str(value))
+        if path.suffix and not path.is_dir():
+            return super().convert(value, param, ctx)
+        if path.exists() and not path.is_dir():
+            self.fail(f"{str(path)!r}: is a file: allowed is a folder, .html or .md", param, ctx)
+        if not path.parent.is_dir():
+            self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
+        if not _writable(path / "report.html" if path.is_dir() else path):
             self.fail(f"{str(path)!r}: cannot be written there", param, ctx)
         return path
 

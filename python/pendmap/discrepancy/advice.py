@@ -72,15 +72,14 @@ def _sentence(judgement: Judgement) -> str:
         )
     wanted = []
     for standing in judgement.standings:
-        for rival in standing.rivals[:1]:
+        for rival in [rival for rival in standing.rivals if rival.alike][:1]:
             power = rival.separation * standing.gain
-            if rival.alike:
-                wanted.append(
-                    f"{standing.candidate.name} and {rival.candidate.name} differ by s G = "
-                    f"{power:.2g} here, 25 are needed: record "
-                    f"{definition(standing.candidate.name)['revealed_by']}, "
-                    f"and {definition(rival.candidate.name)['revealed_by']}"
-                )
+            wanted.append(
+                f"{standing.candidate.name} and {rival.candidate.name} differ by s G = "
+                f"{power:.2g} here, 25 are needed: record "
+                f"{definition(standing.candidate.name)['revealed_by']}, "
+                f"and {definition(rival.candidate.name)['revealed_by']}"
+            )
     if wanted:
         return "; ".join(wanted) + "."
     return (

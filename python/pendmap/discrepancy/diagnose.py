@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.advice import Advice, advice_of
 from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.cycles import Cycles, cycles_of
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.gap import Gap, gap_of
+from pendmap.discrepancy.horizon import Forecast, forecasts_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
 from pendmap.discrepancy.runs import RunByRun, run_by_run
 from pendmap.discrepancy.select import Attempt, Search
@@ -103,6 +106,21 @@ class Discrepancy(Readable):
             return []
         classes = (standing.equivalent for standing in self.judgement.standings)
         return [names for names in classes if len(names) > 1]
+
+    @property
+    def adds(self) -> bool:
+        """Whether the best model is another than the baseline."""
+        return self.best is not self.base
+
+    @functools.cached_property
+    def forecasts(self) -> tuple[Forecast, ...]:
+        """How the error of both models grows with the horizon, on what was held back."""
+        return forecasts_of(self.evidence, self.base, self.best)
+
+    @functools.cached_property
+    def cycles(self) -> tuple[Cycles, ...]:
+        """Periods and peaks of each free run against those of both models."""
+        return cycles_of(self.evidence, self.base, self.best)
 
 
 def diagnose(

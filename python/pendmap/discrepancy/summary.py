@@ -61,6 +61,26 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 for run in gap.by_run
             ],
         },
+        "forecast": [
+            {
+                "runs": forecast.kind,
+                "starts": forecast.starts,
+                "noise_floor": forecast.noise_floor,
+                "horizon_s": forecast.horizon.tolist(),
+                "before": forecast.before.tolist(),
+                "after": forecast.after.tolist(),
+            }
+            for forecast in found.forecasts
+        ],
+        "cycles": [
+            {
+                "name": one.name,
+                "held_out": one.held_out,
+                "period_rms_percent": {m: e.period_rms for m, e in one.errors.items()},
+                "peak_rms_percent": {m: e.peak_rms for m, e in one.errors.items()},
+            }
+            for one in found.cycles
+        ],
         "where": found.where,
         "next_experiment": found.advice.next_experiment,
         "detection_limits": found.advice.limits,

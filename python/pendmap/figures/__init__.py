@@ -37,6 +37,7 @@ __all__ = [
     "draw_pendulum",
     "draw_record",
     "draw_runs",
+    "write_report",
 ]
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -189,8 +190,9 @@ def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     """Draw a diagnosis into a file.
 
     The residuals of the runs that the baseline misses most, before and after, over the noise; the
-    torque that each model lacks over angle and velocity, with 95 % intervals; the scores of the
-    candidates; the first effect's size run by run.
+    residual by run, and the error of forecasts against their horizon; the torque that each model
+    lacks over angle and velocity, with 95 % intervals; the scores of the candidates; the first
+    effect's size run by run.
 
     Parameters
     ----------
@@ -216,6 +218,41 @@ def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         style.write(discrepancy.figure(found, dpi=style.resolution(None)), part)
     return Path(path)
+
+
+def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
+    """Write the report of a diagnosis with its figures.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        What ``pendmap.discrepancy.diagnose`` returned.
+    path : str or path
+        ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
+        beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.
+
+    Returns
+    -------
+    Path
+        The file or folder. Each file is complete; existing ones are replaced.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If a file cannot be written.
+    """
+    from pendmap.figures import report  # noqa: PLC0415 (scipy takes a while)
+
+    target = Path(path)
+    if target.suffix.lower() not in {"", *report.SUFFIXES} and not target.is_dir():
+        allowed = ", ".join(report.SUFFIXES)
+        raise InputError(
+            f"cannot write {str(target)!r}: suffix {target.suffix!r}, allowed are {allowed}, or a "
+            "folder"
+        )
+    return report.write(found, target)
 
 
 def draw_runs(

@@ -26,6 +26,7 @@ __all__ = [
     "Row",
     "State",
     "Table1",
+    "errors_of",
     "first_state",
     "peak_errors",
     "table1",
@@ -169,15 +170,32 @@ def peak_errors(
     origin = dataclasses.replace(start, theta=start.theta - zero)
     span = float(turned.time[-1]) - start.time
     times, angles = simulated_peaks(found.rig, origin, start.time + 1.2 * span + 5.0)
+    return errors_of(found.method, peaks, times, angles + shown)
+
+
+def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakErrors:
+    """Compare simulated peaks with measured ones, number by number.
+
+    Parameters
+    ----------
+    method : str
+        What the simulation is called.
+    peaks : Peaks
+        The measured ones.
+    times, angles : array, shape (n,)
+        The simulated ones from the first measured peak on, s and rad, as the sensor would read
+        them.
+    """
+    turned = peaks.turned
     number = turned.index - turned.index[0]
     made_time, made = (np.full(int(number[-1]) + 1, math.nan) for _ in range(2))
     size = min(made.size, times.size)
-    made_time[:size], made[:size] = times[:size], angles[:size] + shown
+    made_time[:size], made[:size] = times[:size], angles[:size]
     at = np.flatnonzero(turned.index[2:] - turned.index[:-2] == 2)  # noqa: PLR2004 (one cycle)
     period = turned.time[at + 2] - turned.time[at]
     other = made_time[number[at + 2]] - made_time[number[at]]
     return PeakErrors(
-        method=found.method,
+        method=method,
         period_time=turned.time[at],
         period=period,
         period_error=100 * (other - period) / period,

@@ -46,6 +46,9 @@ _LOOKS: Final = {
     "de_paula": Look("de Paula", "#cc79a7"),
     "energy_balance": Look("energy balance", "#56b4e9", "--"),
     "model": Look("model", "#0072b2"),
+    "before": Look("before", "#d55e00"),
+    "baseline": Look("baseline", "#d55e00"),
+    "after": Look("after", "#0072b2"),
 }
 """Okabe and Ito's colours, for the methods that stand beside one another."""
 _OTHER: Final = "#8a8a8a"

@@ -1,7 +1,8 @@
 """Recordings for the Rerun viewer; the only place that imports rerun.
 
 ``record`` looks at what a dataset holds and writes its recording, ``record_identification`` writes
-that of what was found in records; ``open_viewer`` shows one.
+that of what was found in records, ``record_discrepancy`` that of what a model lacks;
+``open_viewer`` shows one.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pendmap.errors import InputError
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
 from pendmap.viewer import basins, frame, trajectory
+from pendmap.viewer.discrepancy import record_discrepancy
 from pendmap.viewer.identification import record_identification
 from pendmap.viewer.window import (
     NoDisplayError,
@@ -37,6 +39,7 @@ __all__ = [
     "check_display",
     "open_viewer",
     "record",
+    "record_discrepancy",
     "record_identification",
 ]
 

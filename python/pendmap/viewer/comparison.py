@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport
     from pendmap.records import Run
 
-__all__ = ["INSTANTS", "PER_SWING", "Comparison", "comparisons"]
+__all__ = ["INSTANTS", "PER_SWING", "Comparison", "comparisons", "drawn_at"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -164,21 +164,14 @@ def _drawn(
     run: Run, columns: tuple[Floats, Floats, Floats], peaks: Peaks, w0: float, sigma: float
 ) -> Comparison:
     """Return model, its velocity and the residual beside a run, thinned and cut at gaps."""
-    time = run.time
-    step = float(np.median(np.diff(time)))
-    swing = math.tau / w0 / step if w0 else math.inf
-    every = max(1, min(-(-time.size // INSTANTS), int(min(swing, time.size) / PER_SWING)))
-    kept = slice(None, None, every)
-    chosen = time[kept]
-    cuts = np.flatnonzero(np.diff(chosen) > GAP * every * step) + 1
-    ends = (chosen[cuts - 1] + chosen[cuts]) / 2
+    step = float(np.median(np.diff(run.time)))
+    kept, cuts, instants = drawn_at(run.time, w0)
     model, model_speed, residual = columns
     record, speed, made, made_speed, left = (
         np.insert(column[kept], cuts, math.nan)
         for column in (run.theta, _speed(run, w0, step), model, model_speed, residual)
     )
     there = bool(np.isfinite(made).any())
-    instants = np.insert(chosen, cuts, ends)
     return Comparison(
         name=run.name,
         time=instants,
@@ -192,6 +185,32 @@ def _drawn(
         peaks=_in_turn(peaks, run),
         sigma=sigma,
     )
+
+
+def drawn_at(time: Floats, w0: float) -> tuple[slice, npt.NDArray[np.int64], Floats]:
+    """Return which samples of a run are drawn, where gaps cut them, and the instants.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        s.
+    w0 : float
+        Natural frequency, rad/s; 0 where it is not known.
+
+    Returns
+    -------
+    slice, ndarray of int, ndarray
+        The samples kept; places among these where a row without numbers belongs; the instants of
+        all rows, s.
+    """
+    step = float(np.median(np.diff(time)))
+    swing = math.tau / w0 / step if w0 else math.inf
+    every = max(1, min(-(-time.size // INSTANTS), int(min(swing, time.size) / PER_SWING)))
+    kept = slice(None, None, every)
+    chosen = time[kept]
+    cuts = np.flatnonzero(np.diff(chosen) > GAP * every * step) + 1
+    ends = (chosen[cuts - 1] + chosen[cuts]) / 2
+    return kept, cuts, np.insert(chosen, cuts, ends)
 
 
 def _speed(run: Run, w0: float, step: float) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -13,8 +13,9 @@ import rerun.blueprint as rrb
 
 from pendmap.model.units import Units
 from pendmap.pictures import names, plane
-from pendmap.viewer import columns, frame
+from pendmap.viewer import columns, frame, series
 from pendmap.viewer.columns import Look
+from pendmap.viewer.series import Series
 
 if TYPE_CHECKING:
     from pendmap.viewer.comparison import Comparison
@@ -22,17 +23,6 @@ if TYPE_CHECKING:
 __all__ = ["log", "views"]
 
 Floats = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Series:
-    """Name and colour of a time series; lines have a width, points a size."""
-
-    name: str
-    colour: tuple[int, int, int]
-    width: float = 0.0
-    size: float = 3.0
-
 
 # The model is drawn broad, and the record thin upon it: so both are seen where they agree.
 RECORD: Final = Series("record", (230, 159, 0), 1.2)
@@ -143,35 +133,15 @@ def log(stream: rr.RecordingStream, root: str, one: Comparison, w0: float) -> No
     _phase(stream, f"{root}/phase/data", one)
 
 
-def _series(
-    stream: rr.RecordingStream, path: str, time: Floats, values: Floats, look: Series
-) -> None:
-    """Log a time series, if it has any instant; a line is thinned to its lowest and highest."""
-    if not time.size:
-        return
-    style: rr.SeriesLines | rr.SeriesPoints = (
-        rr.SeriesLines(
-            colors=[look.colour],
-            names=[look.name],
-            widths=[look.width],
-            aggregation_policy=rr.components.AggregationPolicy.MinMax,
-        )
-        if look.width
-        else rr.SeriesPoints(colors=[look.colour], names=[look.name], marker_sizes=[look.size])
-    )
-    stream.log(path, style, static=True)
-    stream.send_columns(path, [columns.at(time)], rr.Scalars.columns(scalars=values))
-
-
 def _angle(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
     """Log both angles, the peaks, and what is not for fitting."""
     record = replace(RECORD, width=0.0) if one.sparse else RECORD
-    _series(stream, f"{path}/model", one.model_time, one.model, MODEL)
-    _series(stream, f"{path}/record", one.time, one.record, record)
+    series.log(stream, f"{path}/model", one.model_time, one.model, MODEL)
+    series.log(stream, f"{path}/record", one.time, one.record, record)
     if not one.sparse:
-        _series(stream, f"{path}/peaks", one.peaks.time, one.peaks.amplitude, PEAKS)
+        series.log(stream, f"{path}/peaks", one.peaks.time, one.peaks.amplitude, PEAKS)
     out = one.left_out
-    _series(stream, f"{path}/left_out", one.time[out], one.record[out], LEFT_OUT)
+    series.log(stream, f"{path}/left_out", one.time[out], one.record[out], LEFT_OUT)
 
 
 def _residual(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
@@ -182,13 +152,13 @@ def _residual(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
     rms = MILLI * math.sqrt(float(np.mean(one.residual[known] ** 2)))
     name = f"{RESIDUAL.name}, {rms:.3g} mrad rms"
     look = replace(RESIDUAL, name=name, size=RESIDUAL.size if one.sparse else 1.0)
-    _series(stream, f"{path}/residual", one.time[known], MILLI * one.residual[known], look)
+    series.log(stream, f"{path}/residual", one.time[known], MILLI * one.residual[known], look)
     ends = one.time[[0, -1]]
     for name, sign, said in (("above", 1, "+"), ("below", -1, MINUS)) if one.sigma else ():
         band = np.full(2, MILLI * sign * BAND * one.sigma)
         text = f"{said}{BAND:g} {SIGMA} of the noise, {said}{abs(band[0]):.3g} mrad"
         line = Series(text, frame.INK, 1.5)
-        _series(stream, f"{path}/{name}", ends, band, line)
+        series.log(stream, f"{path}/{name}", ends, band, line)
 
 
 def _pendulums(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
@@ -198,11 +168,11 @@ def _pendulums(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
     parts = [(RECORD, one.time, one.record, (1.5, 7.0), 3.0)]
     if one.model.size:
         parts.append((MODEL, one.model_time, one.model, (4.5, 13.0), 1.0))
-    for series, time, theta, (arm, bob), order in parts:
+    for look, time, theta, (arm, bob), order in parts:
         there = np.isfinite(theta)
         at = np.stack([np.sin(theta), -np.cos(theta)], axis=1)[there]
         lines = np.stack([np.zeros_like(at), at], axis=1)
-        root, colour = f"{path}/data/{series.name}", series.colour
+        root, colour = f"{path}/data/{look.name}", look.colour
         columns.strips(stream, f"{root}/arm", time[there], lines, Look(colour, arm, order))
         columns.points(stream, f"{root}/bob", time[there], at, Look(colour, bob, order + 1))
     pivot = rr.Points2D([[0.0, 0.0]], colors=[frame.INK], radii=rr.Radius.ui_points(3.0))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.words import counted
+from pendmap.pictures.names import unit_of
+from pendmap.words import counted, written
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -15,26 +15,11 @@ if TYPE_CHECKING:
 
 __all__ = ["page"]
 
-UNITS: Final[Mapping[str, str]] = {
-    "w0": "rad/s",
-    "c_over_m": "1/s",
-    "Tr": "rad/s\N{SUPERSCRIPT TWO}",
-    "offset": "rad",
-    "tilt": "rad",
-}
-"""Units of what several methods know; parameters of effects are in SI, as they say themselves."""
-
 COMPARED: Final = ("w0", "c_over_m", "Tr")
 """What all methods are compared by."""
 
 FOLLOWING: Final[Mapping[str, str]] = {"zeta": "", "theta_r": " rad"}
 """What follows from them, with its unit."""
-
-DIGITS: Final = 5
-"""Digits of a number whose uncertainty is not known."""
-
-PLACES: Final = 10
-"""Places after the point up to which a number is written out."""
 
 
 def page(report: IdentificationReport) -> str:
@@ -58,7 +43,7 @@ def _best(report: IdentificationReport) -> Iterator[str]:
     yield from ("", f"Used: {best.used}." if best.used else "", "")
     yield from ("| parameter | value | 95 % interval | unit |", "|---|---|---|---|")
     for name, each in best.estimates.items():
-        yield f"| {name} | {_value(each)} | {_interval(each)} | {UNITS.get(name, '')} |"
+        yield f"| {name} | {_value(each)} | {_interval(each)} | {unit_of(name)} |"
     yield ""
     follows = [f"{name} = {each.value:.4g}{FOLLOWING[name]}" for name, each in best.derived.items()]
     if follows:
@@ -81,7 +66,7 @@ def _methods(report: IdentificationReport) -> Iterator[str]:
         known = {n: m for n, m in report.methods.items() if parameter in m.estimates}
         if not known:
             continue
-        yield from (f"## {parameter} ({UNITS[parameter]}) by each method", "")
+        yield from (f"## {parameter} ({unit_of(parameter)}) by each method", "")
         yield from ("| method | value | 95 % interval |", "|---|---|---|")
         for name, found in known.items():
             each = found.estimates[parameter]
@@ -115,22 +100,12 @@ def _width(each: Estimate) -> float:
     return each.stderr or 0.0
 
 
-def _written(value: float, width: float) -> str:
-    """Return a number with two digits of its uncertainty."""
-    if not (math.isfinite(value) and math.isfinite(width)):
-        return f"{value:g}"
-    if not width:
-        return f"{value:.{DIGITS}g}"
-    places = max(1 - math.floor(math.log10(width)), 0)
-    return f"{value:.{places}f}" if places <= PLACES else f"{value:.3g}"
-
-
 def _value(each: Estimate) -> str:
-    return _written(each.value, _width(each))
+    return written(each.value, _width(each))
 
 
 def _interval(each: Estimate) -> str:
     if each.ci95 is None or not _width(each):  # peaks without errors leave intervals without width
         return ""
-    low, high = (_written(end, _width(each)) for end in each.ci95)
+    low, high = (written(end, _width(each)) for end in each.ci95)
     return f"[{low}, {high}]"

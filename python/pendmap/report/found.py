@@ -1,0 +1,252 @@
+"""Parts 5 to 7 of a diagnosis' report: what was added, the ranking, and run by run."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from pendmap.discrepancy.rivals import ALIKE
+from pendmap.discrepancy.select import GATE
+from pendmap.discrepancy.strength import strength_of
+from pendmap.discrepancy.summary import ranking_table
+from pendmap.model.effects import definition
+from pendmap.pictures.names import unit_of
+from pendmap.report.document import Formula, Items, Name, Paragraph, Picture, Section, Table
+from pendmap.report.wording import compared, gained, joined, mrad, own_parameters, share, values
+from pendmap.words import written
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pendmap.discrepancy import Discrepancy, NamedEffect
+    from pendmap.discrepancy.rivals import Rival, Standing
+    from pendmap.identification import Estimate
+    from pendmap.report.document import Block
+
+__all__ = ["added", "ranked", "run_by_run"]
+
+SI: Final = "rad/s\N{SUPERSCRIPT TWO}"
+PLUS: Final = "\N{PLUS-MINUS SIGN}"
+RIVALS: Final = 4
+"""Rivals of an effect that are shown."""
+
+EQUATION: Final = "theta'' + (c/m) theta' + w0^2 (1 + a(t)) sin(theta) = -Tr sign(theta')"
+"""The model to begin with, as the paper has it."""
+
+
+def added(found: Discrepancy) -> Section:
+    """Return what was added, how strong it is, and how the other parameters moved."""
+    if not found.effects:
+        return Section(
+            "What was added",
+            (
+                Paragraph("Nothing: no effect is claimed. The model given out is the baseline."),
+                _parameters(found),
+                *_unphysical(found),
+            ),
+        )
+    blocks: list[Block] = []
+    terms, meant = [], ["v = theta'", "a the pivot's acceleration over gravity"]
+    for effect in found.effects:
+        entry = definition(effect.name)
+        if entry["group"] not in {"drive", "reading"}:
+            term, _, said = str(entry["formula"]).partition(", ")
+            terms.append((_signed(term), effect.name))
+            meant += [said] if said else []
+    if len(terms) == 1:
+        blocks.append(Formula(f"{EQUATION} {terms[0][0]}"))
+    elif terms:
+        wide = max(len(term) for term, _ in terms)
+        lines = (f"    {term:{wide}}   ({name})" for term, name in terms)
+        blocks.append(Formula("\n".join([EQUATION, *lines])))
+    if terms:
+        blocks.append(Paragraph(f"with {'; '.join(meant)}."))
+    for effect in found.effects:
+        entry = definition(effect.name)
+        if entry["group"] in {"drive", "reading"}:
+            where = "drive" if entry["group"] == "drive" else "sensor"
+            blocks.append(Paragraph((f"In the {where}: ", Name(entry["formula"]), ".")))
+    blocks.append(
+        Items(tuple((*values(effect), *_strength(found, effect)) for effect in found.effects))
+    )
+    blocks += [Paragraph("How the other parameters moved:"), _parameters(found)]
+    return Section("What was added", (*blocks, *_unphysical(found)))
+
+
+def _signed(term: str) -> str:
+    sign, rest = (term[0], term[1:]) if term.startswith(("-", "+")) else ("+", term)
+    return f"{sign} {rest.strip()}"
+
+
+def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:
+    """Yield how strong an effect is over the records, against friction and gravity."""
+    strength = strength_of(found.evidence, found.best, effect.name)
+    if strength is None:
+        return
+    fit = found.best.trial.fit
+    if strength.torque > 0:
+        w0, friction = fit["w0"], fit.estimates.get("Tr")
+        against = ""
+        if (
+            friction is not None
+            and friction.value > 0
+            and "Tr" not in own_parameters([effect.name])
+        ):
+            against = f"{strength.torque / friction.value:.2g} Tr and "
+        yield (
+            f". Over these records its torque is {strength.torque:.2g} {SI} rms, {against}"
+            f"{strength.torque / w0**2:.1g} w0\N{SUPERSCRIPT TWO}; at most "
+            f"{strength.greatest_torque:.2g} {SI}"
+        )
+    elif strength.reading > 0:
+        yield (
+            f". It moves the readings by {mrad(strength.reading)} rms, at most "
+            f"{mrad(strength.greatest_reading)}"
+        )
+
+
+def _parameters(found: Discrepancy) -> Table:
+    before, after = (found.base.trial.fit.estimates, found.best.trial.fit.estimates)
+    new = own_parameters(effect.name for effect in found.effects)
+    names = [n for n in before if n in after and "[" not in n and n not in new]
+    rows = []
+    for name in names:
+        old, now = before[name], after[name]
+        moved = now.value - old.value
+        error = now.stderr or 0.0
+        rows.append(
+            (
+                Name(name),
+                unit_of(name),
+                _said(old),
+                _said(now),
+                f"{moved / error:+.2g}" if error and moved else "0",
+            )
+        )
+    head = ("parameter", "unit", "before", "after", "moved, standard errors")
+    return compared(found, Table(head, tuple(rows), words=("unit",)))
+
+
+def _said(estimate: Estimate) -> str:
+    error = estimate.stderr or 0.0
+    if not (error and math.isfinite(error)):
+        return f"{estimate.value:.5g}"
+    return f"{written(estimate.value, error)} {PLUS} {error:.1g}"
+
+
+def _unphysical(found: Discrepancy) -> Iterator[Block]:
+    for fit, which in ((found.base.trial.fit, "baseline"), (found.best.trial.fit, "model found")):
+        for name in ("c_over_m", "Tr"):
+            if name in fit.estimates and fit[name] < 0:
+                yield Paragraph(
+                    (
+                        Name(name),
+                        (
+                            f" of the {which} is negative, which no pendulum has: it makes up for "
+                            "what is missing."
+                        ),
+                    )
+                )
+
+
+def ranked(found: Discrepancy) -> Section:
+    """Return the ranking of candidates, and why the runners-up lost."""
+    head, rows = ranking_table(found)
+    blocks: list[Block] = [
+        Paragraph(
+            "Every effect of the library, scored at the baseline's fit: the score G is what it "
+            f"would take off the sum of squares by itself, in units of the noise. {GATE:g} is the "
+            "least for a refit; without a missing effect none gets there. Those refitted have the "
+            "fall of the BIC and of the sum of squares on what was held back."
+        ),
+        Table(
+            tuple(head),
+            tuple((Name(row[0]), *row[1:]) for row in rows),
+            words=("shape",),
+        ),
+        Picture("ranking", "Scores of the candidates at the baseline."),
+    ]
+    for standing in found.judgement.standings:
+        blocks += _rivals(found, standing)
+    return Section("Ranking", tuple(blocks))
+
+
+def _rivals(found: Discrepancy, standing: Standing) -> Iterator[Block]:
+    name = standing.candidate.name
+    if not standing.rivals:
+        yield Paragraph(("Nothing else of the library could stand in for ", Name(name), "."))
+        return
+    claimed = "" if found.effects else ", which comes nearest and is not claimed"
+    yield Paragraph(
+        (
+            "In the place of ",
+            Name(name),
+            (
+                f"{claimed} (gain {gained(standing.gain)}): the separation s is the part of that "
+                "gain which another effect does not reach."
+            ),
+        )
+    )
+    yield Table(
+        ("instead", "gain", "behind", "s", "s G", "why not"),
+        tuple(
+            (
+                Name(rival.candidate.title),
+                gained(rival.gain),
+                gained(rival.behind),
+                f"{rival.separation:.2g}",
+                gained(rival.separation * standing.gain),
+                _why(rival),
+            )
+            for rival in standing.rivals[:RIVALS]
+        ),
+        words=("why not",),
+    )
+
+
+def _why(rival: Rival) -> str:
+    if rival.contains:
+        return "has it as a special case and gains no more"
+    if rival.alike:
+        return f"not told apart: behind by less than {ALIKE:g}"
+    return "refitted, explains less" if rival.refitted else "scored, explains less"
+
+
+def run_by_run(found: Discrepancy) -> Section:
+    """Return what was found as each run would have it by itself."""
+    standings = found.judgement.standings
+    sizes = [standing.candidate.free[0] for standing in standings]
+    blocks: list[Block] = []
+    if not sizes:
+        blocks.append(Paragraph("There is no effect to compare between runs."))
+    names = [run.name for run in found.evidence.fitted]
+    for size in sizes:
+        pairs = found.runs.coefficients[size]
+        spread = found.runs.spread(size)
+        estimate = found.nearest.trial.fit.estimates[size]
+        label = unit_of(size)
+        shown = [(n, v, e) for n, (v, e) in zip(names, pairs, strict=True) if math.isfinite(e)]
+        blind = [n for n, (_, e) in zip(names, pairs, strict=True) if not math.isfinite(e)]
+        differ = (
+            f" Beyond noise they differ by {share(spread)} of it."
+            if spread
+            else " They differ by no more than noise."
+        )
+        blocks += [
+            Paragraph(
+                (
+                    Name(size),
+                    f": all runs together {_said(estimate)} {label}".rstrip() + ".",
+                    differ if len(shown) > 1 else "",
+                )
+            ),
+            Table(
+                ("run", f"value ({label})" if label else "value", "standard error"),
+                tuple((Name(n), written(v, e), f"{e:.2g}") for n, v, e in shown),
+            ),
+        ]
+        if blind:
+            blocks.append(Paragraph(("It does not show in ", *joined(blind), ".")))
+    if sizes:
+        blocks.append(Picture("runs", "Each run's own value, with bars of 95 %."))
+    return Section("Run by run", tuple(blocks))

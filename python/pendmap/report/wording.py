@@ -1,0 +1,154 @@
+"""Words that several parts of a report share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pendmap.discrepancy.candidates import own_name
+from pendmap.pictures.names import unit_of
+from pendmap.report.document import Name, Strong, Table
+from pendmap.words import written
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pendmap.discrepancy import Discrepancy, NamedEffect
+
+__all__ = [
+    "chance",
+    "compared",
+    "gained",
+    "joined",
+    "lead",
+    "mrad",
+    "own_parameters",
+    "quantity",
+    "share",
+    "unit",
+    "values",
+]
+
+Parts = tuple[str | Name | Strong, ...]
+
+
+def mrad(value: float) -> str:
+    """Return an angle that is small."""
+    return f"{1e3 * value:.3g} mrad"
+
+
+def gained(value: float) -> str:
+    """Return a score, or a difference of sums of squares."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"  # noqa: PLR2004 (three digits)
+
+
+def chance(probability: float) -> str:
+    """Return a probability, none of them certain."""
+    if probability > 0.999:  # noqa: PLR2004 (as far as it is known)
+        return "above 99.9 %"
+    return f"{100 * probability:.3g} %" if probability >= 0.001 else "below 0.1 %"  # noqa: PLR2004
+
+
+def share(part: float) -> str:
+    """Return a part of something."""
+    return f"{100 * part:.3g} %" if part > 0.99 else f"{100 * part:.0f} %"  # noqa: PLR2004
+
+
+def joined(names: Iterable[str], last: str = "and") -> Parts:
+    """Return names as a sentence has them."""
+    each = [Name(name) for name in names]
+    parts: list[str | Name | Strong] = []
+    for k, name in enumerate(each):
+        if k:
+            parts.append(f" {last} " if k == len(each) - 1 else ", ")
+        parts.append(name)
+    return tuple(parts)
+
+
+def unit(effect: str, parameter: str) -> str:
+    """Return the unit of an effect's parameter in SI, after a blank; nothing if it has none."""
+    return f" {unit_of(f'{effect}.{parameter}')}".rstrip()
+
+
+def quantity(effect: NamedEffect, parameter: str) -> str:
+    """Return a parameter of an effect with its interval of 95 % and its unit."""
+    value, bounds = effect.parameters[parameter], effect.ci95.get(parameter)
+    after = unit(effect.name, parameter)
+    if bounds is None:
+        return f"{value:.4g}{after}"
+    width = (bounds[1] - bounds[0]) / 2
+    low, high = (written(bound, width) for bound in bounds)
+    return f"{written(value, width)}{after} (95 %: {low} to {high})"
+
+
+def values(effect: NamedEffect) -> Parts:
+    """Return an effect's name with its parameters."""
+    said = ", ".join(f"{name} = {quantity(effect, name)}" for name in effect.parameters)
+    return (Name(effect.name), f", {said}")
+
+
+def lead(found: Discrepancy) -> Parts:
+    """Return a diagnosis in one sentence."""
+    names = joined(effect.name for effect in found.effects)
+    nearest = found.nearest.trial.names
+    gap, closed = found.gap, found.judgement.closed
+    to = f"from {mrad(gap.held_out_before)} to {mrad(gap.held_out_after)}"
+    noise = f"the noise is {mrad(gap.noise_floor)}"
+    if found.verdict == "none":
+        return (
+            Strong("Nothing is missing"),
+            " that these records could show: what the model leaves is their noise, ",
+            f"{mrad(gap.noise_floor)}.",
+        )
+    if found.verdict == "named":
+        with_it = "With them" if len(found.effects) > 1 else "With it"
+        return (
+            Strong("The model lacks"),
+            " ",
+            *names,
+            f". {with_it} the residual on held-out data falls {to}; {noise}.",
+        )
+    if found.verdict == "ambiguous":
+        alike = [joined(each, "or") for each in found.equivalent]
+        classes: Parts = tuple(
+            part for k, each in enumerate(alike) for part in (*(("; ",) if k else ()), *each)
+        )
+        return (
+            Strong("The model lacks one of a class"),
+            ": ",
+            *classes,
+            (
+                f". These records do not tell which. With the first, the residual on held-out data "
+                f"falls {to}; {noise}."
+            ),
+        )
+    if found.verdict == "partial":
+        verb = "They close" if len(found.effects) > 1 else "It closes"
+        end = f", and something more. {verb} {share(closed)} of the squared gap, {to}; {noise}."
+        return (Strong("The model lacks"), " ", *names, end)
+    near: Parts = ()
+    if nearest:
+        verb = "close" if len(nearest) > 1 else "closes"
+        end = f", {verb} {share(closed)} of its squared gap; no name is claimed."
+        near = (" What comes nearest, ", *joined(nearest), end)
+    return (
+        Strong("Something is missing that no effect of the library explains"),
+        f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}.",
+        *near,
+    )
+
+
+def compared(found: Discrepancy, table: Table) -> Table:
+    """Return a table without what stands under ``after`` where the model stays the baseline."""
+    if found.adds:
+        return table
+    kept = [k for k, name in enumerate(table.head) if not name.startswith(("after", "moved"))]
+    return Table(
+        tuple(table.head[k].replace("before", "baseline") for k in kept),
+        tuple(tuple(row[k] for k in kept) for row in table.rows),
+        table.words,
+    )
+
+
+def own_parameters(effects: Iterable[str]) -> set[str]:
+    """Return the parameters of a rig that say the same as one of these effects."""
+    return {own for effect in effects if (own := own_name(effect)) is not None}

@@ -1,0 +1,99 @@
+"""The error of forecasts against their horizon, and figure 7, before and after."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from hidden import once
+from pendmap import Rig
+from pendmap.discrepancy import diagnosed_model
+from pendmap.discrepancy.horizon import forecasts_of
+from pendmap.discrepancy.replay import Motion, replayed
+from pendmap.discrepancy.strength import strength_of
+from pendmap.identification import compare
+from pendmap.identification.runs import FitRun
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy import Discrepancy
+
+
+@pytest.fixture
+def found() -> Discrepancy:
+    return once("quadratic_drag")
+
+
+def test_at_no_horizon_the_error_is_the_noise(found: Discrepancy) -> None:
+    assert {forecast.kind for forecast in found.forecasts} == {"free", "forced"}
+    for forecast in found.forecasts:
+        assert forecast.horizon[0] < 0.2
+        assert forecast.after[0] == pytest.approx(forecast.noise_floor, rel=0.08)
+        assert forecast.before[0] == pytest.approx(forecast.noise_floor, rel=0.1)
+
+
+def test_the_new_model_sees_farther(found: Discrepancy) -> None:
+    for forecast in found.forecasts:
+        assert np.all(np.diff(forecast.horizon) > 0)
+        far = forecast.horizon > 0.5 * forecast.horizon[-1]
+        before, after = np.mean(forecast.before[far]), np.mean(forecast.after[far])
+        # What the new model lacks is the state alone, which one swing of readings gives.
+        assert forecast.noise_floor * 0.9 < after < 1.4 * forecast.noise_floor
+        assert before > 1.2 * after
+
+
+def test_periods_and_peaks_are_those_of_a_simulation(found: Discrepancy) -> None:
+    """The command ``compare`` has them from the located turns of a simulation."""
+    model = dataclasses.replace(diagnosed_model(found), notes={})
+    simulated = {one.run.name: one.errors for one in compare(model, found.evidence.experiment).runs}
+    assert found.cycles[0].held_out
+    assert {one.name for one in found.cycles} == set(simulated)
+    for one in found.cycles:
+        after, other = one.errors["after"], simulated[one.name]
+        assert other is not None
+        np.testing.assert_allclose(after.period_error, other.period_error, atol=1e-3)
+        np.testing.assert_allclose(after.peak_error, other.peak_error, atol=1e-3)
+    before, after = (
+        np.mean([one.errors[name].peak_rms for one in found.cycles]) for name in ("before", "after")
+    )
+    assert after < 0.5 * before
+
+
+def test_a_replay_falls_freely_where_nothing_else_acts() -> None:
+    """A pendulum that starts upright, at rest, goes as ``th - pi = a cosh(w0 t)`` at first."""
+    time = np.linspace(0.0, 0.5, 51)
+    run = FitRun(time, np.zeros(51), 1e-9)
+    ((readings, curve),) = replayed(Motion(Rig(w0=6.0), {}), [run], [(np.pi - 1e-5, 0.0)])
+    expected = np.pi - 1e-5 * np.cosh(6.0 * time)
+    np.testing.assert_allclose(readings, expected, atol=1e-9)
+    np.testing.assert_allclose(curve[0], expected, atol=1e-9)
+
+
+def test_the_strength_of_a_drag_is_its_torque(found: Discrepancy) -> None:
+    strength = strength_of(found.evidence, found.best, "quadratic_drag")
+    assert strength is not None
+    q = found.effects[0].parameters["q"]
+    speeds = np.concatenate([curve[1] for curve in found.best.trial.fit.curves])
+    speeds = speeds[np.isfinite(speeds)]
+    assert strength.torque == pytest.approx(q * np.sqrt(np.mean(speeds**4)), rel=0.25)
+    assert strength.greatest_torque <= 1.001 * q * np.max(speeds**2)
+    assert strength.reading == pytest.approx(0.0, abs=1e-9)
+
+
+def test_forecasts_do_not_depend_on_where_clocks_begin(found: Discrepancy) -> None:
+    for begin in np.random.default_rng(1).uniform(0.0, 1000.0, 3):
+        held = tuple(_later(run, float(begin)) for run in found.evidence.held)
+        evidence = dataclasses.replace(found.evidence, held=held)
+        moved = forecasts_of(evidence, found.base, found.best)
+        for forecast, usual in zip(moved, found.forecasts, strict=True):
+            np.testing.assert_allclose(forecast.after, usual.after, rtol=0.1)
+
+
+def _later(run: FitRun, begin: float) -> FitRun:
+    """Return a run on a clock that began earlier; the drive's phase counts from its zero."""
+    drive = run.drive
+    if drive is not None:
+        drive = {**drive, "phi": float(drive["phi"] or 0) - float(drive["Omega"] or 0) * begin}
+    return dataclasses.replace(run, time=run.time + begin, drive=drive)

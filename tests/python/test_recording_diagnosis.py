@@ -1,0 +1,135 @@
+"""Recordings of diagnoses, read back: the record beside both models, what is left, the report."""
+
+from __future__ import annotations
+
+import subprocess
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from hidden import once
+from pendmap import report, viewer
+from pendmap.viewer import window
+from recordings import ReadBack
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy.typing as npt
+
+    from pendmap.discrepancy import Discrepancy
+
+    Floats = npt.NDArray[np.float64]
+
+pytestmark = pytest.mark.usefixtures("strict_recordings")
+
+
+@pytest.fixture
+def found() -> Discrepancy:
+    return once("quadratic_drag")
+
+
+@pytest.fixture
+def file(found: Discrepancy, tmp_path: Path) -> Path:
+    return viewer.record_discrepancy(found, tmp_path / "a.rrd")
+
+
+@pytest.fixture
+def back(file: Path) -> ReadBack:
+    return ReadBack(file)
+
+
+def scalars(back: ReadBack, entity: str) -> Floats:
+    return back.rows(entity, "Scalars:scalars")
+
+
+def hanging(back: ReadBack, bob: str, pivot: float) -> Floats:
+    """The angle of a pendulum whose arm is 1 long."""
+    at = back.rows(bob, "Points2D:positions") - (pivot, 0.0)
+    assert np.allclose(np.hypot(*at.T), 1.0, atol=1e-5)
+    return np.arctan2(at[:, 0], -at[:, 1])
+
+
+def test_the_file_is_whole(file: Path) -> None:
+    command = [window._program(), "rrd", "verify", str(file)]  # noqa: SLF001 (the viewer itself)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+
+
+def test_two_recordings_of_one_diagnosis_are_the_same(found: Discrepancy, file: Path) -> None:
+    other = viewer.record_discrepancy(found, file.with_name("b.rrd"))
+    command = [window._program(), "rrd", "compare", "--unordered", str(file), str(other)]  # noqa: SLF001
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+
+
+def test_residuals_are_those_of_the_gap(found: Discrepancy, back: ReadBack) -> None:
+    """All runs, those held out last; in mrad, beside two standard deviations of the noise."""
+    for number, row in enumerate(found.gap.by_run, 1):
+        root = f"/run_{number}/residual"
+        for name, rms in (("before", row.before), ("after", row.after)):
+            left = scalars(back, f"{root}/{name}")
+            assert np.sqrt(np.nanmean(left**2)) == pytest.approx(1e3 * rms, rel=1e-6)
+        assert scalars(back, f"{root}/above") == pytest.approx(2e3 * row.noise_floor)
+        assert scalars(back, f"{root}/below") == pytest.approx(-2e3 * row.noise_floor)
+    assert f"/run_{len(found.gap.by_run) + 1}/angle/record" not in back.columns
+
+
+def test_three_pendulums_hang_side_by_side(found: Discrepancy, back: ReadBack) -> None:
+    """The models' deviations are drawn larger by the factor that the file names."""
+    larger = float(back.one("/__properties/pendmap", "deviations_drawn_larger"))
+    assert larger >= 1
+    run = found.evidence.fitted[0]
+    record = scalars(back, "/run_1/angle/record")
+    np.testing.assert_allclose(back.seconds("/run_1/angle/record"), run.time, atol=2e-9)
+    np.testing.assert_allclose(record, run.theta)
+    root = "/run_1/pendulum/data"
+    assert hanging(back, f"{root}/record/bob", 0.0) == pytest.approx(turned(record), abs=1e-5)
+    for place, name in enumerate(("before", "after"), 1):
+        model = scalars(back, f"/run_1/angle/{name}")
+        left = scalars(back, f"/run_1/residual/{name}") / 1e3
+        assert record - model == pytest.approx(left, abs=1e-9)
+        shown = hanging(back, f"{root}/{name}/bob", 2.5 * place)
+        away = turned(shown - record)
+        assert away == pytest.approx(-larger * left, abs=1e-5)
+    assert f"deviations {larger:g} times larger" in back.views["/run_1/pendulum"]
+
+
+def turned(angle: Floats) -> Floats:
+    """An angle in the turn about 0."""
+    return np.angle(np.exp(1j * angle))
+
+
+def test_torque_and_forecasts_are_drawn_where_they_are(found: Discrepancy, back: ReadBack) -> None:
+    for over in ("angle", "velocity", "amplitude", "drive_phase", "lab_time"):
+        for name, torque in (("before", found.torque_before), ("after", found.torque_after)):
+            line = np.array(back.one(f"/torque/{over}/data/{name}", "LineStrips2D:strips"))
+            rows = torque.rows[over]
+            expected = [(row[end], row["torque"]) for row in rows for end in ("from", "to")]
+            np.testing.assert_allclose(line.reshape(-1, 2), expected, rtol=1e-6, atol=1e-7)
+    for forecast in found.forecasts:
+        line = np.array(back.one(f"/forecast/{forecast.kind}/data/after", "LineStrips2D:strips"))
+        np.testing.assert_allclose(line.reshape(-1, 2)[:, 1], 1e3 * forecast.after, rtol=1e-6)
+
+
+def test_every_view_has_something_to_show(found: Discrepancy, back: ReadBack) -> None:
+    runs = len(found.gap.by_run)
+    for number in range(1, runs + 1):
+        for view in ("pendulum", "angle", "residual"):
+            assert f"/run_{number}/{view}" in back.views
+    assert {"/torque/angle", "/forecast/free", "/summary"} <= set(back.views)
+    for origin in back.views:
+        assert any(entity.startswith(origin) for entity in back.columns), origin
+
+
+def test_the_report_lies_beside(found: Discrepancy, back: ReadBack) -> None:
+    text = back.one("/summary", "TextDocument:text")
+    assert text == report.as_markdown(report.diagnosis(found), {})
+    assert back.one("/__properties/pendmap", "verdict") == "named"
+
+
+def test_where_nothing_is_found_there_is_a_recording_too(tmp_path: Path) -> None:
+    back = ReadBack(viewer.record_discrepancy(once("none"), tmp_path / "a.rrd"))
+    before, after = (scalars(back, f"/run_1/residual/{name}") for name in ("before", "after"))
+    np.testing.assert_array_equal(before, after)

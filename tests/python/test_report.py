@@ -1,0 +1,233 @@
+"""Reports of diagnoses: each verdict has one, it says what the JSON says, and it is well formed."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import re
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+
+import pytest
+from markdown_it import MarkdownIt
+from matplotlib import rc_context
+
+from hidden import once
+from pendmap import InputError, figures, report
+from pendmap.discrepancy.summary import as_json
+from pendmap.figures import discrepancy, style
+from pendmap.figures.report import FIGURES
+from pendmap.report.document import (
+    Document,
+    Formula,
+    Items,
+    Name,
+    Paragraph,
+    Picture,
+    Section,
+    Strong,
+    Table,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+    from pendmap.discrepancy import Discrepancy
+
+VOID = {"meta", "img", "br"}
+
+
+class Page(HTMLParser):
+    """The text of a page, its images, and whether every tag that opens is closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.images: list[str] = []
+        self.tags: set[str] = set()
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note a tag that opens, and images."""
+        self.tags.add(tag)
+        if tag == "img":
+            self.images.append(str(dict(attrs)["src"]))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        """Expect the tag that opened last."""
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        """Collect what is read."""
+        if self.open and self.open[-1] not in {"style", "title", "figcaption"}:
+            self.words += data.split()
+
+
+def of_verdict(verdict: str) -> Discrepancy:
+    if verdict == "none":
+        return once("none")
+    if verdict == "unknown":
+        return once("base_sway", seed=1)
+    if verdict == "ambiguous":
+        return once("quadratic_drag", size=0.1)
+    named = once("quadratic_drag")
+    if verdict == "named":
+        return named
+    # What only the words of the report depend on.
+    judgement = dataclasses.replace(named.judgement, verdict="partial", left=12.0)
+    nearly = tuple(dataclasses.replace(effect, approximate=True) for effect in named.effects)
+    return dataclasses.replace(named, judgement=judgement, effects=nearly)
+
+
+@pytest.mark.parametrize("verdict", ["none", "named", "partial", "ambiguous", "unknown"])
+def test_every_verdict_has_its_report(verdict: str, tmp_path: Path) -> None:
+    found = of_verdict(verdict)
+    assert found.verdict == verdict
+    folder = figures.write_report(found, tmp_path / "report")
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    markdown = (folder / "report.md").read_text(encoding="utf-8")
+    assert f"**{verdict.capitalize()}**" in markdown
+    pictures = re.findall(r"\]\(<(.*?)>\)", markdown)
+    assert {"gap.png", "residuals.png", "torque.png", "ranking.png"} <= set(pictures)
+    for name, image in zip(pictures, page.images, strict=True):
+        kind, content = image.split(",")
+        assert kind == "data:image/png;base64"
+        assert (folder / name).read_bytes() == base64.b64decode(content)
+    # One file that needs no other, and runs nothing.
+    assert not page.tags & {"script", "link", "iframe"}
+    claims = verdict in {"named", "partial", "ambiguous"}
+    assert ("after" in page.words) == claims
+    assert ("baseline" in page.words) or claims
+    assert bool(re.search(r"- q v \|v\|", markdown)) == claims
+    if verdict == "ambiguous":
+        (names,) = found.equivalent
+        assert all(f"`{name}`" in markdown.split("\n")[2] for name in names)
+        assert "25 are needed" in markdown
+
+
+def test_its_numbers_are_those_of_the_json() -> None:
+    found = once("quadratic_drag")
+    fields = as_json(found)
+    text = report.as_markdown(report.diagnosis(found), {})
+    lines = [line for line in text.split("\n") if line.startswith("|")]
+    rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+    told: dict[object, list[str]] = {(row[0], row[1]): row for row in rows}
+    told |= {row[0]: row for row in rows}
+    gap = fields["gap"]
+    floor = gap["noise_floor"]
+    assert told["fitted runs"][1:] == [mrad(gap["before"]), mrad(gap["after"]), mrad(floor)]
+    held = [mrad(gap["held_out_before"]), mrad(gap["held_out_after"]), mrad(floor)]
+    assert told["held out"][1:] == held
+    for run in gap["runs"]:
+        name = f"{'held out: ' if run['held_out'] else ''}`{run['name']}`"
+        numbers = [mrad(run[key]) for key in ("before", "after", "noise_floor")]
+        assert [name, *numbers] in rows
+    for forecast in fields["forecast"]:
+        ahead = f"{forecast['horizon_s'][-1]:.3g} s"
+        last = [mrad(forecast[key][-1]) for key in ("before", "after")]
+        assert told[forecast["runs"], ahead][2:4] == last
+    (effect,) = fields["effects"]
+    value, low, high = re.search(  # type: ignore[union-attr]
+        r"q = ([\d.]+) 1/rad \(95 %: ([\d.]+) to ([\d.]+)\)", text
+    ).groups()
+    assert float(value) == pytest.approx(effect["parameters"]["q"], rel=1e-2)
+    bounds = effect["ci95"]["q"]
+    assert [float(low), float(high)] == pytest.approx(bounds, rel=1e-2)
+    for row in fields["ranking"][:8]:
+        assert told[f"`{row['name']}`"][0] == f"`{row['name']}`"
+        assert any(r[0] == f"`{row['name']}`" and f"{row['score']:.1f}" in r for r in rows)
+    for name, limit in fields["detection_limits"].items():
+        assert told[f"`{name}`"][2].startswith(f"{limit:.2g}")
+    for run, each in zip(found.evidence.fitted, fields["runs"]["quadratic_drag.q"], strict=True):
+        assert any(r[0] == f"`{run.name}`" and r[2] == f"{each['stderr']:.2g}" for r in rows)
+
+
+def mrad(value: float) -> str:
+    return f"{1e3 * value:.3g} mrad"
+
+
+NASTY = "a|b <script>alert(1)</script> *c* _d_ `e` [f](g) # & \\ $h$ ``i"
+
+
+def test_whatever_a_user_wrote_is_shown_as_it_is() -> None:
+    """Markdown, read by another parser, and HTML say the same words."""
+    document = Document(
+        f"Title {NASTY}",
+        (Strong("Strong"), f" and {NASTY}"),
+        (
+            Section(
+                NASTY,
+                (
+                    Paragraph(f"1. {NASTY}"),
+                    Paragraph(f"- {NASTY}"),
+                    Items((NASTY, (Name(NASTY), " and ", Name("`")), "+ more")),
+                    Formula("th'' = -a |v| <b>"),
+                    Table(("one", "two|three"), ((Name(NASTY), NASTY), ("", "4"))),
+                    Picture("absent", "Nothing."),
+                ),
+            ),
+        ),
+    )
+    page = Page(report.as_html(document, {}))
+    assert "script" not in page.tags
+    read = MarkdownIt("commonmark").enable("table").render(report.as_markdown(document, {}))
+    other = Page(read)
+    assert other.words == page.words
+    assert " ".join(page.words).count("<script>alert(1)</script>") == 9
+
+
+def test_a_file_of_each_kind(tmp_path: Path) -> None:
+    found = once("quadratic_drag")
+    assert figures.write_report(found, tmp_path / "a.html") == tmp_path / "a.html"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
+    figures.write_report(found, tmp_path / "b.md")
+    text = (tmp_path / "b.md").read_text(encoding="utf-8")
+    for name in re.findall(r"\]\(<(.*?)>\)", text):
+        assert name.startswith("b_")
+        assert (tmp_path / name).exists()
+    with pytest.raises(InputError, match=r"\.pdf.*\.html, \.md"):
+        figures.write_report(found, tmp_path / "c.pdf")
+
+
+@pytest.mark.parametrize("report", ["a.pdf", "absent/report", "file"])
+def test_bad_places_are_refused_at_once(report: str, tmp_path: Path, pendmap_command: Run) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "hidden").mkdir()
+    run = pendmap_command("diagnose", "hidden", "--report", report)
+    assert run.returncode == 2
+    assert "--report" in run.stderr
+    assert report in run.stderr
+    assert len(run.stderr.strip().splitlines()) == 1
+
+
+def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command: Run) -> None:
+    """Stretches are held back within the run, no drive has a phase, and nothing is compared."""
+    made = pendmap_command("rig", "free_decay", "--out", "decay")
+    assert made.returncode == 0, made.stderr
+    run = pendmap_command("diagnose", "decay", "--report", "report", "--quiet")
+    assert run.returncode == 0, run.stderr
+    text = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+    assert "Stretches were held back of `run_00`" in text
+    assert "| forced |" not in text
+
+
+def test_nothing_of_its_figures_is_cut() -> None:
+    found = once("quadratic_drag")
+    with rc_context(style.RC):
+        drawn = [draw(found, 60.0) for draw in FIGURES.values()]
+        drawn.append(discrepancy.figure(found, dpi=60.0))
+        for figure in drawn:
+            assert figure is not None
+            figure.canvas.draw()
+            drawn_in = figure.get_tightbbox()
+            width, height = figure.get_size_inches()
+            assert drawn_in.x0 > 0
+            assert drawn_in.y0 > 0
+            assert drawn_in.x1 < width
+            assert drawn_in.y1 < height
