@@ -16,8 +16,8 @@ const WIDEST: usize = 16;
 /// up. Ten in a unit of time are common.
 const MOST_STEPS: usize = 1000;
 const MOST_STEPS_A_TIME: f64 = 50.0;
-/// The free parameters of a reading, and the angle.
-const READINGS: usize = MOST_READINGS + 1;
+/// The free parameters of a reading, angle and velocity.
+const READINGS: usize = MOST_READINGS + 2;
 
 /// A window at one point of the search.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     let directions = columns.motion.len() + 2;
     let follow = Follow { problem, shaped, columns, window, directions };
     let samples = window.to - window.from;
-    let mut slopes = vec![0.0; samples * directions];
+    let mut slopes = vec![[0.0; 2]; samples * directions];
     let mut states = Vec::new();
     let mut first = 0;
     while first < directions {
@@ -84,8 +84,8 @@ struct Follow<'a> {
 }
 
 impl Follow<'_> {
-    /// The derivatives of the angle in `N` directions from `first` on.
-    fn pass<const N: usize>(&self, first: usize, slopes: &mut [f64], states: &mut Vec<State>) {
+    /// The derivatives of angle and velocity in `N` directions from `first` on.
+    fn pass<const N: usize>(&self, first: usize, slopes: &mut [State], states: &mut Vec<State>) {
         let record = &self.problem.records[self.window.record];
         let motion = &self.columns.motion;
         let number = |slot: Slot, value: f64| {
@@ -114,13 +114,15 @@ impl Follow<'_> {
             sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
         let filled = N.min(self.directions - first);
         for (row, state) in slopes.chunks_exact_mut(self.directions).zip(&run.states) {
-            row[first..first + filled].copy_from_slice(&state[0].slope[..filled]);
+            for (k, slope) in row[first..first + filled].iter_mut().enumerate() {
+                *slope = [state[0].slope[k], state[1].slope[k]];
+            }
         }
         *states = run.states.iter().map(|state| state.map(Number::value)).collect();
     }
 
-    /// What the sensor makes of the angles.
-    fn read(&self, states: Vec<State>, slopes: &[f64]) -> Linear {
+    /// What the sensor makes of the motion.
+    fn read(&self, states: Vec<State>, slopes: &[State]) -> Linear {
         let record = &self.problem.records[self.window.record];
         let sensor = Sensor::new(&self.shaped.pendulum, self.columns);
         let (moving, reading) = (self.columns.motion.len(), self.columns.reading.len());
@@ -136,29 +138,30 @@ impl Follow<'_> {
                 continue;
             }
             let slopes = &slopes[k * self.directions..(k + 1) * self.directions];
-            let read = sensor.read(state[0]);
+            let read = sensor.read(*state);
             residuals.push(weight * (record.readings[sample] - read.value));
-            let by_angle = weight * read.slope[0];
-            rows.extend(slopes[..moving].iter().map(|slope| by_angle * slope));
-            rows.extend(read.slope[1..=reading].iter().map(|slope| weight * slope));
-            rows.extend(slopes[moving..].iter().map(|slope| by_angle * slope));
+            let by_state = [0, 1].map(|of| weight * read.slope[of]);
+            let through = |slope: &State| by_state[0] * slope[0] + by_state[1] * slope[1];
+            rows.extend(slopes[..moving].iter().map(through));
+            rows.extend(read.slope[2..2 + reading].iter().map(|slope| weight * slope));
+            rows.extend(slopes[moving..].iter().map(through));
         }
         Linear { states, residuals, rows, width }
     }
 }
 
-/// The sensor, with derivatives by the angle and by its free parameters.
+/// The sensor, with derivatives by angle, velocity and its free parameters.
 struct Sensor(Observation<Tangent<f64, READINGS>>);
 
 impl Sensor {
     fn new(pendulum: &Pendulum, columns: &Columns) -> Self {
         Self(Observation::lift(pendulum, |index, value| {
             let place = columns.reading.iter().position(|(_, own)| *own == index);
-            Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 1))
+            Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 2))
         }))
     }
 
-    fn read(&self, theta: f64) -> Tangent<f64, READINGS> {
-        self.0.read(Tangent::seeded(theta, 0))
+    fn read(&self, state: State) -> Tangent<f64, READINGS> {
+        self.0.read(Tangent::seeded(state[0], 0), Tangent::seeded(state[1], 1))
     }
 }
