@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["COEFFICIENTS", "complete", "features"]
 
 COEFFICIENTS: Final = (3.09, 0.82, -0.82, 1.05, 0.42)
-"""``b0`` to ``b4``, from few experiments as yet: 14 sets, of which 12 were right, drawn towards numbers
-that were guessed."""
+"""``b0`` to ``b4``, from few experiments as yet: 14 sets, of which 12 were right, drawn towards
+numbers that were guessed."""
 
 LEAST_CHANCE: Final = 1e-6
 """Below this a chance says no more."""

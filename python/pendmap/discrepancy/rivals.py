@@ -132,9 +132,11 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
     reach = max(NEAR[0], NEAR[1] * gain)
     rivals = []
     for rank, k in enumerate(others):
-        score = scores.scores[k]
+        score, found = scores.scores[k], None
         reached, refitted = score.gain / level, False
-        if rank < REFITTED and gain - reached < reach:
+        if scores.same(own, k):
+            reached = gain
+        elif rank < REFITTED and gain - reached < reach:
             found = search.refit(rest, scores, [k])
             if found is not None:
                 reached, refitted = (rest.chi2 - found.trial.chi2) / level, True
@@ -159,7 +161,7 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
 
 
 def _likeness(evidence: Evidence, one: Trial, other: Trial, rest: Trial) -> float:
-    """Return how alike two fits' curves are: 1 where they are the same, 0 as far apart as from none.
+    """Return how alike two fits' curves are: 1 if they are the same, 0 if as far as from none.
 
     As the cosine that would put them so far apart, ``sqrt(1 - d^2 / G)``.
     """

@@ -203,7 +203,10 @@ class Search:
         least = GATE * level
         if ranked:
             least = max(least, WORTH * scores.scores[ranked[0]].gain)
-        wanted = [[k] for k in ranked[:REFITTED] if scores.scores[k].gain >= least]
+        strong = [k for k in ranked[:REFITTED] if scores.scores[k].gain >= least]
+        wanted = [
+            [k] for n, k in enumerate(strong) if not any(scores.same(j, k) for j in strong[:n])
+        ]
         if self._room(current.trial) > 1:
             wanted += self._promising_pairs(scores, ranked, level)
         refitted = []
