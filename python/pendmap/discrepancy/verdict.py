@@ -120,7 +120,8 @@ def judge(
     # The greatest of several runs is greater by chance.
     left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
     form = form_of(search.scores(trial), search.level(), torque=chance, left=left, runs=runs.chance)
-    rest = form.chance < CHANCE
+    # What an effect would take up that was too weak to be accepted is not unknown.
+    rest = (form.chance if trial.chosen else form.unnamed) < CHANCE
     closed = _closed(search, best)
     spread = max((runs.spread(c.free[0]) for c in trial.chosen), default=0.0)
     standings = tuple(standing_of(search, best, candidate) for candidate in trial.chosen)
