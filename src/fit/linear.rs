@@ -16,8 +16,8 @@ const WIDEST: usize = 16;
 /// up. Ten in a unit of time are common.
 const MOST_STEPS: usize = 1000;
 const MOST_STEPS_A_TIME: f64 = 50.0;
-/// The free parameters of a reading, and the angle.
-const READINGS: usize = MOST_READINGS + 1;
+/// The free parameters of a reading, angle and velocity.
+const READINGS: usize = MOST_READINGS + 2;
 
 /// A window at one point of the search.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     let directions = columns.motion.len() + 2;
     let follow = Follow { problem, shaped, columns, window, directions };
     let samples = window.to - window.from;
-    let mut slopes = vec![0.0; samples * directions];
+    let mut slopes = vec![[0.0; 2]; samples * directions];
     let (mut states, mut heard) = (Vec::new(), Vec::new());
     let mut first = 0;
     while first < directions {
@@ -84,14 +84,14 @@ struct Follow<'a> {
 }
 
 impl Follow<'_> {
-    /// What the sensor is given, the angle or an accelerometer's reading, with its derivatives in
-    /// `N` directions from `first` on.
+    /// What the sensor is given, angle and velocity or an accelerometer's reading and nothing, with
+    /// its derivatives in `N` directions from `first` on.
     fn pass<const N: usize>(
         &self,
         first: usize,
-        slopes: &mut [f64],
+        slopes: &mut [State],
         states: &mut Vec<State>,
-        heard: &mut Vec<f64>,
+        heard: &mut Vec<State>,
     ) {
         let record = &self.problem.records[self.window.record];
         let motion = &self.columns.motion;
@@ -119,26 +119,29 @@ impl Follow<'_> {
         };
         let run =
             sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
-        let given: Vec<Tangent<f64, N>> = match accelerometer {
-            None => run.states.iter().map(|state| state[0]).collect(),
+        let given: Vec<[Tangent<f64, N>; 2]> = match accelerometer {
+            None => run.states.clone(),
             Some(sensor) => {
                 let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
                 let moments = times.iter().zip(&run.states).zip(&run.signs);
                 moments
                     .map(|((tau, state), signs)| sensor.read(&course, *tau, *state, *signs, own))
+                    .map(|reading| [reading, Tangent::constant(0.0)])
                     .collect()
             }
         };
         let filled = N.min(self.directions - first);
         for (row, given) in slopes.chunks_exact_mut(self.directions).zip(&given) {
-            row[first..first + filled].copy_from_slice(&given.slope[..filled]);
+            for (k, slope) in row[first..first + filled].iter_mut().enumerate() {
+                *slope = [given[0].slope[k], given[1].slope[k]];
+            }
         }
-        *heard = given.into_iter().map(Number::value).collect();
+        *heard = given.into_iter().map(|each| each.map(Number::value)).collect();
         *states = run.states.iter().map(|state| state.map(Number::value)).collect();
     }
 
     /// What the sensor makes of what it is given.
-    fn read(&self, states: Vec<State>, heard: &[f64], slopes: &[f64]) -> Linear {
+    fn read(&self, states: Vec<State>, heard: &[State], slopes: &[State]) -> Linear {
         let record = &self.problem.records[self.window.record];
         let sensor = match self.shaped.accelerometer {
             None => Some(Sensor::new(&self.shaped.pendulum, self.columns)),
@@ -157,30 +160,32 @@ impl Follow<'_> {
                 continue;
             }
             let slopes = &slopes[k * self.directions..(k + 1) * self.directions];
-            let given = Tangent::seeded(*given, 0);
-            let read = sensor.as_ref().map_or(given, |sensor| sensor.read(given));
+            let read = sensor
+                .as_ref()
+                .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given));
             residuals.push(weight * (record.readings[sample] - read.value));
-            let by_angle = weight * read.slope[0];
-            rows.extend(slopes[..moving].iter().map(|slope| by_angle * slope));
-            rows.extend(read.slope[1..=reading].iter().map(|slope| weight * slope));
-            rows.extend(slopes[moving..].iter().map(|slope| by_angle * slope));
+            let by_state = [0, 1].map(|of| weight * read.slope[of]);
+            let through = |slope: &State| by_state[0] * slope[0] + by_state[1] * slope[1];
+            rows.extend(slopes[..moving].iter().map(through));
+            rows.extend(read.slope[2..2 + reading].iter().map(|slope| weight * slope));
+            rows.extend(slopes[moving..].iter().map(through));
         }
         Linear { states, residuals, rows, width }
     }
 }
 
-/// The sensor of the angle, with derivatives by the angle and by its free parameters.
+/// The sensor of the angle, with derivatives by angle, velocity and its free parameters.
 struct Sensor(Observation<Tangent<f64, READINGS>>);
 
 impl Sensor {
     fn new(pendulum: &Pendulum, columns: &Columns) -> Self {
         Self(Observation::lift(pendulum, |index, value| {
             let place = columns.reading.iter().position(|(_, own)| *own == index);
-            Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 1))
+            Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 2))
         }))
     }
 
-    fn read(&self, theta: Tangent<f64, READINGS>) -> Tangent<f64, READINGS> {
-        self.0.read(theta)
+    fn read(&self, state: State) -> Tangent<f64, READINGS> {
+        self.0.read(Tangent::seeded(state[0], 0), Tangent::seeded(state[1], 1))
     }
 }

@@ -43,7 +43,7 @@ impl HarmonicDrive {
 /// The pivot's acceleration over gravity, with all that effects have added to the harmonic drive.
 ///
 /// Upward `p cos(a) + second cos(2 a + second_phase)` and, toward positive theta,
-/// `lateral cos(a + lateral_phase)`, where `a = omega tau + phase`.
+/// `lateral cos(a + lateral_phase)`, where `a = omega tau + phase + chirp tau^2 / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion<R> {
     /// Amplitude of the harmonic drive.
@@ -60,24 +60,31 @@ pub struct Motion<R> {
     pub lateral: R,
     /// Its phase against the drive, rad.
     pub lateral_phase: R,
+    /// Rate of change of the angular frequency.
+    pub chirp: R,
 }
 
 impl<R: Real> Motion<R> {
-    /// `1 + a(tau)` with the upward acceleration `a`; without the second harmonic if `plain`.
+    /// `1 + a(tau)` with the upward acceleration `a`; without second harmonic and chirp if `plain`.
     #[inline(always)]
     pub fn vertical(&self, tau: R, plain: bool) -> R {
-        let angle = self.omega * tau + self.phase;
-        let first = self.p * cosine(angle) + tau.like(1.0);
         if plain {
-            return first;
+            return self.p * cosine(self.omega * tau + self.phase) + tau.like(1.0);
         }
+        let angle = self.angle(tau);
+        let first = self.p * cosine(angle) + tau.like(1.0);
         self.second * cosine(angle.scale(2.0) + self.second_phase) + first
     }
 
     /// The sideways acceleration.
     #[inline(always)]
     pub fn sideways(&self, tau: R) -> R {
-        self.lateral * cosine(self.omega * tau + self.phase + self.lateral_phase)
+        self.lateral * cosine(self.angle(tau) + self.lateral_phase)
+    }
+
+    #[inline(always)]
+    fn angle(&self, tau: R) -> R {
+        (self.omega + self.chirp.scale(0.5) * tau) * tau + self.phase
     }
 }
 

@@ -36,6 +36,8 @@ pub struct Equation<R> {
     pub ages: bool,
     /// Effects with a torque.
     torques: Vec<(Kind, [R; MOST_PARAMETERS])>,
+    /// Effects with an inertia, which are among the torques too.
+    inertias: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// Effects with a friction.
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// The effect with a corner.
@@ -96,8 +98,9 @@ impl<R: Real> Equation<R> {
             second_phase: zero,
             lateral: zero,
             lateral_phase: zero,
+            chirp: zero,
         };
-        let (mut torques, mut frictions) = (Vec::new(), Vec::new());
+        let (mut torques, mut inertias, mut frictions) = (Vec::new(), Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
         let mut corner = None;
@@ -119,6 +122,14 @@ impl<R: Real> Equation<R> {
             match effect.kind.definition().action {
                 Action::Position | Action::Velocity | Action::Kinked => {
                     torques.push((effect.kind, parameters));
+                }
+                Action::Driven => {
+                    torques.push((effect.kind, parameters));
+                    plain = false;
+                }
+                Action::Inertia => {
+                    torques.push((effect.kind, parameters));
+                    inertias.push((effect.kind, parameters));
                 }
                 Action::Friction | Action::SlidingFriction | Action::LoadedFriction => {
                     holds[0] |= effect.is(&[Action::LoadedFriction]);
@@ -145,6 +156,7 @@ impl<R: Real> Equation<R> {
             lab_time,
             ages,
             torques,
+            inertias,
             frictions,
             corner,
             sideways,
@@ -280,7 +292,18 @@ impl<R: Real> Equation<R> {
     /// `th''` while moving in the sense of `at`.
     #[inline(always)]
     pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        (-self.friction(at)).mul_add(at.sense, self.load(forcing, at))
+        let all = (-self.friction(at)).mul_add(at.sense, self.load(forcing, at));
+        if self.inertias.is_empty() { all } else { all / self.inertia(at) }
+    }
+
+    /// The inertia over that without effects.
+    #[inline(always)]
+    fn inertia(&self, at: &Point<R>) -> R {
+        let mut sum = at.constant(1.0);
+        for (kind, parameters) in &self.inertias {
+            sum = sum + kind.inertia(parameters, &at.hidden());
+        }
+        sum
     }
 
     #[inline(always)]
@@ -306,7 +329,8 @@ impl Equation<f64> {
     #[inline(always)]
     #[must_use]
     pub fn map<R: Real>(&self, number: R) -> Equation<R> {
-        let Motion { p, omega, phase, second, second_phase, lateral, lateral_phase } = self.motion;
+        let Motion { p, omega, phase, second, second_phase, lateral, lateral_phase, chirp } =
+            self.motion;
         let mut equation = Equation {
             gamma: number.like(self.gamma),
             theta_r: number.like(self.theta_r),
@@ -319,11 +343,13 @@ impl Equation<f64> {
                 second_phase: number.like(second_phase),
                 lateral: number.like(lateral),
                 lateral_phase: number.like(lateral_phase),
+                chirp: number.like(chirp),
             },
             gravity: [number.like(self.gravity[0]), number.like(self.gravity[1])],
             lab_time: number.like(self.lab_time),
             ages: self.ages,
             torques: Vec::new(),
+            inertias: Vec::new(),
             frictions: Vec::new(),
             corner: self
                 .corner
@@ -334,6 +360,9 @@ impl Equation<f64> {
         };
         for (kind, [a, b, c]) in &self.torques {
             equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+        }
+        for (kind, [a, b, c]) in &self.inertias {
+            equation.inertias.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
         }
         for (kind, [a, b, c]) in &self.frictions {
             equation.frictions.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));

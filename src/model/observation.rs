@@ -1,4 +1,4 @@
-//! What the sensor makes of the angle. The motion does not depend on it, so maps leave it out.
+//! What the sensor makes of the angle and of how fast it passes. The motion does not depend on it, so maps leave it out.
 
 use super::effects::{Action, Kind, MOST_PARAMETERS};
 use super::pendulum::Pendulum;
@@ -30,13 +30,13 @@ impl<R: Real> Observation<R> {
         Self { readings }
     }
 
-    /// The reading at the angle `theta`, rad and not wrapped: each effect in the order of the model
-    /// takes what the one before it gives.
+    /// The reading at the angle `theta`, rad and not wrapped, passed at `velocity`: each effect in the
+    /// order of the model takes what the one before it gives.
     #[must_use]
-    pub fn read(&self, theta: R) -> R {
+    pub fn read(&self, theta: R, velocity: R) -> R {
         let mut reading = theta;
         for (kind, parameters) in &self.readings {
-            reading = kind.reading(parameters, reading);
+            reading = kind.reading(parameters, reading, velocity);
         }
         reading
     }

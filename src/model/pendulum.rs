@@ -182,7 +182,10 @@ impl Pendulum {
     #[must_use]
     pub fn greatest_pull(&self) -> f64 {
         let motion = self.motion();
-        1.0 + motion.p.abs() + motion.second.abs() + motion.lateral.abs()
+        let carried =
+            |e: &Effect| if e.is(&[Action::Driven]) { e.parameters[0].abs() } else { 0.0 };
+        let further: f64 = self.effects.iter().map(carried).sum();
+        1.0 + (1.0 + further) * (motion.p.abs() + motion.second.abs()) + motion.lateral.abs()
     }
 
     /// The unit of "periods": `2 pi / omega`, or `2 pi` without drive.
@@ -222,7 +225,10 @@ impl Pendulum {
     pub fn route(&self) -> Route {
         let has = |actions: &[Action]| self.effects.iter().any(|e| e.is(actions));
         let sliding = [Action::SlidingFriction, Action::LoadedFriction];
-        if has(&[Action::Velocity, Action::Kinked]) || has(&sliding) || self.has_corner() {
+        if has(&[Action::Velocity, Action::Kinked, Action::Inertia])
+            || has(&sliding)
+            || self.has_corner()
+        {
             Route::General
         } else if self.has_friction() {
             Route::Friction
@@ -254,7 +260,7 @@ impl Pendulum {
     /// friction.
     #[must_use]
     pub fn has_extra_load(&self) -> bool {
-        let position = |e: &Effect| e.is(&[Action::Position, Action::Friction]);
+        let position = |e: &Effect| e.is(&[Action::Position, Action::Driven, Action::Friction]);
         self.motion().lateral != 0.0 || self.effects.iter().any(position)
     }
 

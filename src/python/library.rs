@@ -6,7 +6,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::model::Kind;
 use crate::model::effects::Power;
 
-/// Name, group, formula, parameters and the rest of every effect.
+/// Name, group, family, formula, parameters and the rest of every effect.
 #[pyfunction]
 pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
@@ -15,6 +15,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         let dict = PyDict::new(py);
         dict.set_item("name", definition.name)?;
         dict.set_item("group", definition.group.word())?;
+        dict.set_item("family", kind.family().words())?;
         dict.set_item("formula", definition.formula)?;
         dict.set_item("revealed_by", definition.revealed_by)?;
         dict.set_item("mappable", definition.mappable.word())?;

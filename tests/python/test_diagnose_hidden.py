@@ -35,7 +35,7 @@ def test_what_is_hidden_is_named_with_its_size(effect: str, parameter: str, tmp_
     low, high = named.ci95[parameter]
     wide = high - low
     assert low - wide < truth[effect][parameter] < high + wide
-    assert named.probability > 0.95
+    assert named.probability > 0.9
     assert not named.approximate
     gap = found.gap
     assert gap.after < gap.before

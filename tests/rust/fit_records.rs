@@ -39,7 +39,7 @@ pub fn record(
     }
     let states = sample(&course, 0.0, start, &times, |_, _| true).states;
     let sensor = Observation::lift(&pendulum, |_, value| value);
-    let readings = states.iter().map(|state| sensor.read(state[0])).collect();
+    let readings = states.iter().map(|state| sensor.read(state[0], state[1])).collect();
     let weights = vec![1.0; times.len()];
     Record {
         pendulum,

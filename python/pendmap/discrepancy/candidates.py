@@ -14,6 +14,8 @@ from pendmap.model.rig import COUNTERPARTS
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
+    from numpy.typing import NDArray
+
     from pendmap.model import Rig
     from pendmap.model.units import Units
 
@@ -22,6 +24,9 @@ __all__ = ["Candidate", "candidates", "own_name", "place"]
 SCANNED: Final = 6
 """Values of a shape parameter at which a candidate is scored, from the least typical one to the
 greatest in equal ratios: neighbouring shapes are then alike to a few percent."""
+
+PLACES: Final = 9
+"""The same of a place on the circle, in equal steps."""
 
 FAINT: Final = 1e-7
 """A size without dimensions at which an effect with a phase is scored: at 0 the phase would do
@@ -156,10 +161,16 @@ def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
         return
     first, *others = shapes
     fixed = {e["name"]: math.sqrt(e["typical"][0] * e["typical"][1]) for e in others}
-    low, high = first["typical"]
-    values = np.arange(low, high + 0.5) if _whole(first) else np.geomspace(low, high, SCANNED)
-    for value in values:
+    for value in _scan(*first["typical"], whole=_whole(first)):
         yield {first["name"]: float(value)} | fixed
+
+
+def _scan(low: float, high: float, *, whole: bool) -> NDArray[np.float64]:
+    if whole:
+        return np.arange(low, high + 0.5)
+    if low < 0:
+        return np.linspace(low, high, PLACES)  # a place on the circle
+    return np.geomspace(low, high, SCANNED)
 
 
 def _turns(entry: Mapping[str, Any]) -> bool:

@@ -39,9 +39,10 @@ class NamedEffect:
     ci95 : mapping of str to (float, float)
         Intervals of 95 % of what was fitted; a shape that was scanned has none.
     probability : float
-        That this name is right, among all names.
+        That this name is right: its share among its rivals, times the probability that one of
+        them is.
     approximate : bool
-        Whether its form is only nearly right.
+        Whether its form may be only nearly right.
     """
 
     name: str
@@ -82,7 +83,11 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
         }
         named.append(
             NamedEffect(
-                candidate.name, parameters, ci95, standing.probability, judgement.approximate
+                candidate.name,
+                parameters,
+                ci95,
+                standing.share * judgement.complete,
+                judgement.approximate,
             )
         )
     return tuple(named)

@@ -29,8 +29,11 @@ STARTS: Final = 3
 FIRST_BEND: Final = 1.1
 """Ratio of neighbouring shapes that are tried about the best one of the scan; then its root."""
 
-BENDS: Final = 3
+BENDS: Final = 2
 """How often."""
+
+SLIGHT: Final = 1.0
+"""Of a sum of squares: a shape that promises less is where it should be."""
 
 KICK: Final = 0.1
 """Part of the score's step from which a candidate is fitted a second time."""
@@ -128,9 +131,11 @@ class Refits:
             best = min(fits, key=lambda x: fits[x].chi2)
             for other in (best / width, best * width):
                 fit_at(other)
-            vertex = _vertex(fits)
-            if vertex is not None:
+            vertex, gain = _vertex(fits)
+            if gain > SLIGHT:
                 fit_at(vertex)
+            elif gain >= 0:
+                break
             width = math.sqrt(width)
         best_trial = min(fits.values(), key=_chi2)
         try:
@@ -147,16 +152,21 @@ class Refits:
             return None  # the start leads out of the range of numbers
 
 
-def _vertex(fits: dict[float, Trial]) -> float | None:
-    """Return where the parabola through the best fit and its neighbours is least."""
+def _vertex(fits: dict[float, Trial]) -> tuple[float, float]:
+    """Return where the parabola through the best fit and its neighbours is least.
+
+    And by how much that is less than the best; negative where there is no such place.
+    """
     places = sorted(fits)
     k = places.index(min(fits, key=lambda x: fits[x].chi2))
     if not 0 < k < len(places) - 1:
-        return None
+        return math.nan, -1.0
     x = np.log(places[k - 1 : k + 2])
     y = np.array([fits[p].chi2 for p in places[k - 1 : k + 2]])
-    a, b, _ = np.polyfit(x - x[1], y, 2)
-    return float(math.exp(x[1] - b / (2 * a))) if a > 0 else None
+    a, b, _ = np.polyfit(x - x[1], y, 2)  # exact: three points
+    return (
+        (float(math.exp(x[1] - b / (2 * a))), float(b * b / (4 * a))) if a > 0 else (math.nan, -1.0)
+    )
 
 
 def key_of(chosen: Sequence[Candidate]) -> Key:

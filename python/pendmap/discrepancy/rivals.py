@@ -6,12 +6,16 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.candidates import Candidate
+    from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.select import Search
+    from pendmap.discrepancy.trial import Trial
 
 __all__ = ["Rival", "Standing", "standing_of"]
 
@@ -50,7 +54,7 @@ class Rival:
     separation : float
         ``s = 1 - gain / gain of the effect found``.
     likeness : float
-        Cosine of the angle between what both do to the readings.
+        Cosine of the angle between what both do to the readings, with shapes as they are adapted.
     refitted : bool
         Whether the gain is that of a fit; else it is the score's.
     contains : bool
@@ -95,7 +99,7 @@ class Standing:
         return [self.candidate.name, *(r.candidate.name for r in self.rivals if r.alike)]
 
     @property
-    def probability(self) -> float:
+    def share(self) -> float:
         """The share of its likelihood among all names, with equal odds for each beforehand."""
         weights = [math.exp(-0.5 * max(r.behind, 0.0)) for r in self.rivals if not r.contains]
         return 1.0 / (1.0 + sum(weights))
@@ -128,13 +132,18 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
     reach = max(NEAR[0], NEAR[1] * gain)
     rivals = []
     for rank, k in enumerate(others):
-        score = scores.scores[k]
+        score, found = scores.scores[k], None
         reached, refitted = score.gain / level, False
-        if rank < REFITTED and gain - reached < reach:
+        if scores.same(own, k):
+            reached = gain
+        elif rank < REFITTED and gain - reached < reach:
             found = search.refit(rest, scores, [k])
             if found is not None:
                 reached, refitted = (rest.chi2 - found.trial.chi2) / level, True
         likeness = scores.likeness(own, k)
+        if refitted and found is not None:
+            # Its shape has been adapted since: what counts is what it does now.
+            likeness = max(likeness, _likeness(search.evidence, best.trial, found.trial, rest))
         more = score.candidate.count > candidate.count
         rivals.append(
             Rival(
@@ -149,3 +158,19 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
         )
     rivals.sort(key=lambda r: r.behind)
     return Standing(candidate, gain, tuple(rivals))
+
+
+def _likeness(evidence: Evidence, one: Trial, other: Trial, rest: Trial) -> float:
+    """Return how alike two fits' curves are: 1 if they are the same, 0 if as far as from none.
+
+    As the cosine that would put them so far apart, ``sqrt(1 - d^2 / G)``.
+    """
+    apart = 0.0
+    for k, run in enumerate(evidence.fitted):
+        difference = (one.fit.residuals[k] - other.fit.residuals[k]) / run.sigma
+        counted = np.isfinite(difference)
+        if run.trusted is not None:
+            counted &= run.trusted
+        apart += float(np.sum(difference[counted] ** 2))
+    gain = max(rest.chi2 - one.chi2, 1e-300)
+    return math.sqrt(max(1.0 - apart / gain, 0.0))

@@ -34,10 +34,13 @@ class RunByRun:
     uneven : float
         Cochran's Q over all parameters together, less its degrees of freedom, over its standard
         deviation: what the sum of squares would gain if each run had parameters of its own.
+    chance : float
+        That noise alone makes it so great, Q being distributed as chi-squared.
     """
 
     coefficients: dict[str, list[tuple[float, float]]]
     uneven: float
+    chance: float
 
     def spread(self, name: str) -> float:
         """Return how much a parameter differs from run to run beyond noise, over its size.
@@ -73,6 +76,8 @@ def run_by_run(evidence: Evidence, trial: Trial, level: float) -> RunByRun:
     ----------
     Cochran (1954), Biometrics 10, 101.
     """
+    from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
+
     found = sensitivities(trial.fit, evidence.fitted, (), trial.fit.model)
     sizes = np.linalg.norm(found.columns, axis=0)
     columns = found.columns / np.where(sizes > 0, sizes, 1.0)
@@ -92,7 +97,7 @@ def run_by_run(evidence: Evidence, trial: Trial, level: float) -> RunByRun:
             step = float(pull[place]) / seen / sizes[place]
             wanted[name].append((value + step, math.sqrt(level / seen) / sizes[place]))
     uneven = (q - degrees) / math.sqrt(2 * degrees) if degrees > 0 else 0.0
-    return RunByRun(wanted, uneven)
+    return RunByRun(wanted, uneven, float(chi2.sf(q, degrees)) if degrees > 0 else 1.0)
 
 
 def _rank(information: NDArray[np.float64]) -> int:

@@ -39,6 +39,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Score", "Scores", "scores_of"]
 
+SAME: Final = 1e-6
+"""A cosine that falls short of 1 by less is that of two names for one thing."""
+
 UNSEEN: Final = 1e-4
 """A candidate of which the fitted parameters follow all but this part (of the root of its
 information) does nothing of its own: rounding and the integrator's error are not far below."""
@@ -112,6 +115,12 @@ class Scores:
         left = _root_inverse(self.gram[np.ix_(a, a)])
         right = _root_inverse(self.gram[np.ix_(b, b)])
         return float(np.linalg.norm(left @ self.gram[np.ix_(a, b)] @ right, 2))
+
+    def same(self, one: int, other: int) -> bool:
+        """Whether two candidates are the same under two names: to fit both would say nothing."""
+        shaped = self.scores[one].candidate.shape or self.scores[other].candidate.shape
+        alike = len(self.columns[one]) == len(self.columns[other])
+        return not shaped and alike and self.likeness(one, other) > 1 - SAME
 
     def pairs(self, places: Sequence[int]) -> list[tuple[float, int, int]]:
         """Return the joint gains of all pairs among some candidates, the greatest first."""

@@ -39,6 +39,12 @@ PAIRED: Final = 8
 BENT: Final = 2
 """Of how many refitted candidates."""
 
+ALIKE: Final = 1.5
+"""Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
+
+CLEAN: Final = 1.0
+"""Standard errors of the slow part of the residuals below which nothing to speak of is left."""
+
 BEGUN: Final = 2
 """So often a search begins again from a better baseline."""
 
@@ -147,6 +153,8 @@ class Search:
         A search may end in the wrong valley, out of which an effect leads that has nothing to do
         with the pendulum.
         """
+        if self._consistent(found):
+            return None
         rest = found
         try:
             for candidate in found.chosen:
@@ -155,6 +163,17 @@ class Search:
         except InputError:
             return None
         return rest if rest.chi2 < self.base.trial.chi2 - GATE * self.level() else None
+
+    def _consistent(self, found: Trial) -> bool:
+        """Whether an effect gained what its size over its standard error says (Wald's test).
+
+        Where the baseline is in the wrong valley it has gained far more.
+        """
+        if len(found.chosen) > 1 or found.chosen[0].adapted:
+            return False
+        size = found.fit.estimates[found.chosen[0].free[0]]
+        fall = self.base.trial.chi2 - found.chi2
+        return bool(size.stderr and fall < ALIKE * (size.value / size.stderr) ** 2)
 
     def pool(self, trial: Trial) -> list[list[Candidate]]:
         """Return the candidates that a trial's model does not have yet."""
@@ -184,7 +203,10 @@ class Search:
         least = GATE * level
         if ranked:
             least = max(least, WORTH * scores.scores[ranked[0]].gain)
-        wanted = [[k] for k in ranked[:REFITTED] if scores.scores[k].gain >= least]
+        strong = [k for k in ranked[:REFITTED] if scores.scores[k].gain >= least]
+        wanted = [
+            [k] for n, k in enumerate(strong) if not any(scores.same(j, k) for j in strong[:n])
+        ]
         if self._room(current.trial) > 1:
             wanted += self._promising_pairs(scores, ranked, level)
         refitted = []
@@ -194,9 +216,10 @@ class Search:
                 refitted.append((found, places))
         refitted.sort(key=lambda pair: pair[0].trial.bic(level))
         # A shape that was only scanned may lose to another effect for that reason.
-        refitted[:BENT] = [
-            (self._refits.bent(current.trial, f), places) for f, places in refitted[:BENT]
-        ]
+        for k, (found, places) in enumerate(refitted[:BENT]):
+            # Beside one that leaves nothing no shape gains anything.
+            if k == 0 or refitted[0][0].trial.remainder.z > CLEAN:
+                refitted[k] = (self._refits.bent(current.trial, found), places)
         refitted.sort(key=lambda pair: pair[0].trial.bic(level))
         accepted = None
         for found, places in refitted:

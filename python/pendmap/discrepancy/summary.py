@@ -90,6 +90,9 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             "uneven": judgement.uneven,
             "spread": judgement.spread,
             "torque_by_chance": judgement.chance,
+            "chance": judgement.form.chance,
+            "chances": dict(judgement.form.chances),
+            "further": judgement.form.further,
             "chi2_per_degree": judgement.ratio,
             "allowed": judgement.ratio_allowed,
         },
@@ -169,7 +172,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
             for name, value in effect.parameters.items()
         )
-        nearly = ", its form only nearly right" if effect.approximate else ""
+        nearly = ", with reserve: what is missing may be like it only" if effect.approximate else ""
         yield f"  {effect.name}: {values}; probability {effect.probability:.3f}{nearly}"
     for names in found.equivalent:
         yield f"  not told apart here: {', '.join(names)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -15,9 +16,10 @@ if TYPE_CHECKING:
 
     from pendmap.discrepancy.candidates import Candidate
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
-__all__ = ["Held", "Trial", "fitted", "tried", "with_candidates"]
+__all__ = ["ASTRAY", "Held", "Trial", "fitted", "tried", "with_candidates"]
 
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
@@ -28,6 +30,9 @@ short again may find a better one."""
 
 MOST_STEPS: Final = 40
 """Steps of a fit at most."""
+
+LITTLE: Final = 0.05
+"""Of a sum of squares: far below what decides between candidates."""
 
 FEW_STEPS: Final = 12
 """Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
@@ -64,14 +69,19 @@ class Trial:
         What was fitted, as in :func:`pendmap.identification.fitting.fit_runs`.
     chosen : tuple of Candidate
         The effects that were added to the baseline.
-    remainder : Remainder
-        What it leaves.
+    runs : tuple of FitRun
+        What it was fitted to.
     """
 
     fit: TrajectoryFit
     free: tuple[str, ...]
     chosen: tuple[Candidate, ...]
-    remainder: Remainder
+    runs: tuple[FitRun, ...]
+
+    @functools.cached_property
+    def remainder(self) -> Remainder:
+        """What it leaves."""
+        return remainder_of(self.fit, self.runs, len(self.fit.names))
 
     @property
     def chi2(self) -> float:
@@ -112,6 +122,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     start: Mapping[str, float] | None = None,
     windows: Windows | None = None,
     steps: int = MOST_STEPS,
+    least_gain: float = 1e-3,
 ) -> Trial:
     """Fit a model to the evidence.
 
@@ -125,15 +136,20 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         What is fitted.
     chosen : sequence of Candidate
         The effects of the model that were added to the baseline.
-    start, windows, steps
+    start, windows, steps, least_gain
         As of :func:`pendmap.identification.fitting.fit_runs`.
     """
     fit = fit_runs(
-        evidence.fitted, model, free, start=start, windows=windows, profiled=(), steps=steps
+        evidence.fitted,
+        model,
+        free,
+        start=start,
+        windows=windows,
+        profiled=(),
+        steps=steps,
+        least_gain=least_gain,
     )
-    adapted = len(fit.names)
-    remainder = remainder_of(fit, evidence.fitted, adapted)
-    return Trial(fit, tuple(free), tuple(chosen), remainder)
+    return Trial(fit, tuple(free), tuple(chosen), evidence.fitted)
 
 
 def with_candidates(
@@ -163,7 +179,14 @@ def with_candidates(
     begin = trial.start | dict(start)
     chosen = (*trial.chosen, *added)
     found = fitted(
-        evidence, model, free, chosen, start=begin, windows=trial.fit.windows, steps=FEW_STEPS
+        evidence,
+        model,
+        free,
+        chosen,
+        start=begin,
+        windows=trial.fit.windows,
+        steps=FEW_STEPS,
+        least_gain=LITTLE,
     )
     if trial.chi2 > ASTRAY * max(trial.fit.degrees, 1):
         again = fitted(evidence, found.fit.model, free, chosen, start=found.start)

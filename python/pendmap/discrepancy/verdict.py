@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from pendmap.discrepancy.calibration import complete
+from pendmap.discrepancy.form import Form, form_of
 from pendmap.discrepancy.rivals import Standing, standing_of
 
 if TYPE_CHECKING:
@@ -20,9 +22,6 @@ __all__ = ["Judgement", "judge"]
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
-LEFT: Final = 5.0
-"""Standard errors of the slow part of the residuals above which something is left."""
-
 SPREAD: Final = 0.5
 """How much an effect's size may differ from run to run, over its size, beyond what noise makes:
 more is no effect that is alike in every run."""
@@ -30,8 +29,11 @@ more is no effect that is alike in every run."""
 CLOSED: Final = 0.75
 """Share of the gap on held-out data that effects must close to be named beside what is left."""
 
-CHANCE: Final = 1e-5
-"""Chance of a residual torque below which something is left."""
+CHANCE: Final = 1e-3
+"""Chance of what is left below which it is no chance: a tenth of the false alarms allowed."""
+
+SURE: Final = 0.9
+"""Probability that names are right below which they are given with reserve."""
 
 SEVERAL: Final = 1.0
 """Standard errors by which the greatest of several runs counts as less than all together."""
@@ -66,6 +68,11 @@ class Judgement:
     chance : float
         That noise alone would show such a torque over angle, velocity, amplitude, drive phase or
         time as is left.
+    form : Form
+        What is left, looked for in every direction.
+    complete : float
+        Probability that the effects found are all that is missing, each by its name or in its
+        class (:mod:`pendmap.discrepancy.calibration`); 1 where none was found.
     """
 
     verdict: Verdict
@@ -77,11 +84,13 @@ class Judgement:
     uneven: float
     spread: float
     chance: float
+    form: Form
+    complete: float
 
     @property
     def approximate(self) -> bool:
-        """Whether the form of what was found is only nearly right."""
-        return self.verdict == "partial"
+        """Whether what was found may be only nearly what is missing."""
+        return self.verdict == "partial" or self.complete < SURE
 
 
 def judge(
@@ -110,10 +119,13 @@ def judge(
     ratio = trial.chi2 / degrees
     # The greatest of several runs is greater by chance.
     left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
-    rest = left > LEFT or uneven > LEFT or chance < CHANCE
+    form = form_of(search.scores(trial), search.level(), torque=chance, left=left, runs=runs.chance)
+    # What an effect would take up that was too weak to be accepted is not unknown.
+    rest = (form.chance if trial.chosen else form.unnamed) < CHANCE
     closed = _closed(search, best)
     spread = max((runs.spread(c.free[0]) for c in trial.chosen), default=0.0)
     standings = tuple(standing_of(search, best, candidate) for candidate in trial.chosen)
+    sure = complete(form.chance, [s.gain for s in standings]) if standings else 1.0
     verdict: Verdict
     if not trial.chosen:
         verdict = "unknown" if rest else "none"
@@ -123,7 +135,9 @@ def judge(
         verdict = "ambiguous"
     else:
         verdict = "named"
-    return Judgement(verdict, standings, left, ratio, allowed, closed, uneven, spread, chance)
+    return Judgement(
+        verdict, standings, left, ratio, allowed, closed, uneven, spread, chance, form, sure
+    )
 
 
 def _closed(search: Search, best: Found) -> float:

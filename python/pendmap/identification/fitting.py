@@ -106,6 +106,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     sigma_doubt: float = 0.0,
     hold: bool = False,
     steps: int = 40,
+    least_gain: float = 1e-3,
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
 
@@ -139,6 +140,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         knows are adapted alone: a model is tried on records that it was not fitted to.
     steps : int
         The most steps of a stage.
+    least_gain : float
+        A step that promises less of the sum of squares than this is the last one.
 
     Raises
     ------
@@ -163,7 +166,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         "shortest": units.w0 * (swing if shortest_s is None else shortest_s),
         "growth": 4.0,
         "steps": steps,
-        "gain": 1e-3,
+        "gain": least_gain,
         "hold": len([q for q in quantities if q.name.partition("[")[0] in free]) if hold else 0,
         "profiled": chosen,
         "level": LEVEL,

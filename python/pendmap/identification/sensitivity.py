@@ -26,6 +26,9 @@ __all__ = ["Sensitivities", "WindowSlopes", "sensitivities", "window_slopes"]
 STATE: Final = 2
 """Columns of an initial state."""
 
+FOLLOWED: Final = 1e-6
+"""What the initial state follows to within this part of it, it follows: the rest is rounding."""
+
 BLIND: Final = 1e-11
 """A direction of the state that changes readings by less than this part of the other is unseen."""
 
@@ -89,7 +92,9 @@ class WindowSlopes:
 
         def free(values: NDArray[np.float64]) -> NDArray[np.float64]:
             kept = values[counted]
-            return np.asarray(kept - basis @ (basis.T @ kept), np.float64)
+            rest = kept - basis @ (basis.T @ kept)
+            followed = np.linalg.norm(rest, axis=0) < FOLLOWED * np.linalg.norm(kept, axis=0)
+            return np.asarray(np.where(followed, 0.0, rest), np.float64)
 
         places = np.flatnonzero(counted).astype(np.int64)
         return free(self.columns), free(further), free(self.residual), places

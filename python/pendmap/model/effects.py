@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SHAPES", "Effect", "definition", "library"]
 
-SHAPES: Final = ("n", "w", "vs")
+SHAPES: Final = ("n", "th0", "w", "vs")
 """Parameters of effects that say how they act, not how strongly."""
 
 
@@ -123,8 +123,12 @@ class Effect:
         values = {}
         for parameter in entry["parameters"]:
             low, high = parameter["typical"]
-            shape = parameter["name"] in SHAPES
-            values[parameter["name"]] = float(f"{(low * high) ** 0.5:.1g}") if shape else low
+            if parameter["name"] not in SHAPES:
+                values[parameter["name"]] = low
+            elif low > 0:
+                values[parameter["name"]] = float(f"{(low * high) ** 0.5:.1g}")
+            else:
+                values[parameter["name"]] = 0.5 * (low + high)
         return cls(entry["name"], values).given(units)
 
     @property

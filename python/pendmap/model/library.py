@@ -51,6 +51,9 @@ class EffectDefinition:
         The field's standard term.
     group : str
         Where it acts: ``damping``, ``torque``, ``drive`` or ``reading``.
+    family : str
+        What it is mistaken for first: ``damping``, ``dry friction``, ``position torque``,
+        ``drive`` or ``reading``.
     formula : str
         Its term on the right of ``th'' = ...``, per moment of inertia, with ``v = th'``; of a drive
         what the pivot does, of a reading what the sensor shows.
@@ -65,6 +68,7 @@ class EffectDefinition:
 
     name: str
     group: str
+    family: str
     formula: str
     parameters: tuple[EffectParameter, ...]
     mappable: str

@@ -30,12 +30,13 @@ NONE: Final = "none"
 
 
 def describe() -> list[dict[str, str]]:
-    """Name, group, formula and parameters with their default ranges, for each effect."""
+    """Name, group, formula, runs needed and parameters with their ranges, for each effect."""
     return [
         {
             "name": name,
             "group": effect.group,
             "formula": effect.formula,
+            "needs": effect.needs,
             "parameters": ", ".join(_range(field) for field in dataclasses.fields(effect)),
         }
         for name, effect in EFFECTS.items()

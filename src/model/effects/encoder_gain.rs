@@ -23,7 +23,7 @@ impl Law for EncoderGain {
         mappable: Mappable::Yes,
     };
 
-    fn reading<R: Real>([e, ..]: &[R; MOST_PARAMETERS], theta: R) -> R {
+    fn reading<R: Real>([e, ..]: &[R; MOST_PARAMETERS], theta: R, _: R) -> R {
         theta + *e * theta
     }
 }

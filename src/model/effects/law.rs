@@ -44,6 +44,10 @@ impl Group {
 pub enum Action {
     /// A torque of angle and time.
     Position,
+    /// A torque of the angle and of how the pivot moves.
+    Driven,
+    /// An inertia of the angle, with the torque that comes of it.
+    Inertia,
     /// A smooth torque of the velocity.
     Velocity,
     /// A continuous torque of the velocity whose formula changes with its sign.
@@ -238,9 +242,15 @@ pub trait Law {
     #[inline(always)]
     fn drive<R: Real>(_: &[R; MOST_PARAMETERS], _: &mut Motion<R>) {}
 
-    /// What a sensor reads at the angle `theta`.
+    /// What it adds to the inertia, which is 1 without it; of [`Action::Inertia`] only.
     #[inline(always)]
-    fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R) -> R {
+    fn inertia<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        at.constant(0.0)
+    }
+
+    /// What a sensor reads at the angle `theta`, passing it at `velocity`.
+    #[inline(always)]
+    fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R, _: R) -> R {
         theta
     }
 

@@ -3,8 +3,10 @@
 //! [`law`] says what an effect is. A new one is one file with a [`Law`] and one line in the list
 //! below; Python, the command line, model files, maps and fits read it from here.
 
+pub mod family;
 pub mod law;
 
+pub use family::Family;
 pub use law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
 
 use super::drive::Motion;
@@ -72,6 +74,14 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::inertia`].
+            #[inline(always)]
+            pub fn inertia<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+                match self {
+                    $(Self::$law => $module::$law::inertia(parameters, at),)*
+                }
+            }
+
             /// [`Law::drive`].
             pub fn drive<R: Real>(self, parameters: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
                 match self {
@@ -80,9 +90,14 @@ macro_rules! library {
             }
 
             /// [`Law::reading`].
-            pub fn reading<R: Real>(self, parameters: &[R; MOST_PARAMETERS], theta: R) -> R {
+            pub fn reading<R: Real>(
+                self,
+                parameters: &[R; MOST_PARAMETERS],
+                theta: R,
+                velocity: R,
+            ) -> R {
                 match self {
-                    $(Self::$law => $module::$law::reading(parameters, theta),)*
+                    $(Self::$law => $module::$law::reading(parameters, theta, velocity),)*
                 }
             }
 
@@ -114,20 +129,28 @@ library! {
     stribeck_friction::StribeckFriction,
     load_dependent_friction::LoadDependentFriction,
     asymmetric_viscous::AsymmetricViscous,
+    asymmetric_coulomb::AsymmetricCoulomb,
+    rough_spot::RoughSpot,
     coulomb_drift::CoulombDrift,
     viscous_drift::ViscousDrift,
     bias_torque::BiasTorque,
     bearing_harmonic::BearingHarmonic,
     magnet::Magnet,
     elastic_restoring::ElasticRestoring,
+    inertia_ripple::InertiaRipple,
+    added_mass::AddedMass,
+    rig_tilt::RigTilt,
     drive_amplitude::DriveAmplitude,
     drive_phase::DrivePhase,
     drive_frequency::DriveFrequency,
+    drive_chirp::DriveChirp,
     drive_second_harmonic::DriveSecondHarmonic,
     lateral_drive::LateralDrive,
     encoder_offset::EncoderOffset,
     encoder_gain::EncoderGain,
     encoder_eccentricity::EncoderEccentricity,
+    sensor_lag::SensorLag,
+    timebase::Timebase,
 }
 
 impl Kind {

@@ -1,0 +1,52 @@
+"""The numbers of pendmap/discrepancy/calibration.py from blind experiments.
+
+    python benchmarks/blind_calibration.py blind.jsonl [more.jsonl ...]
+
+A set of effects that was claimed is right where each is hidden, by its name or in its class.
+Logistic regression; each number is drawn towards the one that stands there by a normal prior of
+width 1, so that few experiments change little. Experiments that calibrate are not those that the
+probabilities are judged by: use another seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from blind_report import sound
+from pendmap.discrepancy.calibration import COEFFICIENTS, features
+
+WIDTH = 1.0
+"""Standard deviation of the prior."""
+
+
+def main() -> None:
+    """Fit and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("files", type=Path, nargs="+")
+    lines = [
+        line
+        for file in parser.parse_args().files
+        for line in file.read_text(encoding="utf-8").splitlines()
+    ]
+    rows = [row for row in map(json.loads, lines) if row.get("named")]
+    x = np.array([features(r["form"][0], [s["gain"] for s in r["standings"]]) for r in rows])
+    y = np.array([sound(row) for row in rows])
+    prior = np.array(COEFFICIENTS)
+
+    def loss(b: np.ndarray) -> float:
+        sign = np.where(y, 1.0, -1.0)
+        fit = np.sum(np.logaddexp(0.0, -sign * (x @ b)))
+        return float(fit + 0.5 * np.sum(((b - prior) / WIDTH) ** 2))
+
+    found = minimize(loss, prior)
+    print(f"{len(rows)} sets, {int(np.sum(y))} right")
+    print("COEFFICIENTS =", tuple(round(float(b), 2) for b in found.x))
+
+
+if __name__ == "__main__":
+    main()

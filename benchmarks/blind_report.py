@@ -1,0 +1,253 @@
+"""What the blind benchmark found: figures, confusion matrix, and how true probabilities are.
+
+Intervals are those of Wilson (1927), J. Am. Stat. Assoc. 22, 209, 95 %.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blind_cases import CLEAR
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+    Row = dict[str, Any]
+
+BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
+"""Edges between which probabilities are compared with what came true."""
+
+STRONG, SEEN = 100.0, 60.0
+"""Scores from which figures count."""
+
+
+def share_of(hits: int, of: int) -> tuple[float, float, float]:
+    """Return a share with the ends of its interval."""
+    z, share = 1.96, hits / of
+    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * math.sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
+    return share, max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def wilson(hits: int, of: int) -> str:
+    """Return a share with its interval, in words."""
+    if of == 0:
+        return "no cases"
+    share, low, high = (100 * x for x in share_of(hits, of))
+    return f"{share:.1f} % ({hits} of {of}; {low:.1f} to {high:.1f} %)"
+
+
+def true_names(row: Row) -> list[str]:
+    """Return the names of what is hidden, without their variants."""
+    return [effect.split(":")[0] for effect in row["effects"] if effect != "none"]
+
+
+def classes(row: Row) -> list[set[str]]:
+    """Return for each effect that is claimed all names that the verdict holds possible."""
+    return [{name, *next((c for c in row["classes"] if name in c), ())} for name in row["named"]]
+
+
+def right(row: Row) -> bool:
+    """Whether as many effects are claimed as are hidden, each by name or in its class."""
+    return sound(row) and len(row["named"]) == len(true_names(row))
+
+
+def sound(row: Row) -> bool:
+    """Whether each effect that is claimed is hidden, by its name or in its class."""
+    hidden = true_names(row)
+    for own in classes(row):
+        name = next((name for name in hidden if name in own), None)
+        if name is None:
+            return False
+        hidden.remove(name)
+    return bool(row["named"])
+
+
+def strength(row: Row) -> float:
+    """Return the least score of what is hidden."""
+    return min(row["G"], default=0.0)
+
+
+def confidently_wrong(row: Row) -> bool:
+    """Whether names are claimed without reserve, and none of them can be right."""
+    return row["verdict"] in {"named", "ambiguous"} and not all(row["approximate"])
+
+
+def careful(row: Row) -> bool:
+    """Whether a withheld effect got no name, or a reserved one of its family."""
+    if row["verdict"] in {"unknown", "partial"}:
+        return True
+    return bool(row["named"]) and all(row["approximate"]) and _of_family(row)
+
+
+def figures(rows: list[Row]) -> list[list[str]]:
+    """Return the lines of the table: what, target, measured."""
+
+    def share(of: Iterable[Row], hit: Callable[[Row], bool]) -> str:
+        chosen = list(of)
+        return wilson(sum(map(hit, chosen)), len(chosen))
+
+    def found(row: Row) -> bool:
+        return bool(row["verdict"] != "none")
+
+    def kind(what: str, least: float = 0.0) -> list[Row]:
+        return [r for r in rows if r["what"] == what and strength(r) >= least]
+
+    def told(of: list[Row]) -> list[Row]:
+        return [r for r in of if r["s"] * strength(r) >= CLEAR]
+
+    one, two = kind("one"), kind("two")
+    clear, withheld = told(kind("one", STRONG)), told(kind("withheld", STRONG))
+    sizes = [len(c) for r in clear if right(r) for c in classes(r)]
+    inside, errors = _parameters([r for r in clear if r["named"] == true_names(r)])
+    spoilt = [r for r in kind("nuisance") if not true_names(r)]
+    return [
+        ["false alarms, nothing hidden", "at most 1 %", share(kind("none"), found)],
+        ["right, G >= 100 and s G >= 25", "98 %", share(clear, right)],
+        [
+            "the name alone",
+            "90 %",
+            share(clear, lambda r: right(r) and not r["classes"]),
+        ],
+        ["detected, G >= 60", "95 %", share(kind("one", SEEN), found)],
+        ["detected, G >= 100", "99 %", share(kind("one", STRONG), found)],
+        [
+            "class size, G >= 100 and s G >= 25, mean",
+            "1.5",
+            f"{np.mean(sizes):.2f} of {len(sizes)}" if sizes else "no cases",
+        ],
+        ["both of a pair, G >= 100 and s G >= 25", "95 %", share(told(kind("two", STRONG)), right)],
+        [
+            "withheld, G >= 100: no name, or reserved and of the family",
+            "90 %",
+            share(withheld, careful),
+        ],
+        [
+            "withheld, G >= 100: wrong name without reserve",
+            "at most 5 %",
+            share(withheld, confidently_wrong),
+        ],
+        ["wrongly unknown", "at most 2 %", share(one + two, lambda r: r["verdict"] == "unknown")],
+        [
+            "named without reserve, where right",
+            "",
+            share(
+                (r for r in one + two if r["named"] and right(r)),
+                lambda r: not any(r["approximate"]),
+            ),
+        ],
+        ["95 % intervals that cover", "92 to 98 %", wilson(sum(inside), len(inside))],
+        [
+            "error times sqrt(G), median",
+            "0.8",
+            f"{np.median(errors):.2f} of {len(errors)}" if errors else "no cases",
+        ],
+        [
+            "held-out chi^2/N afterwards, median",
+            "1.03",
+            f"{np.median([r['held'] for r in one + two]):.3f}" if one + two else "no cases",
+        ],
+        ["form differs, G >= 100: right family", "90 %", share(kind("form", STRONG), _of_family)],
+        ["nuisances: false alarms", "at most 2 %", share(spoilt, found)],
+        [
+            "seconds of one thread for 9 runs of 2,500 samples, median",
+            "",
+            f"{np.median([22500 * r['seconds'] / r['samples'] for r in rows]):.1f}" if rows else "",
+        ],
+    ]
+
+
+def _of_family(row: Row) -> bool:
+    """Whether the strongest effect that is claimed is of the family of what is hidden."""
+    if not row["named"]:
+        return False
+    gains = [standing["gain"] for standing in row["standings"]]
+    return row["named_families"][int(np.argmax(gains))] in row["families"]
+
+
+def _parameters(rows: Iterable[Row]) -> tuple[list[bool], list[float]]:
+    """Return whether intervals of first parameters cover the truth, and the relative errors."""
+    inside, errors = [], []
+    for row in rows:
+        name = row["named"][0]
+        values, bounds = row["parameters"][name]
+        size = next(iter(values))
+        true = row["truth"].get(name, {}).get(size)
+        if true is None or size not in bounds:
+            continue
+        low, high = bounds[size]
+        inside.append(low <= true <= high)
+        errors.append(abs(values[size] / true - 1) * math.sqrt(strength(row)))
+    return inside, errors
+
+
+def believed(rows: Iterable[Row]) -> tuple[list[float], list[bool]]:
+    """Return all probabilities that were given, and whether their names were right."""
+    chances, true = [], []
+    for row in rows:
+        for name, chance in zip(row["named"], row["probability"], strict=True):
+            chances.append(chance)
+            true.append(name in true_names(row))
+    return chances, true
+
+
+def reliability(rows: Iterable[Row]) -> list[list[str]]:
+    """Return by bins of probability: how many names, the mean, the share that was right."""
+    chances, true = (np.array(x) for x in believed(rows))
+    lines = []
+    for low, high in itertools.pairwise(BINS):
+        own = (chances >= low) & ((chances < high) | (high == 1.0)) if chances.size else chances
+        count = int(np.count_nonzero(own))
+        if count:
+            hits = int(np.count_nonzero(true[own]))
+            mean = f"{float(np.mean(chances[own])):.3f}"
+            lines.append([f"{low:g} to {high:g}", str(count), mean, wilson(hits, count)])
+    return lines
+
+
+def confusion(rows: Iterable[Row]) -> list[list[str]]:
+    """Return what was said of each effect that was hidden alone: the matrix without its zeros."""
+    counts: Counter[tuple[str, str]] = Counter()
+    for row in rows:
+        if row["what"] in {"one", "withheld", "form"} and strength(row) >= SEEN:
+            said = (
+                " + ".join(
+                    "/".join([n, *sorted(c - {n})])
+                    for n, c in zip(row["named"], classes(row), strict=True)
+                )
+                or row["verdict"]
+            )
+            reserve = "nearly " if row["named"] and all(row["approximate"]) else ""
+            hidden = row["effects"][0] + (" (withheld)" if row["what"] == "withheld" else "")
+            counts[hidden, reserve + said] += 1
+    return [[hidden, said, str(times)] for (hidden, said), times in sorted(counts.items())]
+
+
+def draw_reliability(rows: Iterable[Row], path: Path) -> None:
+    """Draw the share of names that were right against the probability they were given."""
+    import matplotlib.pyplot as plt  # noqa: PLC0415 (for a picture only)
+
+    chances, true = (np.array(x) for x in believed(rows))
+    figure, axes = plt.subplots(figsize=(4.2, 4.2), layout="constrained")
+    axes.plot([0, 1], [0, 1], color="0.7", linewidth=1)
+    for low, high in itertools.pairwise(BINS):
+        own = (chances >= low) & ((chances < high) | (high == 1.0))
+        count = int(np.count_nonzero(own))
+        if not count:
+            continue
+        share, least, most = share_of(int(np.count_nonzero(true[own])), count)
+        mean = float(np.mean(chances[own]))
+        axes.plot([mean, mean], [least, most], color="C0", linewidth=1.5)
+        axes.plot(mean, share, "o", color="C0", markersize=5)
+        axes.annotate(str(count), (mean, share), xytext=(6, -10), textcoords="offset points")
+    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
+    axes.set_xlabel("probability given to a name")
+    axes.set_ylabel("share of names that were right")
+    figure.savefig(path, dpi=150)
+    plt.close(figure)

@@ -1,0 +1,32 @@
+//! A sensor that is late: a filter of first order, `tau y' = theta - y`, much quicker than the swing.
+//!
+//! What is kept is the first power of `tau`; the next is `tau^2 th''`, smaller by `tau w0`. A free decay
+//! read late is one that began late: only what has a clock of its own, a drive, shows it.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+
+pub struct SensorLag;
+
+impl Law for SensorLag {
+    const DEFINITION: Definition = Definition {
+        name: "sensor_lag",
+        group: Group::Reading,
+        action: Action::Reading,
+        formula: "reading theta - tau v",
+        parameters: &[Parameter {
+            name: "tau",
+            unit: "s",
+            power: Power::Of(-1),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [1e-4, 0.1],
+            meaning: "time by which the reading is late; negative where the drive's clock is",
+        }],
+        revealed_by: "forced runs at several frequencies, against a drive phase",
+        mappable: Mappable::Yes,
+    };
+
+    fn reading<R: Real>([tau, ..]: &[R; MOST_PARAMETERS], theta: R, velocity: R) -> R {
+        theta - *tau * velocity
+    }
+}

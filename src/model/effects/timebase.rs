@@ -1,0 +1,33 @@
+//! A record whose clock runs fast or slow.
+//!
+//! Its seconds are what all rates are counted in, `w0` and damping too: only the drive, which has a clock
+//! of its own, has another frequency in them. That is an error of the drive's frequency, exactly.
+
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use crate::lanes::Real;
+use crate::model::drive::Motion;
+
+pub struct Timebase;
+
+impl Law for Timebase {
+    const DEFINITION: Definition = Definition {
+        name: "timebase",
+        group: Group::Drive,
+        action: Action::Drive,
+        formula: "omega/(1 + e), the record's time being (1 + e) t",
+        parameters: &[Parameter {
+            name: "e",
+            unit: "1",
+            power: Power::Of(0),
+            range: [-0.9, 10.0],
+            typical: [-0.01, 0.01],
+            meaning: "seconds that the record's clock gains in one",
+        }],
+        revealed_by: "forced runs; a better clock tells it from a drive frequency",
+        mappable: Mappable::Yes,
+    };
+
+    fn drive<R: Real>([e, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+        motion.omega = motion.omega / (*e + e.like(1.0));
+    }
+}

@@ -1,0 +1,66 @@
+"""Names that records cannot tell apart, found from the records' own sensitivities."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from pendmap import virtual_rig
+from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.candidates import Candidate
+from pendmap.discrepancy.evidence import evidence_of
+from pendmap.discrepancy.scores import Scores, scores_of
+from pendmap.records import read_experiment
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def scored(folder: Path, names: list[str | Candidate], *, forced: int) -> Scores:
+    """Score effects at the baseline of an experiment that hides nothing."""
+    request = virtual_rig.Request("hidden", seed=4, effects=("none",), free=2, forced=forced)
+    where = virtual_rig.places(folder / "plain", replace=True)
+    virtual_rig.write(virtual_rig.make(request), where)
+    evidence = evidence_of(read_experiment(where.experiment))
+    pool = [[Candidate(n) if isinstance(n, str) else n] for n in names]
+    return scores_of(evidence, baseline(evidence), pool)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "forced"),
+    [
+        ("bias_torque", "asymmetric_coulomb", 0),
+        ("bias_torque", "asymmetric_coulomb", 2),
+        ("drive_frequency", "timebase", 2),
+        ("drive_amplitude", "added_mass", 2),
+        ("rig_tilt", "encoder_offset", 0),
+        # One period a turn is gravity itself, and gravity turned.
+        ("rig_tilt", Candidate("bearing_harmonic", {"n": 1.0}), 0),
+    ],
+)
+def test_equals_are_alike(one: str, other: str | Candidate, forced: int, tmp_path: Path) -> None:
+    scores = scored(tmp_path, [one, other], forced=forced)
+    assert scores.likeness(0, 1) == pytest.approx(1, abs=1e-4)
+    gains = [score.gain for score in scores.scores]
+    assert gains[0] == pytest.approx(gains[1], rel=1e-2, abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("rig_tilt", "encoder_offset"),
+        ("drive_frequency", "drive_phase"),
+        ("sensor_lag", "encoder_offset"),
+        ("asymmetric_coulomb", "asymmetric_viscous"),
+    ],
+)
+def test_what_differs_under_a_drive_is_told_apart(one: str, other: str, tmp_path: Path) -> None:
+    assert scored(tmp_path, [one, other], forced=2).likeness(0, 1) < 0.99
+
+
+@pytest.mark.parametrize("name", ["added_mass", "sensor_lag"])
+def test_what_leaves_no_trace_in_a_free_decay_gains_nothing(name: str, tmp_path: Path) -> None:
+    score = scored(tmp_path, [name, "encoder_offset"], forced=0).scores[0]
+    assert score.gain == 0
+    assert score.information == 0

@@ -1,0 +1,52 @@
+"""With how much reserve a name is given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+import pendmap
+from hidden import diagnosed
+from pendmap.discrepancy.calibration import complete
+from pendmap.discrepancy.verdict import CHANCE, SURE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_probability_falls_with_what_is_left_and_with_how_many_effects_it_took() -> None:
+    by_chance = [complete(chance, [500.0]) for chance in (1.0, 0.1, 1e-2, 1e-3)]
+    assert by_chance == sorted(by_chance, reverse=True)
+    assert by_chance[0] > SURE > by_chance[-1]
+    by_count = [complete(0.5, [500.0] * count) for count in (1, 2, 3)]
+    assert by_count == sorted(by_count, reverse=True)
+    # One that mops up what a stronger one of the wrong form leaves.
+    assert complete(0.5, [2000.0, 1500.0]) > complete(0.5, [2000.0, 20.0])
+    assert complete(0.0, [1e300, 0.0]) > 0
+
+
+def test_nothing_left_is_chance(tmp_path: Path) -> None:
+    found, _ = diagnosed(tmp_path, free=3, forced=0)
+    assert found.verdict == "none"
+    assert found.judgement.form.chance > CHANCE
+    assert all(0 <= chance <= 1 for chance in found.judgement.form.chances.values())
+
+
+def test_a_form_that_the_library_lacks_shows_in_what_is_left(tmp_path: Path) -> None:
+    found, _ = diagnosed(
+        tmp_path, "encoder_gain", size=3.0, free=3, forced=0, without=("encoder_gain",)
+    )
+    assert found.verdict in {"unknown", "partial"}
+    assert found.judgement.form.chance < CHANCE
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_what_two_others_do_together_is_given_with_reserve(seed: int, tmp_path: Path) -> None:
+    # With its whole family taken out, two frictions do what a drag does, to within the noise.
+    own = [effect.name for effect in pendmap.effects() if effect.family == "damping"]
+    found, _ = diagnosed(
+        tmp_path, "quadratic_drag", seed=seed, size=3.0, free=3, forced=0, without=own
+    )
+    assert found.effects == () or all(effect.approximate for effect in found.effects)
+    assert all(effect.probability < SURE for effect in found.effects)

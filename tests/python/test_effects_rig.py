@@ -1,0 +1,130 @@
+"""Effects of the library against formulas, integrators and experiments that are not its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from pendmap import virtual_rig
+from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.candidates import Candidate, place
+from pendmap.discrepancy.evidence import Evidence, evidence_of
+from pendmap.discrepancy.trial import fitted
+from pendmap.records import read_experiment
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+GAMMA, THETA_R, P, OMEGA = 0.05, 0.03, 0.6, 2.0
+
+EFFECTS = {
+    "asymmetric_coulomb": {"d": 0.01},
+    "rough_spot": {"f": 0.05, "th0": 0.3, "w": 0.2},
+    "inertia_ripple": {"e": 0.1, "n": 2.0, "psi": 0.4},
+    "added_mass": {"e": 0.1},
+    "rig_tilt": {"d": 0.05},
+    "drive_chirp": {"r": 0.002},
+    "timebase": {"e": 0.01},
+}
+
+
+def acceleration(name: str, tau: float, theta: float, v: float, sign: float) -> float:
+    """Written down again from the formulas of textbooks, w0 = 1."""
+    values = EFFECTS[name]
+    phase, tilt, carried, inertia, own = OMEGA * tau, 0.0, 0.0, 1.0, 0.0
+    friction = THETA_R
+    match name:
+        case "asymmetric_coulomb":
+            friction += values["d"] * sign
+        case "rough_spot":
+            away = 1 - math.cos(theta - values["th0"])
+            friction += values["f"] * math.exp(-away / values["w"] ** 2)
+        case "inertia_ripple":
+            angle = values["n"] * theta + values["psi"]
+            inertia += values["e"] * math.cos(angle)
+            own = 0.5 * values["e"] * values["n"] * math.sin(angle) * v * v
+        case "added_mass":
+            carried = values["e"]
+        case "rig_tilt":
+            tilt = values["d"]
+        case "drive_chirp":
+            phase += 0.5 * values["r"] * tau**2
+        case "timebase":
+            phase /= 1 + values["e"]
+    up = P * math.cos(phase)
+    gravity = -math.sin(theta + tilt) - (1 + carried) * up * math.sin(theta)
+    return (gravity - GAMMA * v - friction * sign + own) / inertia
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_trajectories_are_those_of_scipy(name: str) -> None:
+    model = pendmap.Pendulum(
+        gamma=GAMMA,
+        theta_r=THETA_R,
+        p=P,
+        omega=OMEGA,
+        effects=(pendmap.Effect(name, EFFECTS[name]),),
+    )
+    until = 12.0
+    found = pendmap.simulate(model, 2.5, 0.0, until, tol=1e-12)
+    state, begin, turns = np.array([2.5, 0.0]), 0.0, 0
+    # From turn to turn; at each the load is far greater than the friction, which never holds.
+    while begin < until:
+        sign = math.copysign(1.0, acceleration(name, begin, state[0], 0.0, 0.0))
+
+        def rate(tau: float, y: list[float], sign: float = sign) -> list[float]:
+            return [y[1], acceleration(name, tau, y[0], y[1], sign)]
+
+        def turned(tau: float, y: list[float], begin: float = begin, sign: float = sign) -> float:
+            return y[1] if tau > begin + 1e-3 else sign
+
+        turned.terminal = True  # type: ignore[attr-defined]
+        end = solve_ivp(
+            rate, (begin, until), state, "DOP853", events=turned, rtol=1e-12, atol=1e-13
+        )
+        state, begin, turns = np.array([end.y[0, -1], 0.0]), float(end.t[-1]), turns + 1
+    assert turns >= 3
+    assert float(found.theta[-1]) == pytest.approx(end.y[0, -1], abs=1e-8)
+    assert float(found.velocity[-1]) == pytest.approx(end.y[1, -1], abs=1e-8)
+
+
+def clean(folder: Path, effect: str) -> tuple[Evidence, dict[str, float]]:
+    """Evidence without noise, as if read to a microradian, and the truth."""
+    request = virtual_rig.Request(
+        "hidden", seed=5, effects=(effect,), free=2, forced=2, noise=0.0, counts=0
+    )
+    where = virtual_rig.places(folder / "clean", replace=True)
+    virtual_rig.write(virtual_rig.make(request), where)
+    found = evidence_of(read_experiment(where.experiment))
+    exact = tuple(dataclasses.replace(run, sigma=1e-6) for run in found.fitted)
+    held = tuple(dataclasses.replace(run, sigma=1e-6) for run in found.held)
+    (truth,) = tomllib.loads(where.truth.read_text(encoding="utf-8"))["effect"]
+    return dataclasses.replace(found, fitted=exact, held=held), truth["parameters"]
+
+
+@pytest.mark.parametrize("name", [*EFFECTS, "sensor_lag"])
+def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path) -> None:
+    evidence, truth = clean(tmp_path, name)
+    base = baseline(evidence)
+    size, *shape = truth
+    unit = Candidate(name, {n: truth[n] for n in shape if n != "psi"})
+    start = base.start | {f"{name}.{size}": 0.5 * truth[size]}
+    if unit.phase is not None:
+        start[f"{name}.{unit.phase}"] = truth[unit.phase]
+    model, free = place(base.fit.model, unit), [*base.free, *unit.free]
+    found = fitted(evidence, model, free, (unit,), start=start).fit
+    # Of a lag the second power of tau is left.
+    assert found.rms < (1e-5 if name == "sensor_lag" else 1e-8)
+    assert base.fit.rms > 10 * found.rms
+    near = found[f"{name}.{size}"]
+    if unit.phase is not None:
+        # A negative size is a positive one half a turn on.
+        near *= math.cos(found[f"{name}.{unit.phase}"] - truth[unit.phase])
+    assert near == pytest.approx(truth[size], rel=0.02 if name == "sensor_lag" else 1e-4)
