@@ -5,6 +5,9 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use crate::lanes::sine::Degree;
 use crate::lanes::{Lane, Real};
 
+/// The least root that its derivative is divided by: at 0 that is steep, but a number.
+const LEAST_ROOT: f64 = 1e-150;
+
 /// A value and its derivatives in `N` directions.
 #[derive(Clone, Copy, Debug)]
 pub struct Tangent<L, const N: usize> {
@@ -158,6 +161,16 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
             *slope = *slope / self.value;
         }
         self.value = self.value.logarithm();
+        self
+    }
+
+    #[inline(always)]
+    fn root(mut self) -> Self {
+        self.value = self.value.root();
+        let double = self.value.max(self.value.like(LEAST_ROOT)).scale(2.0);
+        for slope in &mut self.slope {
+            *slope = *slope / double;
+        }
         self
     }
 

@@ -48,6 +48,9 @@ pub trait Real:
     /// `ln self` of a positive normal number.
     #[must_use]
     fn logarithm(self) -> Self;
+    /// The square root.
+    #[must_use]
+    fn root(self) -> Self;
     /// 1 or -1, the sign of `self`; no derivative.
     #[must_use]
     fn sign(self) -> Self;
@@ -146,6 +149,10 @@ macro_rules! scalar_lane {
             #[inline(always)]
             fn logarithm(self) -> Self {
                 elementary::logarithm(self)
+            }
+            #[inline(always)]
+            fn root(self) -> Self {
+                $make($get(self).sqrt())
             }
             #[inline(always)]
             fn sign(self) -> Self {

@@ -13,6 +13,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use super::drive::Motion;
 use super::effects::{Action, Kind, MOST_PARAMETERS, Mappable, Point};
+use super::formula::Formula;
 use super::pendulum::Pendulum;
 use crate::lanes::Real;
 use crate::lanes::sine::{Degree, Fine};
@@ -38,12 +39,16 @@ pub struct Equation<R> {
     torques: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// Effects with a friction.
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
+    /// A user's own effects.
+    formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
     /// The effect with a corner.
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
     plain: bool,
     /// Whether what friction holds changes with the drive, and with the time in the laboratory.
     holds: [bool; 2],
+    /// Whether a formula asks for the phase of the drive.
+    timed: bool,
 }
 
 /// What the drive does at one time.
@@ -57,6 +62,8 @@ pub struct Forcing<R> {
     pub per_gravity: R,
     /// Time in the laboratory.
     pub lab: R,
+    /// Phase of the harmonic drive, rad, where a formula asks for it.
+    pub phase: R,
 }
 
 impl Forcing<f64> {
@@ -69,6 +76,7 @@ impl Forcing<f64> {
             lateral: number.like(self.lateral),
             per_gravity: number.like(self.per_gravity),
             lab: number.like(self.lab),
+            phase: number.like(self.phase),
         }
     }
 }
@@ -97,9 +105,9 @@ impl<R: Real> Equation<R> {
             lateral: zero,
             lateral_phase: zero,
         };
-        let (mut torques, mut frictions) = (Vec::new(), Vec::new());
+        let (mut torques, mut frictions, mut formulas) = (Vec::new(), Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
-        let mut holds = [false; 2];
+        let (mut holds, mut timed) = ([false; 2], false);
         let mut corner = None;
         let probe = Point {
             theta: zero,
@@ -110,11 +118,19 @@ impl<R: Real> Equation<R> {
             vertical: zero,
             per_gravity: zero,
             lab: zero,
+            phase: zero,
         };
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
             if effect.kind.switch(&parameters, &probe).is_some() {
                 corner = Some((effect.kind, parameters));
+            }
+            if let Kind::Formula(formula) = effect.kind {
+                holds[0] |= formula.is_driven();
+                holds[1] |= formula.definition().mappable == Mappable::Frozen;
+                timed |= formula.is_timed();
+                formulas.push((formula, parameters));
+                continue;
             }
             match effect.kind.definition().action {
                 Action::Position | Action::Velocity | Action::Kinked => {
@@ -146,10 +162,12 @@ impl<R: Real> Equation<R> {
             ages,
             torques,
             frictions,
+            formulas,
             corner,
             sideways,
             plain,
             holds,
+            timed,
         }
     }
 
@@ -186,7 +204,15 @@ impl<R: Real> Equation<R> {
     pub fn pushed(&self, vertical: R, lateral: R, tau: R) -> Forcing<R> {
         let [gravity, per_gravity] = self.gravity;
         let lab = if self.ages { self.lab_time + tau } else { self.lab_time };
-        Forcing { vertical: gravity * vertical, lateral: gravity * lateral, per_gravity, lab }
+        let Motion { omega, phase, .. } = self.motion;
+        let phase = if self.timed { omega.mul_add(tau, phase) } else { lab };
+        Forcing {
+            vertical: gravity * vertical,
+            lateral: gravity * lateral,
+            per_gravity,
+            lab,
+            phase,
+        }
     }
 
     /// Where the formulas are evaluated; `sense` is 1 or -1.
@@ -209,8 +235,8 @@ impl<R: Real> Equation<R> {
         [sense, side]: [R; 2],
     ) -> Point<R> {
         let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
-        let Forcing { vertical, per_gravity, lab, .. } = *forcing;
-        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab }
+        let Forcing { vertical, per_gravity, lab, phase, .. } = *forcing;
+        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase }
     }
 
     /// The function at whose zeros an effect has a corner; none where no effect has.
@@ -231,6 +257,42 @@ impl<R: Real> Equation<R> {
     /// All torques per inertia but friction.
     #[inline(always)]
     pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let mut sum = self.known_load(forcing, at);
+        for (formula, parameters) in &self.formulas {
+            sum = sum + formula.torque(parameters, at);
+        }
+        sum
+    }
+
+    /// The magnitude of the friction.
+    #[inline(always)]
+    pub fn friction(&self, at: &Point<R>) -> R {
+        let mut sum = self.known_friction(at);
+        for (formula, parameters) in &self.formulas {
+            sum = sum + formula.friction(parameters, at);
+        }
+        sum
+    }
+
+    /// What acts besides gravity, the constant torque and viscous damping, moving in the sense of
+    /// `at`.
+    #[inline(always)]
+    pub fn besides(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let known = self.extra(forcing, at) - self.known_friction(at) * at.sense;
+        if self.formulas.is_empty() { known } else { known + self.own(at) }
+    }
+
+    /// `th''` while moving in the sense of `at`.
+    #[inline(always)]
+    pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let load = self.known_load(forcing, at);
+        let known = (-self.known_friction(at)).mul_add(at.sense, load);
+        if self.formulas.is_empty() { known } else { known + self.own(at) }
+    }
+
+    /// All torques but friction and formulas.
+    #[inline(always)]
+    fn known_load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         // First, so that nothing need be kept in registers meanwhile.
         let extra = self.extra(forcing, at);
         let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
@@ -238,9 +300,9 @@ impl<R: Real> Equation<R> {
         (-forcing.vertical).mul_add(at.sine, extra + bias + damping)
     }
 
-    /// What acts besides gravity, the constant torque, viscous damping and friction.
+    /// What acts besides gravity, the constant torque, viscous damping, friction and formulas.
     #[inline(always)]
-    pub fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+    fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         let mut sum = at.constant(0.0);
         if self.sideways {
             sum = -(forcing.lateral * at.cosine());
@@ -251,9 +313,9 @@ impl<R: Real> Equation<R> {
         sum
     }
 
-    /// The magnitude of the friction.
+    /// The magnitude of the friction without that of formulas.
     #[inline(always)]
-    pub fn friction(&self, at: &Point<R>) -> R {
+    fn known_friction(&self, at: &Point<R>) -> R {
         let mut sum = at.constant(0.0);
         for (kind, parameters) in &self.frictions {
             sum = sum + kind.friction(parameters, &at.hidden());
@@ -261,11 +323,22 @@ impl<R: Real> Equation<R> {
         sum + Kind::CoulombFriction.friction(&Self::only(self.theta_r), at)
     }
 
+    /// The formulas, friction and all, moving in the sense of `at`.
+    #[inline(always)]
+    fn own(&self, at: &Point<R>) -> R {
+        let mut sum = at.constant(0.0);
+        for (formula, parameters) in &self.formulas {
+            sum = sum + formula.whole(parameters, at);
+        }
+        sum
+    }
+
     /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at
     /// rest, against a constant friction.
     #[must_use]
     pub fn is_plain(&self) -> bool {
-        self.plain && !self.sideways && self.torques.is_empty() && self.frictions.is_empty()
+        let none = self.torques.is_empty() && self.frictions.is_empty();
+        self.plain && !self.sideways && none && self.formulas.is_empty()
     }
 
     /// Whether a pendulum at rest is loaded by gravity under the harmonic drive and by what does not
@@ -275,12 +348,6 @@ impl<R: Real> Equation<R> {
         let [loaded, drifting] = self.holds;
         let holds_alike = !(loaded || drifting && self.ages);
         self.plain && !self.sideways && holds_alike
-    }
-
-    /// `th''` while moving in the sense of `at`.
-    #[inline(always)]
-    pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        (-self.friction(at)).mul_add(at.sense, self.load(forcing, at))
     }
 
     #[inline(always)]
@@ -325,12 +392,14 @@ impl Equation<f64> {
             ages: self.ages,
             torques: Vec::new(),
             frictions: Vec::new(),
+            formulas: Vec::new(),
             corner: self
                 .corner
                 .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),
             sideways: self.sideways,
             plain: self.plain,
             holds: self.holds,
+            timed: self.timed,
         };
         for (kind, [a, b, c]) in &self.torques {
             equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
@@ -338,13 +407,17 @@ impl Equation<f64> {
         for (kind, [a, b, c]) in &self.frictions {
             equation.frictions.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
         }
+        for (formula, [a, b, c]) in &self.formulas {
+            let parameters = [number.like(*a), number.like(*b), number.like(*c)];
+            equation.formulas.push((formula, parameters));
+        }
         equation
     }
 
-    /// Whether the pivot rests.
+    /// Whether nothing changes with the drive's phase: the pivot rests.
     #[must_use]
     pub fn is_autonomous(&self) -> bool {
         let motion = &self.motion;
-        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0
+        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0 && !self.timed
     }
 }

@@ -41,6 +41,13 @@ NAME = "diagnose.toml"
 @click.option(
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
+@click.option(
+    "--effects",
+    "effects_path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Candidates of your own beside the library's: [[formula]] of a .toml.",
+)
 @click.option("--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}]")
 @click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
@@ -51,6 +58,7 @@ def command(  # noqa: PLR0913 (an option each)
     model_path: Path | None,
     max_effects: int,
     without: tuple[str, ...],
+    effects_path: Path | None,
     out: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -66,11 +74,14 @@ def command(  # noqa: PLR0913 (an option each)
     # The matrices are tall and narrow: threads for them cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.discrepancy import diagnose
+    from pendmap.model import load_formulas
     from pendmap.model.effects import definition
     from pendmap.records import read_experiment
 
+    own = [] if effects_path is None else load_formulas(effects_path)
     for name in without:
-        definition(name)
+        if name not in {formula.name for formula in own}:
+            definition(name)
     if out is None and plot is None and not as_json:
         plot = OutputFile([".png"]).convert(f"{Path(NAME).stem}.png", None, None)
     out = out or OutputFile([".toml"]).convert(NAME, None, None)
@@ -79,7 +90,12 @@ def command(  # noqa: PLR0913 (an option each)
     shown = sys.stderr.isatty() and not quiet
     with progress_bar("diagnose", shown=shown) as progress:
         found = diagnose(
-            experiment, model=model, max_effects=max_effects, without=without, progress=progress
+            experiment,
+            model=model,
+            max_effects=max_effects,
+            without=without,
+            effects=own,
+            progress=progress,
         )
     written = write_all(_files(found, out, plot, "pendmap " + shlex.join(sys.argv[1:])))
     if as_json:

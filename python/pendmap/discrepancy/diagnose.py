@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.advice import Advice, advice_of
 from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.candidates import checked_own
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
-    from pendmap.model import Rig
+    from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
 
 __all__ = ["MOST_EFFECTS", "Discrepancy", "diagnose"]
@@ -91,12 +92,13 @@ class Discrepancy:
         return [names for names in classes if len(names) > 1]
 
 
-def diagnose(
+def diagnose(  # noqa: PLR0913 (each is asked for by name)
     experiment: Experiment,
     *,
     model: Rig | None = None,
     max_effects: int = MOST_EFFECTS,
     without: Collection[str] = (),
+    effects: Collection[Formula] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Discrepancy:
     """Find where a model and an experiment disagree, and which effects it lacks.
@@ -115,6 +117,8 @@ def diagnose(
         How many effects are added at most; the sensor's zero does not count.
     without : collection of str
         Effects that are no candidates.
+    effects : collection of Formula
+        Candidates of your own, beside the library's.
     progress : callable, optional
         Called with the steps done and those to do.
 
@@ -126,14 +130,18 @@ def diagnose(
     Raises
     ------
     InputError
-        If there is no run with samples, or no start can be found.
+        If there is no run with samples, no start can be found, or an effect of your own cannot be a
+        candidate.
     """
+    own = checked_own(effects)
     report = progress or (lambda _done, _total: None)
     steps = max_effects + 3
     evidence = evidence_of(experiment)
     begin = baseline(evidence, model)
     report(1, steps)
-    search = Search(evidence, begin, max_effects, without, lambda done: report(1 + done, steps))
+    search = Search(
+        evidence, begin, max_effects, without, lambda done: report(1 + done, steps), own=own
+    )
     nearest = search.run()
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial, nearest.trial.remainder.level)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.verdict import Judgement
-    from pendmap.model import Rig
+    from pendmap.model import Formula, Rig
 
 __all__ = ["NamedEffect", "diagnosed_model", "named_effects"]
 
@@ -42,6 +42,8 @@ class NamedEffect:
         That this name is right, among all names.
     approximate : bool
         Whether its form is only nearly right.
+    formula : Formula, optional
+        Where it is the user's own.
     """
 
     name: str
@@ -49,11 +51,19 @@ class NamedEffect:
     ci95: dict[str, tuple[float, float]]
     probability: float
     approximate: bool
+    formula: Formula | None = None
 
     @property
     def effect(self) -> Effect:
         """As a model has it."""
-        return Effect(self.name, self.parameters, self.ci95, self.probability, self.approximate)
+        return Effect(
+            self.name,
+            self.parameters,
+            self.ci95,
+            self.probability,
+            self.approximate,
+            self.formula,
+        )
 
 
 def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tuple[NamedEffect, ...]:
@@ -82,7 +92,12 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
         }
         named.append(
             NamedEffect(
-                candidate.name, parameters, ci95, standing.probability, judgement.approximate
+                candidate.name,
+                parameters,
+                ci95,
+                standing.probability,
+                judgement.approximate,
+                candidate.formula,
             )
         )
     return tuple(named)

@@ -1,13 +1,15 @@
 //! The library of effects: one file each, and the list of them.
 //!
 //! [`law`] says what an effect is. A new one is one file with a [`Law`] and one line in the list
-//! below; Python, the command line, model files, maps and fits read it from here.
+//! below; Python, the command line, model files, maps and fits read it from here. A user's own
+//! effect needs neither: it is a [`Formula`].
 
 pub mod law;
 
 pub use law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
 
 use super::drive::Motion;
+use super::formula::Formula;
 use crate::error::Error;
 use crate::lanes::Real;
 
@@ -15,13 +17,15 @@ macro_rules! library {
     ($($module:ident :: $law:ident,)*) => {
         $(mod $module;)*
 
-        /// An effect of the library.
+        /// An effect of the library, or one of a user's own.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Kind {
             $(
                 #[doc = concat!("`", stringify!($module), "`")]
                 $law,
             )*
+            /// A formula.
+            Formula(&'static Formula),
         }
 
         impl Kind {
@@ -33,6 +37,7 @@ macro_rules! library {
             pub const fn definition(self) -> &'static Definition {
                 match self {
                     $(Self::$law => &<$module::$law as Law>::DEFINITION,)*
+                    Self::Formula(formula) => formula.definition(),
                 }
             }
 
@@ -41,6 +46,7 @@ macro_rules! library {
             pub fn ready<R: Real>(self, parameters: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
                 match self {
                     $(Self::$law => $module::$law::ready(parameters),)*
+                    Self::Formula(_) => parameters,
                 }
             }
 
@@ -49,6 +55,7 @@ macro_rules! library {
             pub fn torque<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::torque(parameters, at),)*
+                    Self::Formula(formula) => formula.torque(parameters, at),
                 }
             }
 
@@ -57,6 +64,7 @@ macro_rules! library {
             pub fn friction<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::friction(parameters, at),)*
+                    Self::Formula(formula) => formula.friction(parameters, at),
                 }
             }
 
@@ -69,6 +77,7 @@ macro_rules! library {
             ) -> Option<R> {
                 match self {
                     $(Self::$law => $module::$law::switch(parameters, at),)*
+                    Self::Formula(formula) => formula.switch(parameters, at),
                 }
             }
 
@@ -76,6 +85,7 @@ macro_rules! library {
             pub fn drive<R: Real>(self, parameters: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
                 match self {
                     $(Self::$law => $module::$law::drive(parameters, motion),)*
+                    Self::Formula(_) => {}
                 }
             }
 
@@ -83,6 +93,7 @@ macro_rules! library {
             pub fn reading<R: Real>(self, parameters: &[R; MOST_PARAMETERS], theta: R) -> R {
                 match self {
                     $(Self::$law => $module::$law::reading(parameters, theta),)*
+                    Self::Formula(_) => theta,
                 }
             }
 
@@ -91,6 +102,7 @@ macro_rules! library {
             pub fn keeps_mirror(self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
                 match self {
                     $(Self::$law => $module::$law::keeps_mirror(parameters),)*
+                    Self::Formula(formula) => formula.keeps_mirror(parameters),
                 }
             }
 
@@ -99,6 +111,7 @@ macro_rules! library {
             pub fn bars_maps(self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
                 match self {
                     $(Self::$law => $module::$law::bars_maps(parameters),)*
+                    Self::Formula(formula) => formula.bars_maps(parameters),
                 }
             }
         }
@@ -141,6 +154,17 @@ impl Kind {
             .copied()
             .find(|kind| kind.definition().name == name)
             .ok_or_else(|| Error::Effect { name: name.to_owned() })
+    }
+}
+
+impl Kind {
+    /// The same; of a formula, its corner stepped over.
+    #[must_use]
+    pub fn loosened(self) -> Self {
+        match self {
+            Self::Formula(formula) => Self::Formula(formula.loosened()),
+            other => other,
+        }
     }
 }
 
@@ -205,6 +229,23 @@ impl Effect {
     #[must_use]
     pub fn rubs(&self) -> bool {
         self.is(&[Action::Friction, Action::SlidingFriction, Action::LoadedFriction])
+    }
+
+    /// Whether steps end at a corner of it.
+    #[must_use]
+    pub fn has_corner(&self) -> bool {
+        let nowhere = Point {
+            theta: 0.0,
+            velocity: 0.0,
+            sense: 1.0,
+            side: 1.0,
+            sine: 0.0,
+            vertical: 1.0,
+            per_gravity: 1.0,
+            lab: 0.0,
+            phase: 0.0,
+        };
+        self.kind.switch(&self.parameters, &nowhere).is_some()
     }
 
     /// Whether it is the same for the mirrored motion, at the same phase of the drive.
