@@ -15,6 +15,8 @@ from pendmap import checks
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from pendmap.model.effects import Effect
 
 __all__ = ["Formula", "FormulaKey", "formulas_of", "load_formulas"]
@@ -134,6 +136,48 @@ class Formula:
 
         return Effect(self.name, parameters, formula=self)
 
+    @classmethod
+    def of(
+        cls, function: Callable[..., Any], parameters: Mapping[str, Any], *, name: str | None = None
+    ) -> Formula:
+        """Return the formula that a Python function computes.
+
+        The function is called once, with names in place of numbers: what it computes becomes the
+        term, which then runs compiled, in maps too. The function itself is not kept.
+
+        Parameters
+        ----------
+        function : callable
+            ``function(theta, v, t, phase, parameters)`` of arrays and a mapping of numbers; it
+            returns the torque per moment of inertia, by arithmetic and functions of numpy.
+        parameters : mapping
+            As of :class:`Formula`.
+        name : str, optional
+            By default the function's.
+
+        Raises
+        ------
+        InputError
+            If the function branches on values, looks up a table, or does something else that no
+            formula can say; or as :class:`Formula`.
+
+        Examples
+        --------
+        >>> def root_drag(theta, v, t, phase, parameters):
+        ...     return -parameters["k"] * np.sqrt(np.abs(v)) * np.sign(v)
+        >>> Formula.of(root_drag, {"k": 1.5}).term
+        '-k*sqrt(abs(v))*sign(v)'
+        """
+        from pendmap.model.traced import term_of  # noqa: PLC0415 (it loads numpy)
+
+        called = str(getattr(function, "__name__", "")) if name is None else name
+        if not callable(function):
+            shown = checks.shown(function)
+            raise InputError(f"function is {shown}: allowed is a function of five arguments")
+        if not isinstance(parameters, Mapping):
+            return cls(called, "0", parameters)  # which says what is wrong with them
+        return cls(called, term_of(function, parameters, called), parameters)
+
     @property
     def table(self) -> dict[str, Any]:
         """It as a table ``[[formula]]`` of a file."""
@@ -217,13 +261,9 @@ def _parameter(name: object, given: object, names: list[Any]) -> _ParameterKey:
     if "power" not in said:
         raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
     power, less = _power(name, said["power"], names)
-    unit = said.get("unit", "1" if power == 0 and less is None else _unit(power, less, names))
-    meaning = said.get("meaning", "")
-    for what, value in (("unit", unit), ("meaning", meaning)):
-        if not isinstance(value, str):
-            raise InputError(
-                f"parameter '{name}': {what} is {checks.shown(value)}: allowed is a text"
-            )
+    plain = "1" if power == 0 and less is None else _unit(power, less, names)
+    unit = _text(name, "unit", said.get("unit", plain))
+    meaning = _text(name, "meaning", said.get("meaning", ""))
     typical = _bounds(name, "typical", said.get("typical", _TYPICAL))
     allowed = _bounds(name, "range", said.get("range", (-math.inf, math.inf)))
     return name, power, less, unit, allowed, typical, meaning
@@ -240,6 +280,12 @@ def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | Non
             + (f", or {others}" if others else "")
         )
     return 2.0, names.index(match[1])
+
+
+def _text(name: str, what: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"parameter '{name}': {what} is {checks.shown(value)}: allowed is a text")
+    return value
 
 
 def _unit(power: float, less: int | None, names: list[Any]) -> str:

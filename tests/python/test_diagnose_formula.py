@@ -1,0 +1,59 @@
+"""``diagnose`` with candidates of the user's own."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bumpy import BUMP, FILE, experiment
+from pendmap import Formula, InputError, Rig, load_model
+from pendmap.discrepancy import diagnose
+from pendmap.records import read_experiment
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+
+def test_what_only_a_formula_explains_is_named(tmp_path: Path, pendmap_command: Run) -> None:
+    records = experiment(tmp_path / "records")
+    own = tmp_path / "own.toml"
+    own.write_text(FILE, encoding="utf-8")
+    out = tmp_path / "found.toml"
+    run = pendmap_command(
+        "diagnose", str(records), "--effects", str(own), "--out", str(out), "--json"
+    )
+    assert run.returncode == 0, run.stderr
+    found = json.loads(run.stdout)
+    assert found["verdict"] == "named"
+    (bump,) = found["effects"]
+    assert bump["name"] == "bump"
+    for name, true in BUMP.items():
+        low, high = bump["ci95"][name]
+        assert low - (high - low) < true < high + (high - low), name
+    assert found["gap"]["held_out_after"] < 1.1 * found["gap"]["noise_floor"]
+    # The new model is whole: it needs no other file.
+    model = load_model(out)
+    assert isinstance(model, Rig)
+    assert model.effects[-1].formula is not None
+    run = pendmap_command("basins", "--model", str(out), "--grid", "15", "--p", "0.6", "--json")
+    assert run.returncode == 0, run.stderr
+
+
+def test_without_it_no_effect_is_named_for_it(tmp_path: Path) -> None:
+    found = diagnose(read_experiment(experiment(tmp_path / "records")))
+    assert found.verdict not in {"none", "named"}
+
+
+def test_what_cannot_be_a_candidate_is_refused(tmp_path: Path) -> None:
+    records = read_experiment(experiment(tmp_path / "records"))
+    lopsided = Formula("two", "-k*v - c*v^3", {"k": 1, "c": -1})
+    with pytest.raises(InputError, match="is not proportional to its first parameter k"):
+        diagnose(records, effects=[lopsided])
+    with pytest.raises(InputError, match="has one twice"):
+        diagnose(records, effects=[Formula("one", "-k*v^3", {"k": -1})] * 2)
+    with pytest.raises(InputError, match="allowed is a Formula, like"):
+        diagnose(records, effects=["bump"])  # type: ignore[list-item]
