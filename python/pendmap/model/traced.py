@@ -19,27 +19,10 @@ __all__ = ["term_of"]
 _SUM, _PRODUCT, _POWER, _WHOLE = range(4)
 """How strongly a text is bound together; what binds less is put in brackets."""
 
-_JOINED: Final = {
-    "add": ("+", _SUM),
-    "subtract": ("-", _SUM),
-    "multiply": ("*", _PRODUCT),
-    "divide": ("/", _PRODUCT),
-    "power": ("^", _POWER),
-    "float_power": ("^", _POWER),
-}
-_CALLED: Final = {
-    "sqrt": "sqrt",
-    "exp": "exp",
-    "log": "log",
-    "sin": "sin",
-    "cos": "cos",
-    "tanh": "tanh",
-    "absolute": "abs",
-    "fabs": "abs",
-    "sign": "sign",
-}
-_OF_TWO: Final = {"minimum": "min", "maximum": "max", "fmin": "min", "fmax": "max"}
-_ALLOWED: Final = "arithmetic and numpy's sqrt, exp, log, sin, cos, tan, tanh, abs, sign, square, minimum, maximum"
+_ALLOWED: Final = (
+    "arithmetic and numpy's sqrt, exp, log, sin, cos, tan, tanh, abs, sign, square, minimum, "
+    "maximum"
+)
 
 
 class _Text(np.lib.mixins.NDArrayOperatorsMixin):
@@ -67,28 +50,9 @@ class _Text(np.lib.mixins.NDArrayOperatorsMixin):
         name = ufunc.__name__
         if method != "__call__" or options:
             raise _UnreadableError(f"numpy.{name}.{method}" if method != "__call__" else name)
-        parts = [_text(part) for part in given]
-        if name in _JOINED:
-            sign, strength = _JOINED[name]
-            # What follows - or / is bound more strongly than these, and so is what stands before ^.
-            left = strength + (name in {"power", "float_power"})
-            right = strength + (name in {"subtract", "divide", "power", "float_power"})
-            return _Text(f"{parts[0].at_least(left)}{sign}{parts[1].after(right)}", strength)
-        if name in _CALLED:
-            return _Text(f"{_CALLED[name]}({parts[0].text})")
-        if name in _OF_TWO:
-            return _Text(f"{_OF_TWO[name]}({parts[0].text}, {parts[1].text})")
-        if name == "negative":
-            return _Text(f"-{parts[0].after(_PRODUCT)}", _PRODUCT)
-        if name == "positive":
-            return parts[0]
-        if name == "square":
-            return _Text(f"{parts[0].at_least(_WHOLE)}^2", _POWER)
-        if name == "reciprocal":
-            return _Text(f"1/{parts[0].after(_POWER)}", _PRODUCT)
-        if name == "tan":
-            return _Text(f"sin({parts[0].text})/cos({parts[0].text})", _PRODUCT)
-        raise _UnreadableError(f"numpy.{name}")
+        if name not in _WRITTEN:
+            raise _UnreadableError(f"numpy.{name}")
+        return _WRITTEN[name](*(_text(part) for part in given))
 
     def __array_function__(
         self,
@@ -107,6 +71,41 @@ class _Text(np.lib.mixins.NDArrayOperatorsMixin):
 
     def __iter__(self) -> Any:  # noqa: ANN401 (never returns)
         raise _UnreadableError("a loop over an array")
+
+
+def _joined(sign: str, strength: int, *, left: int = 0, right: int = 0) -> Callable[..., _Text]:
+    """Write an operator; ``left`` and ``right`` say how much more its operands must be bound."""
+
+    def write(a: _Text, b: _Text) -> _Text:
+        return _Text(f"{a.at_least(strength + left)}{sign}{b.after(strength + right)}", strength)
+
+    return write
+
+
+def _called(name: str) -> Callable[..., _Text]:
+    """Write a function."""
+    return lambda *parts: _Text(f"{name}({', '.join(part.text for part in parts)})")
+
+
+_WRITTEN: Final[dict[str, Callable[..., _Text]]] = {
+    "add": _joined("+", _SUM),
+    "subtract": _joined("-", _SUM, right=1),
+    "multiply": _joined("*", _PRODUCT),
+    "divide": _joined("/", _PRODUCT, right=1),
+    "power": _joined("^", _POWER, left=1, right=1),
+    "float_power": _joined("^", _POWER, left=1, right=1),
+    "positive": lambda x: x,
+    "negative": lambda x: _Text(f"-{x.after(_PRODUCT)}", _PRODUCT),
+    "square": lambda x: _Text(f"{x.at_least(_WHOLE)}^2", _POWER),
+    "reciprocal": lambda x: _Text(f"1/{x.after(_POWER)}", _PRODUCT),
+    "tan": lambda x: _Text(f"sin({x.text})/cos({x.text})", _PRODUCT),
+    "absolute": _called("abs"),
+    "fabs": _called("abs"),
+    "minimum": _called("min"),
+    "fmin": _called("min"),
+    "maximum": _called("max"),
+    "fmax": _called("max"),
+} | {name: _called(name) for name in ("sqrt", "exp", "log", "sin", "cos", "tanh", "sign")}
 
 
 class _UnreadableError(Exception):
@@ -142,7 +141,7 @@ def term_of(function: Callable[..., Any], parameters: Iterable[str], name: str) 
         raise InputError(
             f"function '{name}' asks for a parameter {error}: allowed are {', '.join(known)}"
         ) from None
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 (whatever a user's function may raise)
         said = " ".join(str(error).split())
         raise InputError(
             f"function '{name}' fails with {type(error).__name__}: {said}: allowed is a function "
