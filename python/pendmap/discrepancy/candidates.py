@@ -15,7 +15,7 @@ from pendmap.model.formula import Formula
 from pendmap.model.rig import COUNTERPARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from pendmap.model import Rig
     from pendmap.model.units import Units
@@ -133,7 +133,7 @@ def place(model: Rig, candidate: Candidate) -> Rig:
     return dataclasses.replace(model, effects=(*kept, driven), Omega=omega)
 
 
-def checked_own(effects: object) -> tuple[Formula, ...]:
+def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
     """Return a user's own candidates.
 
     Raises
@@ -141,21 +141,25 @@ def checked_own(effects: object) -> tuple[Formula, ...]:
     InputError
         If one is no formula, is there twice, or is not proportional to its first parameter.
     """
-    if not isinstance(effects, list | tuple):
-        raise InputError(f"effects is {checks.shown(effects)}: allowed is a list of Formula")
+    formulas = []
     for effect in effects:
-        checks.of_type("effects", effect, Formula, "Formula('mine', '-k*v^5', {'k': -3})")
+        if not isinstance(effect, Formula):
+            raise InputError(
+                f"effects is {checks.shown(effect)}: allowed is a Formula, like Formula('mine', "
+                "'-k*v^5', {'k': -3})"
+            )
         if not effect.proportional:
             size = effect.entry["parameters"][0]["name"]
             raise InputError(
                 f"formula '{effect.name}' is not proportional to its first parameter {size}: "
                 "allowed as a candidate is a term whose first parameter is its size"
             )
-    names = [effect.name for effect in effects]
+        formulas.append(effect)
+    names = [formula.name for formula in formulas]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise InputError(f"effects has {twice[0]} twice: allowed is each name once")
-    return tuple(effects)
+    return tuple(formulas)
 
 
 def candidates(

@@ -9,6 +9,7 @@ from pendmap.discrepancy.advice import Advice, advice_of
 from pendmap.discrepancy.baseline import baseline
 from pendmap.discrepancy.candidates import checked_own
 from pendmap.discrepancy.evidence import Evidence, evidence_of
+from pendmap.discrepancy.functions import FunctionScore, divided, function_scores
 from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
 from pendmap.discrepancy.runs import RunByRun, run_by_run
@@ -19,6 +20,7 @@ from pendmap.discrepancy.verdict import Judgement, judge
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
+    from pendmap.discrepancy.functions import TorqueFunction
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
     from pendmap.model import Formula, Rig
@@ -61,6 +63,8 @@ class Discrepancy:
         Candidates that were refitted.
     advice : Advice
         What to record next, and what these records would have shown.
+    functions : tuple of FunctionScore
+        What Python functions of the user explain, to first order.
     """
 
     evidence: Evidence
@@ -77,6 +81,7 @@ class Discrepancy:
     scores: Scores
     attempts: tuple[Attempt, ...]
     advice: Advice
+    functions: tuple[FunctionScore, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -98,7 +103,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     model: Rig | None = None,
     max_effects: int = MOST_EFFECTS,
     without: Collection[str] = (),
-    effects: Collection[Formula] = (),
+    effects: Collection[Formula | TorqueFunction] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Discrepancy:
     """Find where a model and an experiment disagree, and which effects it lacks.
@@ -117,8 +122,9 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         How many effects are added at most; the sensor's zero does not count.
     without : collection of str
         Effects that are no candidates.
-    effects : collection of Formula
-        Candidates of your own, beside the library's.
+    effects : collection of Formula and TorqueFunction
+        Candidates of your own, beside the library's: formulas as the library's own effects, Python
+        functions of any kind to first order.
     progress : callable, optional
         Called with the steps done and those to do.
 
@@ -133,7 +139,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         If there is no run with samples, no start can be found, or an effect of your own cannot be a
         candidate.
     """
-    own = checked_own(effects)
+    functions, others = divided(effects)
+    own = checked_own(others)
     report = progress or (lambda _done, _total: None)
     steps = max_effects + 3
     evidence = evidence_of(experiment)
@@ -166,4 +173,5 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         scores,
         tuple(search.attempts),
         advice_of(judgement, scores, search.level()),
+        function_scores(evidence, search.base.trial, best.trial, functions),
     )
