@@ -3,7 +3,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::lanes::sine::Degree;
-use crate::lanes::{Lane, Real};
+use crate::lanes::{Lane, Real, Work};
 
 /// The least root that its derivative is divided by: at 0 that is steep, but a number.
 const LEAST_ROOT: f64 = 1e-150;
@@ -172,6 +172,11 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
             *slope = *slope / double;
         }
         self
+    }
+
+    #[inline(always)]
+    fn aside<W: Work>(self, work: W) {
+        self.value.aside(work);
     }
 
     #[inline(always)]

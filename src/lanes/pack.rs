@@ -155,6 +155,11 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
     }
 
     #[inline(always)]
+    fn aside<W: Work>(self, work: W) {
+        Self::apart(self.0[0].isa, work);
+    }
+
+    #[inline(always)]
     fn sign(self) -> Self {
         self.like(1.0).with_sign_of(self)
     }

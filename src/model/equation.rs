@@ -47,8 +47,6 @@ pub struct Equation<R> {
     plain: bool,
     /// Whether what friction holds changes with the drive, and with the time in the laboratory.
     holds: [bool; 2],
-    /// Whether a formula asks for the phase of the drive.
-    timed: bool,
 }
 
 /// What the drive does at one time.
@@ -107,7 +105,7 @@ impl<R: Real> Equation<R> {
         };
         let (mut torques, mut frictions, mut formulas) = (Vec::new(), Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
-        let (mut holds, mut timed) = ([false; 2], false);
+        let mut holds = [false; 2];
         let mut corner = None;
         let probe = Point {
             theta: zero,
@@ -128,7 +126,6 @@ impl<R: Real> Equation<R> {
             if let Kind::Formula(formula) = effect.kind {
                 holds[0] |= formula.is_driven();
                 holds[1] |= formula.definition().mappable == Mappable::Frozen;
-                timed |= formula.is_timed();
                 formulas.push((formula, parameters));
                 continue;
             }
@@ -167,7 +164,6 @@ impl<R: Real> Equation<R> {
             sideways,
             plain,
             holds,
-            timed,
         }
     }
 
@@ -205,7 +201,7 @@ impl<R: Real> Equation<R> {
         let [gravity, per_gravity] = self.gravity;
         let lab = if self.ages { self.lab_time + tau } else { self.lab_time };
         let Motion { omega, phase, .. } = self.motion;
-        let phase = if self.timed { omega.mul_add(tau, phase) } else { lab };
+        let phase = if self.asks_for_phase() { omega.mul_add(tau, phase) } else { lab };
         Forcing {
             vertical: gravity * vertical,
             lateral: gravity * lateral,
@@ -213,6 +209,17 @@ impl<R: Real> Equation<R> {
             lab,
             phase,
         }
+    }
+
+    /// Whether a user's own effect changes with the phase of the drive.
+    #[inline(always)]
+    fn asks_for_phase(&self) -> bool {
+        for (formula, _) in &self.formulas {
+            if formula.is_timed() {
+                return true;
+            }
+        }
+        false
     }
 
     /// Where the formulas are evaluated; `sense` is 1 or -1.
@@ -399,7 +406,6 @@ impl Equation<f64> {
             sideways: self.sideways,
             plain: self.plain,
             holds: self.holds,
-            timed: self.timed,
         };
         for (kind, [a, b, c]) in &self.torques {
             equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
@@ -418,6 +424,6 @@ impl Equation<f64> {
     #[must_use]
     pub fn is_autonomous(&self) -> bool {
         let motion = &self.motion;
-        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0 && !self.timed
+        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0 && !self.asks_for_phase()
     }
 }

@@ -7,7 +7,7 @@ use super::tree::{Function, Operator, Tree, Variable};
 
 /// The longest term, in characters.
 const LONGEST: usize = 1000;
-/// The deepest nesting of brackets, signs and powers.
+/// The deepest nesting of brackets; what is in one and its sign are a level each.
 const DEEPEST: usize = 60;
 /// The largest tree: `min` and `max` take each of their arguments twice.
 const LARGEST: usize = 4000;
@@ -160,9 +160,9 @@ impl Parser<'_> {
     /// Sums and products whose operators bind at least as strongly as `least`.
     fn sum(&mut self, least: u8) -> Result<Tree, String> {
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > 2 * DEEPEST {
             let place = self.place();
-            return Err(format!("is nested too deeply at {place}: allowed are {DEEPEST} levels"));
+            return Err(format!("is nested too deeply at {place}: allowed are {DEEPEST} brackets"));
         }
         let mut left = self.signed()?;
         loop {
@@ -186,9 +186,9 @@ impl Parser<'_> {
 
     fn signed(&mut self) -> Result<Tree, String> {
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > 2 * DEEPEST {
             let place = self.place();
-            return Err(format!("is nested too deeply at {place}: allowed are {DEEPEST} levels"));
+            return Err(format!("is nested too deeply at {place}: allowed are {DEEPEST} brackets"));
         }
         let tree = match self.peek() {
             Token::Mark('-') => {

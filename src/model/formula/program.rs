@@ -7,8 +7,8 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use super::tree::{Function, Operator, Tree, Variable, is_steep, whole};
-use crate::lanes::Real;
 use crate::lanes::sine::Fine;
+use crate::lanes::{Real, Work};
 use crate::model::effects::{MOST_PARAMETERS, Point};
 
 /// Intermediate values at one time.
@@ -97,10 +97,31 @@ impl Program {
     }
 
     /// The value of the term.
+    ///
+    /// Aside, and on a copy: operands are looked up in memory there, where the other effects would
+    /// else have to keep theirs too.
     #[inline(always)]
     pub fn run<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        let (at, mut value) = (*at, at.constant(0.0));
+        at.theta.aside(Running { program: self, parameters, at: &at, value: &mut value });
+        value
+    }
+}
+
+/// A program under way.
+struct Running<'a, R> {
+    program: &'a Program,
+    parameters: &'a [R; MOST_PARAMETERS],
+    at: &'a Point<R>,
+    value: &'a mut R,
+}
+
+impl<R: Real> Work for Running<'_, R> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { program, parameters, at, value } = self;
         let mut slots = [at.theta; SLOTS];
-        for Step { operation, first, second, to } in &self.steps {
+        for Step { operation, first, second, to } in &program.steps {
             macro_rules! operand {
                 ($source:expr) => {
                     match $source {
@@ -129,11 +150,8 @@ impl Program {
                 Operation::Whole(power) => whole_power(x, *power),
                 Operation::Root => x.root(),
                 // What is no number stays none: the functions of the lanes hold it in their range.
-                Operation::Exponential => x.exponential() + (x - x),
-                Operation::Logarithm => {
-                    let root = x.root();
-                    x.logarithm() + (root - root)
-                }
+                Operation::Exponential => x.exponential() + x.scale(0.0),
+                Operation::Logarithm => x.logarithm() + x.root().scale(0.0),
                 Operation::Sine => x.scale(FRAC_1_PI).sine::<Fine>(),
                 Operation::Cosine => x.scale(FRAC_1_PI).cosine::<Fine>(),
                 Operation::Tanh => {
@@ -149,7 +167,7 @@ impl Program {
             };
             slots[*to % SLOTS] = result;
         }
-        slots[self.result % SLOTS]
+        *value = slots[program.result % SLOTS];
     }
 }
 
@@ -203,6 +221,7 @@ impl Builder<'_> {
         self.push(operation, of, of)
     }
 
+    #[allow(clippy::float_cmp)] // exactly those numbers that change nothing
     fn affine(&mut self, of: Source, factor: f64, addend: f64) -> Value {
         if factor == 1.0 && addend == 0.0 {
             return Value::At(of);
