@@ -54,8 +54,8 @@ def definition(name: object) -> dict[str, Any]:
         near = difflib.get_close_matches(str(name), known, n=1)
         hint = f", perhaps {near[0]}" if near else ""
         raise InputError(
-            f"name is {checks.shown(name)}: allowed is an effect of the library{hint}, or one of a "
-            "[[formula]]; pendmap effects lists all"
+            f"name is {checks.shown(name)}: allowed is an effect of the library{hint}; "
+            "pendmap effects lists all"
         )
     return known[name]
 

@@ -253,7 +253,14 @@ def _effect(table: object, formulas: Mapping[str, Formula]) -> Effect:
         if key not in table:
             raise InputError(f"{key} is missing: allowed is like {key} = {example}")
     name = table["name"]
-    return Effect(**table, formula=formulas.get(name) if isinstance(name, str) else None)
+    formula = formulas.get(name) if isinstance(name, str) else None
+    try:
+        return Effect(**table, formula=formula)
+    except InputError as error:
+        own = ", ".join(formulas)
+        if formula is None and formulas and str(error).startswith("name is"):
+            raise InputError(f"{error}, and this file's [[formula]] are {own}") from None
+        raise
 
 
 def _table(effect: Effect) -> dict[str, Any]:
