@@ -82,7 +82,7 @@ def test_a_formula_s_name_does_not_do_for_another(tmp_path: Path) -> None:
     text = '[pendulum]\ngamma = 0.1\n[[effect]]\nname = "root_drag"\nparameters = { k = 1.0 }\n'
     path.write_text(text, encoding="utf-8")
     with pytest.raises(
-        InputError, match="name is 'root_drag': allowed is an effect of the library"
+        InputError, match="name is 'root_drag': allowed is an effect"
     ):
         load_model(path)
     path.write_text(text + FILE, encoding="utf-8")
