@@ -81,9 +81,7 @@ def test_a_formula_s_name_does_not_do_for_another(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     text = '[pendulum]\ngamma = 0.1\n[[effect]]\nname = "root_drag"\nparameters = { k = 1.0 }\n'
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(
-        InputError, match="name is 'root_drag': allowed is an effect"
-    ):
+    with pytest.raises(InputError, match="name is 'root_drag': allowed is an effect"):
         load_model(path)
     path.write_text(text + FILE, encoding="utf-8")
     with pytest.raises(InputError, match=r"this file's \[\[formula\]\] are bump, lean"):
