@@ -33,7 +33,7 @@ ROOT = Formula("root_drag", "-k*sqrt(abs(v))*sign(v)", {"k": 1.5})
 POWER = Formula(
     "own_power",
     "-q*abs(v)^n*sign(v)",
-    {"q": {"power": "2 - n"}, "n": {"power": 0, "range": [1, 4]}},
+    {"q": {"power": "2 - n"}, "n": {"power": 0, "typical": [1.1, 3], "range": [1, 4]}},
 )
 
 
