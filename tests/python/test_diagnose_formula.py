@@ -43,7 +43,8 @@ def test_what_only_a_formula_explains_is_named(tmp_path: Path, pendmap_command: 
     model = load_model(out)
     assert isinstance(model, Rig)
     assert model.effects[-1].formula is not None
-    run = pendmap_command("basins", "--model", str(out), "--grid", "15", "--p", "0.6", "--json")
+    drive = ("--p", "0.6", "--omega", "2")
+    run = pendmap_command("basins", "--model", str(out), *drive, "--grid", "15", "--json")
     assert run.returncode == 0, run.stderr
 
 

@@ -107,7 +107,13 @@ fn a_formula_s_maps_are_the_library_s_cell_for_cell() {
         for (kind, library, own) in twins(&base) {
             if own.check_mappable().is_ok() {
                 let [a, b] = [&library, &own].map(|pendulum| basins_on_plane(pendulum, 24));
-                assert_eq!(cell_names(&a), cell_names(&b), "{kind:?}");
+                let (a, b) = (cell_names(&a), cell_names(&b));
+                let apart = a.iter().zip(&b).filter(|(a, b)| a != b).count();
+                // What costs the library nothing goes through steps of its own: a cell within their
+                // error of a boundary may be on its other side.
+                let other = matches!(kind, Kind::ViscousDamping | Kind::BiasTorque);
+                let allowed = if other { a.len() / 200 } else { 0 };
+                assert!(apart <= allowed, "{kind:?}: {apart} cells");
             }
         }
     }
