@@ -264,11 +264,11 @@ impl<R: Real> Equation<R> {
     /// All torques per inertia but friction.
     #[inline(always)]
     pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        let mut sum = self.known_load(forcing, at);
+        let mut own = at.constant(0.0);
         for (formula, parameters) in &self.formulas {
-            sum = sum + formula.torque(parameters, at);
+            own = own + formula.torque(parameters, at);
         }
-        sum
+        self.load_with(own, forcing, at)
     }
 
     /// The magnitude of the friction.
@@ -285,34 +285,34 @@ impl<R: Real> Equation<R> {
     /// `at`.
     #[inline(always)]
     pub fn besides(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        let known = self.extra(forcing, at) - self.known_friction(at) * at.sense;
-        if self.formulas.is_empty() { known } else { known + self.own(at) }
+        self.extra(self.own(at), forcing, at) - self.known_friction(at) * at.sense
     }
 
     /// `th''` while moving in the sense of `at`.
     #[inline(always)]
     pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        let load = self.known_load(forcing, at);
-        let known = (-self.known_friction(at)).mul_add(at.sense, load);
-        if self.formulas.is_empty() { known } else { known + self.own(at) }
+        // Formulas first, so that nothing need be kept in registers for them.
+        let load = self.load_with(self.own(at), forcing, at);
+        (-self.known_friction(at)).mul_add(at.sense, load)
     }
 
-    /// All torques but friction and formulas.
+    /// All torques but friction, those of formulas being `own`.
     #[inline(always)]
-    fn known_load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+    fn load_with(&self, own: R, forcing: &Forcing<R>, at: &Point<R>) -> R {
         // First, so that nothing need be kept in registers meanwhile.
-        let extra = self.extra(forcing, at);
+        let extra = self.extra(own, forcing, at);
         let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
         let bias = Kind::BiasTorque.torque(&Self::only(self.torque), at);
         (-forcing.vertical).mul_add(at.sine, extra + bias + damping)
     }
 
-    /// What acts besides gravity, the constant torque, viscous damping, friction and formulas.
+    /// What acts besides gravity, the constant torque, viscous damping and friction, formulas being
+    /// `own`.
     #[inline(always)]
-    fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        let mut sum = at.constant(0.0);
+    fn extra(&self, own: R, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let mut sum = own;
         if self.sideways {
-            sum = -(forcing.lateral * at.cosine());
+            sum = sum - forcing.lateral * at.cosine();
         }
         for (kind, parameters) in &self.torques {
             sum = sum + kind.torque(parameters, &at.hidden());

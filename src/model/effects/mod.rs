@@ -50,21 +50,21 @@ macro_rules! library {
                 }
             }
 
-            /// [`Law::torque`].
+            /// [`Law::torque`]; none of a formula, which the equation asks by itself.
             #[inline(always)]
             pub fn torque<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::torque(parameters, at),)*
-                    Self::Formula(formula) => formula.torque(parameters, at),
+                    Self::Formula(_) => at.constant(0.0),
                 }
             }
 
-            /// [`Law::friction`].
+            /// [`Law::friction`]; none of a formula, as of the torque.
             #[inline(always)]
             pub fn friction<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::friction(parameters, at),)*
-                    Self::Formula(formula) => formula.friction(parameters, at),
+                    Self::Formula(_) => at.constant(0.0),
                 }
             }
 
