@@ -43,8 +43,8 @@ def test_what_only_a_formula_explains_is_named(tmp_path: Path, pendmap_command: 
     model = load_model(out)
     assert isinstance(model, Rig)
     assert model.effects[-1].formula is not None
-    drive = ("--p", "0.6", "--omega", "2")
-    run = pendmap_command("basins", "--model", str(out), *drive, "--grid", "15", "--json")
+    drive = ("--p", "0.6", "--omega", "2", "--gamma", "0.2")
+    run = pendmap_command("basins", "--model", str(out), *drive, "--grid", "10", "--json")
     assert run.returncode == 0, run.stderr
 
 
