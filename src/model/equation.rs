@@ -35,11 +35,11 @@ pub struct Equation<R> {
     pub lab_time: R,
     /// Whether the time in the laboratory goes on with `tau`; a map holds it.
     pub ages: bool,
-    /// Effects with a torque.
+    /// Effects with a torque, and formulas, whose friction is a torque in the sense of the motion.
     torques: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// Effects with a friction.
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
-    /// A user's own effects.
+    /// The formulas once more, for what they hold at rest.
     formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
     /// The effect with a corner.
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
@@ -126,6 +126,7 @@ impl<R: Real> Equation<R> {
             if let Kind::Formula(formula) = effect.kind {
                 holds[0] |= formula.is_driven();
                 holds[1] |= formula.definition().mappable == Mappable::Frozen;
+                torques.push((effect.kind, parameters));
                 formulas.push((formula, parameters));
                 continue;
             }
@@ -262,57 +263,53 @@ impl<R: Real> Equation<R> {
     }
 
     /// All torques per inertia but friction.
-    #[inline(always)]
     pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        let mut own = at.constant(0.0);
+        let mut sum = self.moving_load(forcing, at);
         for (formula, parameters) in &self.formulas {
-            own = own + formula.torque(parameters, at);
+            // A formula is summed up whole.
+            sum = sum + formula.friction(parameters, at) * at.sense;
         }
-        self.load_with(own, forcing, at)
+        sum
     }
 
     /// The magnitude of the friction.
-    #[inline(always)]
     pub fn friction(&self, at: &Point<R>) -> R {
-        let mut sum = self.known_friction(at);
+        let mut sum = self.library_friction(at);
         for (formula, parameters) in &self.formulas {
             sum = sum + formula.friction(parameters, at);
         }
         sum
     }
 
+    /// `th''` while moving in the sense of `at`.
+    #[inline(always)]
+    pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        (-self.library_friction(at)).mul_add(at.sense, self.moving_load(forcing, at))
+    }
+
     /// What acts besides gravity, the constant torque and viscous damping, moving in the sense of
     /// `at`.
     #[inline(always)]
     pub fn besides(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        self.extra(self.own(at), forcing, at) - self.known_friction(at) * at.sense
+        self.extra(forcing, at) - self.library_friction(at) * at.sense
     }
 
-    /// `th''` while moving in the sense of `at`.
+    /// All torques, and the friction of formulas, moving in the sense of `at`.
     #[inline(always)]
-    pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        // Formulas first, so that nothing need be kept in registers for them.
-        let load = self.load_with(self.own(at), forcing, at);
-        (-self.known_friction(at)).mul_add(at.sense, load)
-    }
-
-    /// All torques but friction, those of formulas being `own`.
-    #[inline(always)]
-    fn load_with(&self, own: R, forcing: &Forcing<R>, at: &Point<R>) -> R {
+    fn moving_load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         // First, so that nothing need be kept in registers meanwhile.
-        let extra = self.extra(own, forcing, at);
+        let extra = self.extra(forcing, at);
         let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
         let bias = Kind::BiasTorque.torque(&Self::only(self.torque), at);
         (-forcing.vertical).mul_add(at.sine, extra + bias + damping)
     }
 
-    /// What acts besides gravity, the constant torque, viscous damping and friction, formulas being
-    /// `own`.
+    /// What of that is besides gravity, the constant torque and viscous damping.
     #[inline(always)]
-    fn extra(&self, own: R, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        let mut sum = own;
+    fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let mut sum = at.constant(0.0);
         if self.sideways {
-            sum = sum - forcing.lateral * at.cosine();
+            sum = -(forcing.lateral * at.cosine());
         }
         for (kind, parameters) in &self.torques {
             sum = sum + kind.torque(parameters, &at.hidden());
@@ -322,22 +319,12 @@ impl<R: Real> Equation<R> {
 
     /// The magnitude of the friction without that of formulas.
     #[inline(always)]
-    fn known_friction(&self, at: &Point<R>) -> R {
+    fn library_friction(&self, at: &Point<R>) -> R {
         let mut sum = at.constant(0.0);
         for (kind, parameters) in &self.frictions {
             sum = sum + kind.friction(parameters, &at.hidden());
         }
         sum + Kind::CoulombFriction.friction(&Self::only(self.theta_r), at)
-    }
-
-    /// The formulas, friction and all, moving in the sense of `at`.
-    #[inline(always)]
-    fn own(&self, at: &Point<R>) -> R {
-        let mut sum = at.constant(0.0);
-        for (formula, parameters) in &self.formulas {
-            sum = sum + formula.whole(parameters, at);
-        }
-        sum
     }
 
     /// Whether only gravity under the harmonic drive and a constant torque load the pendulum at

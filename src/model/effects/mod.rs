@@ -50,16 +50,16 @@ macro_rules! library {
                 }
             }
 
-            /// [`Law::torque`]; none of a formula, which the equation asks by itself.
+            /// [`Law::torque`]; of a formula all of it, friction too, in the sense of `at`.
             #[inline(always)]
             pub fn torque<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::torque(parameters, at),)*
-                    Self::Formula(_) => at.constant(0.0),
+                    Self::Formula(formula) => formula.whole(parameters, at),
                 }
             }
 
-            /// [`Law::friction`]; none of a formula, as of the torque.
+            /// [`Law::friction`]; none of a formula, which is in its torque.
             #[inline(always)]
             pub fn friction<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {

@@ -71,8 +71,6 @@ pub struct Formula {
     switch: Option<Program>,
     /// The same, its corner stepped over: for a model in which another effect has one.
     loose: Option<&'static Self>,
-    /// Whether it is a friction and nothing else.
-    only_rubs: bool,
     timed: bool,
     driven: bool,
 }
@@ -161,7 +159,6 @@ impl Formula {
                 program,
                 switch: None,
                 loose: None,
-                only_rubs,
                 timed,
                 driven,
             })
@@ -169,7 +166,7 @@ impl Formula {
             None
         };
         let loose = loose.map(|formula| &*Box::leak(Box::new(formula)));
-        let whole = Self { definition, tree, program, switch, loose, only_rubs, timed, driven };
+        let whole = Self { definition, tree, program, switch, loose, timed, driven };
         Ok(Box::leak(Box::new(whole)))
     }
 
@@ -209,29 +206,14 @@ impl Formula {
         self.program.run(parameters, at)
     }
 
-    /// Its part that does not change with the sense of the motion, where it jumps; else all of it.
-    pub fn torque<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
-        if !self.rubs() {
-            return self.whole(parameters, at);
-        }
-        if self.only_rubs {
-            return at.constant(0.0);
-        }
-        let [forth, back] = self.both(parameters, at);
-        (forth + back).scale(0.5)
-    }
-
-    /// The magnitude of its friction.
+    /// The magnitude of its friction: half of what it loses where the sense changes.
     pub fn friction<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         if !self.rubs() {
             return at.constant(0.0);
         }
-        let [forth, back] = self.both(parameters, at);
+        let [forth, back] = [1.0, -1.0]
+            .map(|sense| self.whole(parameters, &Point { sense: at.constant(sense), ..*at }));
         (back - forth).scale(0.5)
-    }
-
-    fn both<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> [R; 2] {
-        [1.0, -1.0].map(|sense| self.whole(parameters, &Point { sense: at.constant(sense), ..*at }))
     }
 
     fn rubs(&self) -> bool {

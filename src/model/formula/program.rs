@@ -59,7 +59,6 @@ enum Source {
     Velocity,
     Sense,
     Side,
-    SineOfTheta,
     Phase,
     Lab,
     Vertical,
@@ -102,7 +101,9 @@ impl Program {
     /// else have to keep theirs too.
     #[inline(always)]
     pub fn run<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
-        let (at, mut value) = (*at, at.constant(0.0));
+        // What no operation takes is not copied.
+        let at = Point { sine: at.theta, ..*at };
+        let mut value = at.theta;
         at.theta.aside(Running { program: self, parameters, at: &at, value: &mut value });
         value
     }
@@ -129,7 +130,6 @@ impl<R: Real> Work for Running<'_, R> {
                         Source::Velocity => &at.velocity,
                         Source::Sense => &at.sense,
                         Source::Side => &at.side,
-                        Source::SineOfTheta => &at.sine,
                         Source::Phase => &at.phase,
                         Source::Lab => &at.lab,
                         Source::Vertical => &at.vertical,
@@ -257,9 +257,6 @@ impl Builder<'_> {
         match tree {
             Tree::Number(value) => Value::Number(*value),
             Tree::Variable(variable) => self.variable(*variable),
-            Tree::Apply(Function::Sine, inner) if **inner == Tree::Variable(Variable::Theta) => {
-                Value::At(Source::SineOfTheta)
-            }
             Tree::Apply(function @ (Function::Abs | Function::Sign), inner) => {
                 self.kink(*function, inner, steep)
             }
