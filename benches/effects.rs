@@ -2,6 +2,8 @@
 //! fast path at the same number of steps a period; and the time of a period, beside the fast path's,
 //! where either takes the steps that it needs for an error of 1e-6.
 //!
+//! An effect that a user can write as a formula is measured as one too, beside the library's own.
+//!
 //! Both are measured in turns, so that whatever else the machine does meets both; the least of many
 //! times counts. `cargo bench --bench effects -- avx512 drag` measures what these words are part of.
 
@@ -13,6 +15,12 @@ use pendmap::lanes::Path;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::effects::{Action, Parameter};
 use pendmap::model::{Effect, Kind, Pendulum};
+
+#[path = "../tests/rust/rewritten.rs"]
+#[allow(dead_code)] // the tests use more of it
+mod rewritten;
+
+use rewritten::rewritten;
 
 /// Trajectories: whole bundles on every path.
 const COUNT: usize = 6144;
@@ -73,8 +81,12 @@ fn main() {
     let damped = Pendulum { gamma: 0.1, ..base.clone() };
     for path in Path::ALL.into_iter().filter(|path| path.available()) {
         let fast = Strobe::new(&damped, STEPS, path);
-        println!("{path}, {STEPS} steps a period  ns a step      over  steps for   period");
-        println!("                                         fast path    {TOL:e}      over");
+        println!(
+            "{path}, {STEPS} steps a period  ns a step      over  steps for   period   formula"
+        );
+        println!(
+            "                                         fast path    {TOL:e}      over      over"
+        );
         for kind in Kind::ALL {
             let definition = kind.definition();
             if definition.action == Action::Reading || !wanted(&[path.name(), definition.name]) {
@@ -85,15 +97,22 @@ fn main() {
             pendulum.lab_time = 100.0;
             let strobe = Strobe::new(&pendulum, STEPS, path);
             let [own, reference] = times(&strobe, &fast);
+            let formula = rewritten(&typical(*kind)).map(|effect| {
+                let pendulum = base.clone().with_effect(effect).expect("once");
+                let pendulum = Pendulum { lab_time: 100.0, ..pendulum };
+                let [formula, library] = times(&Strobe::new(&pendulum, STEPS, path), &strobe);
+                format!("{:>9.2}", formula / library)
+            });
             let precise = chosen(&pendulum, path);
             let [period, other] = times(&precise, &chosen(&damped, path));
             println!(
-                "  {:<26} {:>9.2} {:>9.2} {:>9} {:>9.2}",
+                "  {:<26} {:>9.2} {:>9.2} {:>9} {:>9.2} {}",
                 definition.name,
                 own / STEPS as f64,
                 own / reference,
                 precise.steps(),
-                period / other
+                period / other,
+                formula.unwrap_or_default()
             );
         }
     }

@@ -30,6 +30,13 @@ pub enum Error {
         /// What was given.
         name: String,
     },
+    /// A formula that cannot be an effect.
+    Formula {
+        /// Its name.
+        name: String,
+        /// What is wrong, where, and what is allowed.
+        why: String,
+    },
     /// One thing said twice.
     Twice {
         /// What was given.
@@ -83,6 +90,7 @@ impl fmt::Display for Error {
             Self::Effect { name } => {
                 write!(f, "no effect is named '{name}': pendmap effects lists them")
             }
+            Self::Formula { name, why } => write!(f, "formula '{name}': {why}"),
             Self::Twice { name, other } => {
                 write!(f, "{name} and {other}: allowed is one of them, they are the same effect")
             }

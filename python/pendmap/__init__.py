@@ -15,8 +15,10 @@ from pendmap.errors import InputError
 from pendmap.model import (
     PRESETS,
     Effect,
+    Formula,
     Pendulum,
     Rig,
+    load_formulas,
     load_model,
     save_model,
 )
@@ -47,6 +49,7 @@ __all__ = [
     "EffectParameter",
     "Experiment",
     "Finding",
+    "Formula",
     "Grid",
     "InputError",
     "NoiseFloor",
@@ -60,6 +63,7 @@ __all__ = [
     "basins_of",
     "effects",
     "load",
+    "load_formulas",
     "load_model",
     "noise_floor",
     "read_experiment",

@@ -15,6 +15,7 @@ __all__ = [
     "fit_equations",
     "fit_rows",
     "fit_runs",
+    "formula",
     "period",
     "simd",
     "simd_available",
@@ -23,8 +24,19 @@ __all__ = [
 
 __version__: str
 
+_FormulaParameter: TypeAlias = tuple[
+    str, float, int | None, str, tuple[float, float], tuple[float, float], str
+]
+_Formula: TypeAlias = tuple[str, str, str, Sequence[_FormulaParameter]]
 _Parameters: TypeAlias = tuple[
-    float, float, float, float, float, float, float, Sequence[tuple[str, Sequence[float]]]
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    Sequence[tuple[str | _Formula, Sequence[float]]],
 ]
 _Axis: TypeAlias = tuple[float, float, int]
 _Floats: TypeAlias = NDArray[np.float64]
@@ -45,6 +57,7 @@ def simd() -> str: ...
 def simd_available() -> list[str]: ...
 def default_threads() -> int: ...
 def effects() -> list[dict[str, Any]]: ...
+def formula(given: _Formula) -> tuple[dict[str, Any], bool]: ...
 def period(parameters: _Parameters) -> float: ...
 def advance(
     parameters: _Parameters,

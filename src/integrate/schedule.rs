@@ -52,7 +52,8 @@ impl Schedule {
         let table = (0..steps)
             .map(|k| {
                 let start = tau + duration * (k as f64 / steps as f64);
-                let still = Forcing { vertical: 1.0, lateral: 0.0, per_gravity: 1.0, lab: 0.0 };
+                let still =
+                    Forcing { vertical: 1.0, lateral: 0.0, per_gravity: 1.0, lab: 0.0, phase: 0.0 };
                 let none = [0.0; STAGES];
                 let mut loads = StageLoads {
                     modulation: none,

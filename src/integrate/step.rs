@@ -145,7 +145,7 @@ impl<R: Real> Moving<R> {
             let forcing = loads.forcing[i].like(half_turns);
             let point = equation.point_held(&forcing, at.scale(PI), standing, [sense; 2]);
             let load = conservative_load::<Fine, R>(loads.modulation[i], loads.torque[i], at);
-            let rest = equation.extra(&forcing, &point) - equation.friction(&point) * sense;
+            let rest = equation.besides(&forcing, &point);
             k[i] = rest.scale_add(loads.factor[i], load);
             i += 1;
         }

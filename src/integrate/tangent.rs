@@ -3,7 +3,10 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::lanes::sine::Degree;
-use crate::lanes::{Lane, Real};
+use crate::lanes::{Lane, Real, Work};
+
+/// The least root that its derivative is divided by: at 0 that is steep, but a number.
+const LEAST_ROOT: f64 = 1e-150;
 
 /// A value and its derivatives in `N` directions.
 #[derive(Clone, Copy, Debug)]
@@ -159,6 +162,21 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
         }
         self.value = self.value.logarithm();
         self
+    }
+
+    #[inline(always)]
+    fn root(mut self) -> Self {
+        self.value = self.value.root();
+        let double = self.value.max(self.value.like(LEAST_ROOT)).scale(2.0);
+        for slope in &mut self.slope {
+            *slope = *slope / double;
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn aside<W: Work>(self, work: W) {
+        self.value.aside(work);
     }
 
     #[inline(always)]

@@ -147,6 +147,19 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
     }
 
     #[inline(always)]
+    fn root(mut self) -> Self {
+        for a in &mut self.0 {
+            a.value = a.isa.sqrt_f64s(a.value);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn aside<W: Work>(self, work: W) {
+        Self::apart(self.0[0].isa, work);
+    }
+
+    #[inline(always)]
     fn sign(self) -> Self {
         self.like(1.0).with_sign_of(self)
     }

@@ -48,6 +48,11 @@ pub trait Real:
     /// `ln self` of a positive normal number.
     #[must_use]
     fn logarithm(self) -> Self;
+    /// The square root.
+    #[must_use]
+    fn root(self) -> Self;
+    /// Does `work` in a function of its own, compiled for the instruction set of these numbers.
+    fn aside<W: Work>(self, work: W);
     /// 1 or -1, the sign of `self`; no derivative.
     #[must_use]
     fn sign(self) -> Self;
@@ -146,6 +151,14 @@ macro_rules! scalar_lane {
             #[inline(always)]
             fn logarithm(self) -> Self {
                 elementary::logarithm(self)
+            }
+            #[inline(always)]
+            fn root(self) -> Self {
+                $make($get(self).sqrt())
+            }
+            #[inline(always)]
+            fn aside<W: Work>(self, work: W) {
+                <Self as Lane>::apart((), work);
             }
             #[inline(always)]
             fn sign(self) -> Self {

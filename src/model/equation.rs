@@ -13,6 +13,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use super::drive::Motion;
 use super::effects::{Action, Kind, MOST_PARAMETERS, Mappable, Point};
+use super::formula::Formula;
 use super::pendulum::Pendulum;
 use crate::lanes::Real;
 use crate::lanes::sine::{Degree, Fine};
@@ -34,12 +35,14 @@ pub struct Equation<R> {
     pub lab_time: R,
     /// Whether the time in the laboratory goes on with `tau`; a map holds it.
     pub ages: bool,
-    /// Effects with a torque.
+    /// Effects with a torque, and formulas, whose friction is a torque in the sense of the motion.
     torques: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// Effects with an inertia, which are among the torques too.
     inertias: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// Effects with a friction.
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
+    /// The formulas once more, for what they hold at rest.
+    formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
     /// The effect with a corner.
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
@@ -59,6 +62,8 @@ pub struct Forcing<R> {
     pub per_gravity: R,
     /// Time in the laboratory.
     pub lab: R,
+    /// Phase of the harmonic drive, rad, where a formula asks for it.
+    pub phase: R,
 }
 
 impl Forcing<f64> {
@@ -71,6 +76,7 @@ impl Forcing<f64> {
             lateral: number.like(self.lateral),
             per_gravity: number.like(self.per_gravity),
             lab: number.like(self.lab),
+            phase: number.like(self.phase),
         }
     }
 }
@@ -100,7 +106,8 @@ impl<R: Real> Equation<R> {
             lateral_phase: zero,
             chirp: zero,
         };
-        let (mut torques, mut inertias, mut frictions) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut torques, mut inertias) = (Vec::new(), Vec::new());
+        let (mut frictions, mut formulas) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
         let mut corner = None;
@@ -113,11 +120,19 @@ impl<R: Real> Equation<R> {
             vertical: zero,
             per_gravity: zero,
             lab: zero,
+            phase: zero,
         };
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
             if effect.kind.switch(&parameters, &probe).is_some() {
                 corner = Some((effect.kind, parameters));
+            }
+            if let Kind::Formula(formula) = effect.kind {
+                holds[0] |= formula.is_driven();
+                holds[1] |= formula.definition().mappable == Mappable::Frozen;
+                torques.push((effect.kind, parameters));
+                formulas.push((formula, parameters));
+                continue;
             }
             match effect.kind.definition().action {
                 Action::Position | Action::Velocity | Action::Kinked => {
@@ -158,6 +173,7 @@ impl<R: Real> Equation<R> {
             torques,
             inertias,
             frictions,
+            formulas,
             corner,
             sideways,
             plain,
@@ -198,7 +214,26 @@ impl<R: Real> Equation<R> {
     pub fn pushed(&self, vertical: R, lateral: R, tau: R) -> Forcing<R> {
         let [gravity, per_gravity] = self.gravity;
         let lab = if self.ages { self.lab_time + tau } else { self.lab_time };
-        Forcing { vertical: gravity * vertical, lateral: gravity * lateral, per_gravity, lab }
+        let Motion { omega, phase, .. } = self.motion;
+        let phase = if self.asks_for_phase() { omega.mul_add(tau, phase) } else { lab };
+        Forcing {
+            vertical: gravity * vertical,
+            lateral: gravity * lateral,
+            per_gravity,
+            lab,
+            phase,
+        }
+    }
+
+    /// Whether a user's own effect changes with the phase of the drive.
+    #[inline(always)]
+    fn asks_for_phase(&self) -> bool {
+        for (formula, _) in &self.formulas {
+            if formula.is_timed() {
+                return true;
+            }
+        }
+        false
     }
 
     /// Where the formulas are evaluated; `sense` is 1 or -1.
@@ -221,8 +256,8 @@ impl<R: Real> Equation<R> {
         [sense, side]: [R; 2],
     ) -> Point<R> {
         let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
-        let Forcing { vertical, per_gravity, lab, .. } = *forcing;
-        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab }
+        let Forcing { vertical, per_gravity, lab, phase, .. } = *forcing;
+        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase }
     }
 
     /// The function at whose zeros an effect has a corner; none where no effect has.
@@ -241,8 +276,41 @@ impl<R: Real> Equation<R> {
     }
 
     /// All torques per inertia but friction.
-    #[inline(always)]
     pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let mut sum = self.moving_load(forcing, at);
+        for (formula, parameters) in &self.formulas {
+            // A formula is summed up whole.
+            sum = sum + formula.friction(parameters, at) * at.sense;
+        }
+        sum
+    }
+
+    /// The magnitude of the friction.
+    pub fn friction(&self, at: &Point<R>) -> R {
+        let mut sum = self.library_friction(at);
+        for (formula, parameters) in &self.formulas {
+            sum = sum + formula.friction(parameters, at);
+        }
+        sum
+    }
+
+    /// `th''` while moving in the sense of `at`.
+    #[inline(always)]
+    pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        let all = (-self.library_friction(at)).mul_add(at.sense, self.moving_load(forcing, at));
+        if self.inertias.is_empty() { all } else { all / self.inertia(at) }
+    }
+
+    /// What acts besides gravity, the constant torque and viscous damping, moving in the sense of
+    /// `at`.
+    #[inline(always)]
+    pub fn besides(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+        self.extra(forcing, at) - self.library_friction(at) * at.sense
+    }
+
+    /// All torques, and the friction of formulas, moving in the sense of `at`.
+    #[inline(always)]
+    fn moving_load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         // First, so that nothing need be kept in registers meanwhile.
         let extra = self.extra(forcing, at);
         let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
@@ -250,9 +318,9 @@ impl<R: Real> Equation<R> {
         (-forcing.vertical).mul_add(at.sine, extra + bias + damping)
     }
 
-    /// What acts besides gravity, the constant torque, viscous damping and friction.
+    /// What of that is besides gravity, the constant torque and viscous damping.
     #[inline(always)]
-    pub fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
+    fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         let mut sum = at.constant(0.0);
         if self.sideways {
             sum = -(forcing.lateral * at.cosine());
@@ -263,9 +331,9 @@ impl<R: Real> Equation<R> {
         sum
     }
 
-    /// The magnitude of the friction.
+    /// The magnitude of the friction without that of formulas.
     #[inline(always)]
-    pub fn friction(&self, at: &Point<R>) -> R {
+    fn library_friction(&self, at: &Point<R>) -> R {
         let mut sum = at.constant(0.0);
         for (kind, parameters) in &self.frictions {
             sum = sum + kind.friction(parameters, &at.hidden());
@@ -277,7 +345,8 @@ impl<R: Real> Equation<R> {
     /// rest, against a constant friction.
     #[must_use]
     pub fn is_plain(&self) -> bool {
-        self.plain && !self.sideways && self.torques.is_empty() && self.frictions.is_empty()
+        let none = self.torques.is_empty() && self.frictions.is_empty();
+        self.plain && !self.sideways && none && self.formulas.is_empty()
     }
 
     /// Whether a pendulum at rest is loaded by gravity under the harmonic drive and by what does not
@@ -287,13 +356,6 @@ impl<R: Real> Equation<R> {
         let [loaded, drifting] = self.holds;
         let holds_alike = !(loaded || drifting && self.ages);
         self.plain && !self.sideways && holds_alike
-    }
-
-    /// `th''` while moving in the sense of `at`.
-    #[inline(always)]
-    pub fn acceleration(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        let all = (-self.friction(at)).mul_add(at.sense, self.load(forcing, at));
-        if self.inertias.is_empty() { all } else { all / self.inertia(at) }
     }
 
     /// The inertia over that without effects.
@@ -351,6 +413,7 @@ impl Equation<f64> {
             torques: Vec::new(),
             inertias: Vec::new(),
             frictions: Vec::new(),
+            formulas: Vec::new(),
             corner: self
                 .corner
                 .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),
@@ -367,13 +430,17 @@ impl Equation<f64> {
         for (kind, [a, b, c]) in &self.frictions {
             equation.frictions.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
         }
+        for (formula, [a, b, c]) in &self.formulas {
+            let parameters = [number.like(*a), number.like(*b), number.like(*c)];
+            equation.formulas.push((formula, parameters));
+        }
         equation
     }
 
-    /// Whether the pivot rests.
+    /// Whether nothing changes with the drive's phase: the pivot rests.
     #[must_use]
     pub fn is_autonomous(&self) -> bool {
         let motion = &self.motion;
-        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0
+        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0 && !self.asks_for_phase()
     }
 }

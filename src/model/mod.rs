@@ -3,6 +3,7 @@
 pub mod drive;
 pub mod effects;
 pub mod equation;
+pub mod formula;
 pub mod observation;
 pub mod pendulum;
 pub mod recorded;
@@ -12,6 +13,7 @@ mod spline;
 pub use drive::HarmonicDrive;
 pub use effects::{Effect, Kind};
 pub use equation::Equation;
+pub use formula::Formula;
 pub use observation::Observation;
 pub use pendulum::Pendulum;
 pub use recorded::Recorded;

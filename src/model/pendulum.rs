@@ -91,10 +91,16 @@ impl Pendulum {
             return Ok(self);
         }
         let several = effect.kind == Kind::BearingHarmonic;
-        if !several && self.effects.iter().any(|e| e.kind == effect.kind) {
+        if !several && self.effects.iter().any(|e| e.kind.definition().name == name) {
             return Err(Error::Twice { name, other: name });
         }
         self.effects.push(effect);
+        if self.effects.iter().filter(|e| e.has_corner()).count() > 1 {
+            // Steps end at the corner of one effect: those of formulas are stepped over.
+            for other in &mut self.effects {
+                other.kind = other.kind.loosened();
+            }
+        }
         Ok(self)
     }
 

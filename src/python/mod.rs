@@ -14,7 +14,8 @@ use pyo3::prelude::*;
 
 use crate::error::Error;
 use crate::lanes::Path;
-use crate::model::{Effect, Kind, Pendulum};
+use crate::model::formula::{ParameterSpec, Spec};
+use crate::model::{Effect, Formula, Kind, Pendulum};
 
 /// One mapping of errors for all functions: what the caller gave is a `ValueError`.
 impl From<Error> for PyErr {
@@ -29,15 +30,48 @@ impl From<Error> for PyErr {
 }
 
 /// `(gamma, p, omega, phase, torque, theta_r, lab_time, effects)` as Python hands it over; each
-/// effect is its name and its parameters in the library's order.
-type Parameters = (f64, f64, f64, f64, f64, f64, f64, Vec<(String, Vec<f64>)>);
+/// effect is its name, or a formula, and its parameters in order.
+type Parameters = (f64, f64, f64, f64, f64, f64, f64, Vec<(Which, Vec<f64>)>);
+
+/// An effect as Python names it.
+#[derive(FromPyObject)]
+enum Which {
+    /// One of the library.
+    Library(String),
+    /// A user's own.
+    Formula(FormulaTuple),
+}
+
+/// `(name, term, revealed by, parameters)`.
+type FormulaTuple = (String, String, String, Vec<ParameterTuple>);
+
+/// `(name, power of w0, place of the parameter to be taken off it, unit, range, typical, meaning)`.
+type ParameterTuple = (String, f64, Option<usize>, String, [f64; 2], [f64; 2], String);
+
+impl Which {
+    fn kind(self) -> Result<Kind, Error> {
+        match self {
+            Self::Library(name) => Kind::named(&name),
+            Self::Formula(given) => Ok(Kind::Formula(formula_of(given)?)),
+        }
+    }
+}
+
+fn formula_of(given: FormulaTuple) -> Result<&'static Formula, Error> {
+    let (name, term, revealed_by, parameters) = given;
+    let parameter = |(name, power, less, unit, range, typical, meaning): ParameterTuple| {
+        ParameterSpec { name, power, less, unit, range, typical, meaning }
+    };
+    let parameters = parameters.into_iter().map(parameter).collect();
+    Formula::new(&Spec { name, term, revealed_by, parameters })
+}
 
 fn pendulum(parameters: Parameters) -> Result<Pendulum, Error> {
     let (gamma, p, omega, phase, torque, theta_r, lab_time, effects) = parameters;
     let mut pendulum = Pendulum::new(gamma, p, omega, phase, torque)?.with_friction(theta_r)?;
     pendulum.lab_time = lab_time;
-    for (name, values) in effects {
-        pendulum = pendulum.with_effect(Effect::new(Kind::named(&name)?, &values)?)?;
+    for (which, values) in effects {
+        pendulum = pendulum.with_effect(Effect::new(which.kind()?, &values)?)?;
     }
     Ok(pendulum)
 }
@@ -75,6 +109,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simd_available, module)?)?;
     module.add_function(wrap_pyfunction!(default_threads, module)?)?;
     module.add_function(wrap_pyfunction!(library::effects, module)?)?;
+    module.add_function(wrap_pyfunction!(library::formula, module)?)?;
     module.add_function(wrap_pyfunction!(period, module)?)?;
     module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
     module.add_function(wrap_pyfunction!(motion::choose_steps, module)?)?;

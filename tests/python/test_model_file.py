@@ -163,7 +163,10 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
         (b"x = " + b"[" * 100_000, "not a TOML file: "),
         ("[pendulum]\ngamma = 1\ngamma = 2\n", "not a TOML file: "),
         ("[pendulum]\ngamma = 0.1\n[rig]\nw0 = 6\n", "[rig] is not known: allowed are [pendulum]"),
-        ("gamma = 1\n[pendulum]\n", "gamma is not known: allowed are [pendulum], [[effect]]"),
+        (
+            "gamma = 1\n[pendulum]\n",
+            "gamma is not known: allowed are [pendulum], [[formula]], [[effect]]",
+        ),
         ("format_version = 2\n[pendulum]\n", "format_version is 2: allowed is a whole number"),
         ("covariance = 1\n[pendulum]\n", "covariance is 1: allowed is a table [covariance]"),
         # keys

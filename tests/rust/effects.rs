@@ -184,6 +184,7 @@ fn formulas_and_powers_of_w0_are_right() {
                 .zip(kind.definition().parameters)
                 .map(|(value, parameter)| match parameter.power {
                     Power::Of(k) => value * w0.powi(k),
+                    Power::Real(k) => value * w0.powf(k),
                     Power::TwoMinus(n) => value * w0.powf(2.0 - effect.parameters[n]),
                 })
                 .collect();
@@ -223,10 +224,15 @@ fn readings_follow_one_another_in_order() {
 
 /// The effect's number of derivatives and more: its pendulum's parameters, angle and velocity.
 const MOST: usize = Pendulum::OWN_PARAMETERS + MOST_PARAMETERS + 2;
-type Dual = Tangent<f64, MOST>;
+pub type Dual = Tangent<f64, MOST>;
 
 /// Acceleration and reading, with derivatives where `R` has them.
-fn evaluated(pendulum: &Pendulum, tau: f64, at: State, changed: Option<(usize, f64)>) -> [f64; 2] {
+pub fn evaluated(
+    pendulum: &Pendulum,
+    tau: f64,
+    at: State,
+    changed: Option<(usize, f64)>,
+) -> [f64; 2] {
     let change = |index: usize, value: f64| match changed {
         Some((which, h)) if which == index => value + h,
         _ => value,
@@ -240,7 +246,7 @@ fn evaluated(pendulum: &Pendulum, tau: f64, at: State, changed: Option<(usize, f
     [equation.acceleration(&forcing, &point), reading]
 }
 
-fn derivatives(pendulum: &Pendulum, tau: f64, at: State) -> [Dual; 2] {
+pub fn derivatives(pendulum: &Pendulum, tau: f64, at: State) -> [Dual; 2] {
     let count = pendulum.parameters().len();
     let seeded = |index: usize, value: f64| Dual::seeded(value, index);
     let constant = |value: f64| Dual { value, slope: [0.0; MOST] };

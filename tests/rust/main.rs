@@ -5,6 +5,7 @@
 //! - [`stick_slip`], [`free_decay`], [`edges`]: friction, event by event, and where rounding could decide
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`effects`]: the library, each effect in every respect
+//! - [`formulas`]: effects that users write; [`rewritten`]: the library's as such
 //! - [`fit`], [`fit_derivatives`]: parameters from records
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
@@ -25,6 +26,7 @@ mod exact;
 mod fit;
 mod fit_derivatives;
 mod fit_records;
+mod formulas;
 mod free_decay;
 mod friction;
 mod input;
@@ -35,6 +37,7 @@ mod orbits;
 mod order;
 mod properties;
 mod recorded;
+mod rewritten;
 mod sensitivity;
 mod sine;
 mod special;

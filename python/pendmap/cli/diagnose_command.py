@@ -43,6 +43,13 @@ NAME = "diagnose"
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
 @click.option(
+    "--effects",
+    "effects_path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Candidates of your own beside the library's: [[formula]] of a .toml.",
+)
+@click.option(
     "--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}.toml]"
 )
 @click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
@@ -62,6 +69,7 @@ def command(  # noqa: PLR0913 (an option each)
     model_path: Path | None,
     max_effects: int,
     without: tuple[str, ...],
+    effects_path: Path | None,
     out: Path | None,
     plot: Path | None,
     report: Path | None,
@@ -81,11 +89,14 @@ def command(  # noqa: PLR0913 (an option each)
     # The matrices are tall and narrow: threads for them cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.discrepancy import diagnose
+    from pendmap.model import load_formulas
     from pendmap.model.effects import definition
     from pendmap.records import read_experiment
 
+    own = [] if effects_path is None else load_formulas(effects_path)
     for name in without:
-        definition(name)
+        if name not in {formula.name for formula in own}:
+            definition(name)
     if not (out or plot or report or rerun or view or as_json):
         plot, report, rerun = (_own(suffix) for suffix in (".png", ".html", ".rrd"))
     if view:
@@ -98,7 +109,12 @@ def command(  # noqa: PLR0913 (an option each)
         experiment = read_experiment(path)
     with progress_bar("diagnose", shown=shown) as progress:
         found = diagnose(
-            experiment, model=model, max_effects=max_effects, without=without, progress=progress
+            experiment,
+            model=model,
+            max_effects=max_effects,
+            without=without,
+            effects=own,
+            progress=progress,
         )
     with progress_bar("write", shown=shown):
         written = write_all(_files(found, outputs, "pendmap " + shlex.join(sys.argv[1:])))

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,8 +21,15 @@ __all__ = ["command"]
 
 @click.command("effects")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option(
+    "--effects",
+    "path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Show those of a file instead, its [[formula]]; they are checked.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
-def command(*, names: tuple[str, ...], as_json: bool) -> None:
+def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 
     The formulas stand on the right of th'' = ..., with v = th'; those of drives say what the pivot
@@ -30,11 +38,15 @@ def command(*, names: tuple[str, ...], as_json: bool) -> None:
     how they stand in a model file.
     """
     from pendmap.cli.show import plain
+    from pendmap.model import load_formulas
     from pendmap.model.effects import definition
-    from pendmap.model.library import effects
+    from pendmap.model.library import effects, of_formulas
 
-    wanted = {definition(name)["name"] for name in names}
-    shown = [effect for effect in effects() if not wanted or effect.name in wanted]
+    own = [] if path is None else load_formulas(path)
+    known = {formula.name: formula for formula in own}
+    wanted = {name if name in known else definition(name)["name"] for name in names}
+    listed = effects() if path is None else of_formulas(own)
+    shown = [effect for effect in listed if not wanted or effect.name in wanted]
     if as_json:
         table = [plain(dataclasses.asdict(effect)) for effect in shown]
         click.echo(json.dumps({"effects": table}, allow_nan=False))
@@ -48,7 +60,9 @@ def command(*, names: tuple[str, ...], as_json: bool) -> None:
             "\nIn a model file without dimensions, which simulate and basins take by --model:"
         )
         for effect in shown:
-            click.echo(f"\n{toml_text({'effect': [_example(effect)]})}".rstrip())
+            said = [known[effect.name].table] if effect.name in known else []
+            tables = {"formula": said, "effect": [_example(effect)]}
+            click.echo(f"\n{toml_text({k: v for k, v in tables.items() if v})}".rstrip())
 
 
 def _draw(effects: list[EffectDefinition]) -> None:
@@ -82,7 +96,7 @@ def _maps(effect: EffectDefinition) -> str:
 def _parameter(parameter: EffectParameter) -> str:
     low, high = parameter.typical
     unit = "" if parameter.unit == "1" else parameter.unit
-    power = str(parameter.power_of_w0)
+    power = f"{parameter.power_of_w0:g}"
     if parameter.power_of_w0_less:
         power = f"({power}-{parameter.power_of_w0_less})"
     if power == "0":

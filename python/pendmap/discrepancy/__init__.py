@@ -3,6 +3,14 @@
 from __future__ import annotations
 
 from pendmap.discrepancy.diagnose import Discrepancy, diagnose
+from pendmap.discrepancy.functions import FunctionScore, TorqueFunction
 from pendmap.discrepancy.named import NamedEffect, diagnosed_model
 
-__all__ = ["Discrepancy", "NamedEffect", "diagnose", "diagnosed_model"]
+__all__ = [
+    "Discrepancy",
+    "FunctionScore",
+    "NamedEffect",
+    "TorqueFunction",
+    "diagnose",
+    "diagnosed_model",
+]

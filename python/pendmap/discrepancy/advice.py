@@ -7,7 +7,6 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.select import GATE
-from pendmap.model.effects import definition
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.scores import Scores
@@ -77,8 +76,8 @@ def _sentence(judgement: Judgement) -> str:
             wanted.append(
                 f"{standing.candidate.name} and {rival.candidate.name} differ by s G = "
                 f"{power:.2g} here, 25 are needed: record "
-                f"{definition(standing.candidate.name)['revealed_by']}, "
-                f"and {definition(rival.candidate.name)['revealed_by']}"
+                f"{standing.candidate.definition['revealed_by']}, "
+                f"and {rival.candidate.definition['revealed_by']}"
             )
     if wanted:
         return "; ".join(wanted) + "."

@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.model.effects import Effect, definition, library
+from pendmap import checks
+from pendmap.errors import InputError
+from pendmap.model.effects import Effect, definition, is_phase, library
+from pendmap.model.formula import Formula
 from pendmap.model.rig import COUNTERPARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from pendmap.model import Rig
     from pendmap.model.units import Units
 
-__all__ = ["Candidate", "candidates", "own_name", "place"]
+__all__ = ["Candidate", "candidates", "checked_own", "own_name", "place"]
 
 SCANNED: Final = 6
 """Values of a shape parameter at which a candidate is scored, from the least typical one to the
@@ -32,13 +35,10 @@ FAINT: Final = 1e-7
 """A size without dimensions at which an effect with a phase is scored: at 0 the phase would do
 nothing, and this is far below what any record shows."""
 
-TURN: Final = 6.0
-"""A parameter whose typical range is at least this wide around 0 is a phase, rad."""
-
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """An effect of the library with a shape.
+    """An effect of the library, or of the user's own, with a shape.
 
     Parameters
     ----------
@@ -46,20 +46,28 @@ class Candidate:
         The effect.
     shape : mapping of str to float
         Values of what is no size and no phase, without dimensions.
+    formula : Formula, optional
+        Where it is the user's own.
     """
 
     name: str
     shape: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    formula: Formula | None = None
+
+    @property
+    def definition(self) -> dict[str, Any]:
+        """What the library, or the formula, says about it."""
+        return definition(self.name) if self.formula is None else self.formula.entry
 
     @property
     def size(self) -> str:
         """The parameter that says how strong it is: the library's first."""
-        return str(definition(self.name)["parameters"][0]["name"])
+        return str(self.definition["parameters"][0]["name"])
 
     @property
     def phase(self) -> str | None:
         """The parameter that is a phase, if it has one."""
-        return next((e["name"] for e in definition(self.name)["parameters"] if _turns(e)), None)
+        return next((e["name"] for e in self.definition["parameters"] if is_phase(e)), None)
 
     @property
     def free(self) -> list[str]:
@@ -74,7 +82,7 @@ class Candidate:
 
         Whole numbers are not, nor what the unit of the size depends on.
         """
-        entries = definition(self.name)["parameters"]
+        entries = self.definition["parameters"]
         less = {e["power_of_w0_less"] for e in entries}
         return [
             f"{self.name}.{e['name']}"
@@ -85,7 +93,7 @@ class Candidate:
     @property
     def counts_turns(self) -> bool:
         """Whether its shape is a whole number, of periods a turn."""
-        entries = definition(self.name)["parameters"]
+        entries = self.definition["parameters"]
         return any(_whole(e) for e in entries if e["name"] in self.shape)
 
     @property
@@ -98,7 +106,7 @@ class Candidate:
         bare = dict(self.shape) | {self.size: 0.0}
         if self.phase is not None:
             bare |= {self.size: FAINT, self.phase: phase}
-        effect = Effect(self.name, bare).given(units)
+        effect = Effect(self.name, bare, formula=self.formula).given(units)
         if size == 0.0:
             return effect
         return dataclasses.replace(effect, parameters={**effect.parameters, self.size: size})
@@ -112,6 +120,8 @@ class Candidate:
 
 def own_name(effect: str) -> str | None:
     """Return the parameter of a :class:`pendmap.Rig` that says the same as an effect, if any."""
+    if effect not in library():
+        return None
     entries = definition(effect)["parameters"]
     known = COUNTERPARTS.get(entries[0]["name"])
     return known[0] if len(entries) == 1 and known is not None else None
@@ -128,8 +138,41 @@ def place(model: Rig, candidate: Candidate) -> Rig:
     return dataclasses.replace(model, effects=(*kept, driven), Omega=omega)
 
 
+def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
+    """Return a user's own candidates.
+
+    Raises
+    ------
+    InputError
+        If one is no formula, is there twice, or is not proportional to its first parameter.
+    """
+    formulas = []
+    for effect in effects:
+        if not isinstance(effect, Formula):
+            raise InputError(
+                f"effects is {checks.shown(effect)}: allowed is a Formula, like Formula('mine', "
+                "'-k*v^5', {'k': -3})"
+            )
+        if not effect.proportional:
+            size = effect.entry["parameters"][0]["name"]
+            raise InputError(
+                f"formula '{effect.name}' is not proportional to its first parameter {size}: "
+                "allowed as a candidate is a term whose first parameter is its size"
+            )
+        formulas.append(effect)
+    names = [formula.name for formula in formulas]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(f"effects has {twice[0]} twice: allowed is each name once")
+    return tuple(formulas)
+
+
 def candidates(
-    taken: Collection[str], *, driven: bool, without: Collection[str] = ()
+    taken: Collection[str],
+    *,
+    driven: bool,
+    without: Collection[str] = (),
+    own: Collection[Formula] = (),
 ) -> list[list[Candidate]]:
     """Return the candidates that records may show, by effect, each in all its shapes.
 
@@ -142,20 +185,24 @@ def candidates(
         Whether there are runs with a harmonic drive; effects of the drive need one.
     without : collection of str
         Effects that are left out besides.
+    own : collection of Formula
+        Effects of the user's own, beside the library's.
     """
+    formulas = {formula.name: formula for formula in own}
     found = []
-    for name, entry in library().items():
+    entries = library() | {name: formula.entry for name, formula in formulas.items()}
+    for name, entry in entries.items():
         if name in taken or name in without or own_name(name) in taken:
             continue
         if entry["group"] == "drive" and not driven:
             continue
-        found.append([Candidate(name, shape) for shape in _shapes(entry)])
+        found.append([Candidate(name, shape, formulas.get(name)) for shape in _shapes(entry)])
     return found
 
 
 def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
     """Yield the shapes of an effect: one parameter at most is scanned."""
-    shapes = [e for e in entry["parameters"][1:] if not _turns(e)]
+    shapes = [e for e in entry["parameters"][1:] if not is_phase(e)]
     if not shapes:
         yield {}
         return
@@ -171,11 +218,6 @@ def _scan(low: float, high: float, *, whole: bool) -> NDArray[np.float64]:
     if low < 0:
         return np.linspace(low, high, PLACES)  # a place on the circle
     return np.geomspace(low, high, SCANNED)
-
-
-def _turns(entry: Mapping[str, Any]) -> bool:
-    low, high = entry["typical"]
-    return bool(entry["unit"] == "rad" and low < 0 < high and high - low > TURN)
 
 
 def _whole(entry: Mapping[str, Any]) -> bool:

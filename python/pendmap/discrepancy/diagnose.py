@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.advice import Advice, advice_of
 from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.candidates import checked_own
 from pendmap.discrepancy.cycles import Cycles, cycles_of
 from pendmap.discrepancy.evidence import Evidence, evidence_of
+from pendmap.discrepancy.functions import FunctionScore, divided, function_scores
 from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.horizon import Forecast, forecasts_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
@@ -22,9 +24,10 @@ from pendmap.notebook import Readable
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
+    from pendmap.discrepancy.functions import TorqueFunction
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
-    from pendmap.model import Rig
+    from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
 
 __all__ = ["MOST_EFFECTS", "Discrepancy", "diagnose"]
@@ -64,6 +67,8 @@ class Discrepancy(Readable):
         Candidates that were refitted.
     advice : Advice
         What to record next, and what these records would have shown.
+    functions : tuple of FunctionScore
+        What Python functions of the user explain, to first order.
     """
 
     evidence: Evidence
@@ -80,6 +85,7 @@ class Discrepancy(Readable):
     scores: Scores
     attempts: tuple[Attempt, ...]
     advice: Advice
+    functions: tuple[FunctionScore, ...] = ()
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects)
@@ -123,12 +129,13 @@ class Discrepancy(Readable):
         return cycles_of(self.evidence, self.base, self.best)
 
 
-def diagnose(
+def diagnose(  # noqa: PLR0913 (each is asked for by name)
     experiment: Experiment,
     *,
     model: Rig | None = None,
     max_effects: int = MOST_EFFECTS,
     without: Collection[str] = (),
+    effects: Collection[Formula | TorqueFunction] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Discrepancy:
     """Find where a model and an experiment disagree, and which effects it lacks.
@@ -147,6 +154,9 @@ def diagnose(
         How many effects are added at most; the sensor's zero does not count.
     without : collection of str
         Effects that are no candidates.
+    effects : collection of Formula and TorqueFunction
+        Candidates of your own, beside the library's: formulas as the library's own effects, Python
+        functions of any kind to first order.
     progress : callable, optional
         Called with the steps done and those to do.
 
@@ -158,14 +168,19 @@ def diagnose(
     Raises
     ------
     InputError
-        If there is no run with samples, or no start can be found.
+        If there is no run with samples, no start can be found, or an effect of your own cannot be a
+        candidate.
     """
+    functions, others = divided(effects)
+    own = checked_own(others)
     report = progress or (lambda _done, _total: None)
     steps = max_effects + 3
     evidence = evidence_of(experiment)
     begin = baseline(evidence, model)
     report(1, steps)
-    search = Search(evidence, begin, max_effects, without, lambda done: report(1 + done, steps))
+    search = Search(
+        evidence, begin, max_effects, without, lambda done: report(1 + done, steps), own=own
+    )
     nearest = search.run()
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial, nearest.trial.remainder.level)
@@ -190,4 +205,5 @@ def diagnose(
         scores,
         tuple(search.attempts),
         advice_of(judgement, scores, search.level()),
+        function_scores(evidence, search.base.trial, best.trial, functions),
     )

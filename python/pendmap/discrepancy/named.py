@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.verdict import Judgement
-    from pendmap.model import Rig
+    from pendmap.model import Formula, Rig
 
 __all__ = ["NamedEffect", "diagnosed_model", "named_effects"]
 
@@ -43,6 +43,8 @@ class NamedEffect:
         them is.
     approximate : bool
         Whether its form may be only nearly right.
+    formula : Formula, optional
+        Where it is the user's own.
     """
 
     name: str
@@ -50,11 +52,19 @@ class NamedEffect:
     ci95: dict[str, tuple[float, float]]
     probability: float
     approximate: bool
+    formula: Formula | None = None
 
     @property
     def effect(self) -> Effect:
         """As a model has it."""
-        return Effect(self.name, self.parameters, self.ci95, self.probability, self.approximate)
+        return Effect(
+            self.name,
+            self.parameters,
+            self.ci95,
+            self.probability,
+            self.approximate,
+            self.formula,
+        )
 
 
 def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tuple[NamedEffect, ...]:
@@ -88,6 +98,7 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
                 ci95,
                 standing.share * judgement.complete,
                 judgement.approximate,
+                candidate.formula,
             )
         )
     return tuple(named)

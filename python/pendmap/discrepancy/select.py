@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.model import Formula
 
 __all__ = ["GATE", "Attempt", "Search"]
 
@@ -98,19 +99,24 @@ class Search:
         Effects that are no candidates.
     progress : callable
         Called with the number of effects found so far.
+    own : collection of Formula
+        Candidates of the user's own.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (what is searched, and among what)
         self,
         evidence: Evidence,
         base: Trial,
         most: int,
         without: Collection[str],
         progress: Callable[[int], None],
+        *,
+        own: Collection[Formula] = (),
     ) -> None:
         self.evidence = evidence
         self.most = most
         self.without = without
+        self.own = own
         self.progress = progress
         self.base = Found(base, tried(evidence, base))
         self.attempts: list[Attempt] = []
@@ -177,7 +183,9 @@ class Search:
 
     def pool(self, trial: Trial) -> list[list[Candidate]]:
         """Return the candidates that a trial's model does not have yet."""
-        return candidates(taken_by(trial), driven=self.evidence.forced, without=self.without)
+        return candidates(
+            taken_by(trial), driven=self.evidence.forced, without=self.without, own=self.own
+        )
 
     def scores(self, trial: Trial) -> Scores:
         """Return the scores of all candidates at a trial."""

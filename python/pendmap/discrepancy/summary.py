@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.records.summary import findings_said
@@ -105,6 +106,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             for name, pairs in found.runs.coefficients.items()
         },
         "ranking": _ranking(found),
+        "functions": [dataclasses.asdict(score) for score in found.functions],
         "attempts": [
             {
                 "effects": list(a.names),
@@ -194,6 +196,11 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         yield (
             f"Where: {what} of {row['torque']:.3g} rad/s^2 lacks at {row['over']} "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
+        )
+    for score in found.functions:
+        yield (
+            f"Function {score.name}, to first order: {score.size:.3g} +- {score.stderr:.2g} times "
+            f"it, G = {score.gain:.1f}; {score.left:.1f} beside the effects found"
         )
     yield f"Next: {found.advice.next_experiment}"
     yield from findings_said(found.evidence.experiment)

@@ -25,6 +25,8 @@ import numpy as np
 from pendmap.identification.sensitivity import window_slopes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from pendmap.discrepancy.evidence import Evidence
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["OVER", "residual_torque", "standing_out"]
+__all__ = ["OVER", "freed", "residual_torque", "responses", "standing_out", "windows_of"]
 
 OVER: Final = {
     "angle": "rad",
@@ -99,10 +101,7 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
     trial : Trial
         The model.
     """
-    # All samples: the integrals run through those that do not count.
-    whole = [dataclasses.replace(run, trusted=None) for run in evidence.fitted]
-    _, windows = window_slopes(trial.fit, whole, (), trial.fit.model)
-    places = [_places(evidence.fitted[w.run], trial, w) for w in windows]
+    windows, places = windows_of(evidence, trial)
     names = [name for name in OVER if any(np.isfinite(p[name]).any() for p in places)]
     edges = {
         name: np.unique(
@@ -111,22 +110,11 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
         for name in names
     }
     names = [name for name in names if edges[name].size > 2]  # noqa: PLR2004 (two bins at least)
-    parts = []
-    for window, place in zip(windows, places, strict=True):
-        run = evidence.fitted[window.run]
-        columns = _columns(run, window, place, {name: edges[name] for name in names})
-        if run.trusted is not None:
-            lost = ~run.trusted[window.first : window.first + len(window.residual)]
-            columns[lost] = 0.0
-            for values in (window.columns, window.states, window.residual):
-                values[lost] = 0.0
-        parts.append(window.freed(columns))
-    base, further, residual = (np.concatenate([p[k] for p in parts]) for k in range(3))
-    sizes = np.linalg.norm(base, axis=0)
-    u, s, _ = np.linalg.svd(base[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
-    u = u[:, s > BLIND * s[0]] if s.size else u
-    further = further - u @ (u.T @ further)
-    residual = residual - u @ (u.T @ residual)
+    columns = [
+        responses(evidence.fitted[window.run], window, _binned(place, {n: edges[n] for n in names}))
+        for window, place in zip(windows, places, strict=True)
+    ]
+    further, residual = freed(evidence, windows, columns)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
     first = 0
@@ -137,6 +125,40 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
         )
         first += count
     return Torque(found, gains)
+
+
+def windows_of(
+    evidence: Evidence, trial: Trial
+) -> tuple[list[WindowSlopes], list[dict[str, Floats]]]:
+    """Return the derivatives of a fit window by window, and where the motion is at each sample.
+
+    All samples have them: integrals run through those that do not count.
+    """
+    whole = [dataclasses.replace(run, trusted=None) for run in evidence.fitted]
+    _, windows = window_slopes(trial.fit, whole, (), trial.fit.model)
+    return windows, [_places(evidence.fitted[w.run], trial, w) for w in windows]
+
+
+def freed(
+    evidence: Evidence, windows: Sequence[WindowSlopes], columns: Sequence[Floats]
+) -> tuple[Floats, Floats]:
+    """Return columns and residuals, what parameters and initial states can follow taken off.
+
+    Samples that do not count are left out, also of ``windows``.
+    """
+    parts = []
+    for window, own in zip(windows, columns, strict=True):
+        run = evidence.fitted[window.run]
+        if run.trusted is not None:
+            lost = ~run.trusted[window.first : window.first + len(window.residual)]
+            for values in (own, window.columns, window.states, window.residual):
+                values[lost] = 0.0
+        parts.append(window.freed(own))
+    base, further, residual = (np.concatenate([p[k] for p in parts]) for k in range(3))
+    sizes = np.linalg.norm(base, axis=0)
+    u, s, _ = np.linalg.svd(base[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
+    u = u[:, s > BLIND * s[0]] if s.size else u
+    return further - u @ (u.T @ further), residual - u @ (u.T @ residual)
 
 
 def standing_out(torque: Torque) -> list[dict[str, Any]]:
@@ -171,31 +193,46 @@ def _places(run: FitRun, trial: Trial, window: WindowSlopes) -> dict[str, Floats
     }
 
 
-def _columns(
-    run: FitRun, window: WindowSlopes, place: dict[str, Floats], edges: dict[str, Floats]
-) -> Floats:
-    """Return what a torque of 1 rad/s^2 in each bin does to the readings over their errors."""
+def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
+    """Return a torque of 1 rad/s^2 in each bin, by columns."""
+    torques = []
+    for name, edge in edges.items():
+        which = np.clip(np.searchsorted(edge, place[name], side="right") - 1, 0, edge.size - 2)
+        weight = np.sign(place["velocity"]) if name in ALONG else np.ones(which.size)
+        weight = np.where(np.isfinite(place[name]), weight, 0.0)
+        torques += [np.where(which == k, weight, 0.0) for k in range(edge.size - 1)]
+    return np.stack(torques, axis=1)
+
+
+def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
+    """Return what torques do to the readings of a window, over their standard errors.
+
+    Parameters
+    ----------
+    run : FitRun
+        The record.
+    window : WindowSlopes
+        The derivatives of its window.
+    torques : ndarray of float, shape (n, k)
+        Torques per moment of inertia at the window's samples, rad/s^2.
+
+    Returns
+    -------
+    ndarray of float, shape (n, k)
+    """
     own = slice(window.first, window.first + len(window.residual))
     time = run.time[own]
     sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)[own]
-    count = sum(e.size - 1 for e in edges.values())
     if time.size < 3:  # noqa: PLR2004 (no slope)
-        return np.zeros((time.size, count))
+        return np.zeros(torques.shape)
     a, b = (window.states * sigma[:, None]).T
     wronskian = a * np.gradient(b, time) - np.gradient(a, time) * b
     sound = np.abs(wronskian) > LOST * float(np.max(np.abs(wronskian)))
     inverse = np.where(sound, 1.0 / np.where(sound, wronskian, 1.0), 0.0)
-    torques = []
-    for name, edge in edges.items():
-        which = np.clip(np.searchsorted(edge, place[name], side="right") - 1, 0, edge.size - 2)
-        weight = np.sign(place["velocity"]) if name in ALONG else np.ones(time.size)
-        weight = np.where(np.isfinite(place[name]), weight, 0.0)
-        torques += [np.where(which == k, weight, 0.0) for k in range(edge.size - 1)]
-    u = np.stack(torques, axis=1)
     steps = np.diff(time, append=time[-1:])[:, None]
 
     def integral(kernel: Floats) -> Floats:
-        rate = (kernel * inverse)[:, None] * u
+        rate = (kernel * inverse)[:, None] * torques
         summed = np.cumsum(steps * rate, axis=0)
         return np.asarray(summed - 0.5 * steps * rate, np.float64)
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.model.effects import definition
 from pendmap.model.rig import COUNTERPARTS
 
 if TYPE_CHECKING:
@@ -168,7 +167,7 @@ def _power_of(name: str, rig: Rig, free: Sequence[str]) -> float:
     if found is None:
         raise InputError(f"free has {checks.shown(name)}: the model has no such effect")
     _, effect, parameter = found
-    entry = next(e for e in definition(effect.name)["parameters"] if e["name"] == parameter)
+    entry = next(e for e in effect.definition["parameters"] if e["name"] == parameter)
     less = entry["power_of_w0_less"]
     if less is None:
         return float(entry["power_of_w0"])

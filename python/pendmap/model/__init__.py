@@ -1,12 +1,13 @@
 """The models: a pendulum without dimensions, a rig in SI, their effects and their files.
 
-``effects`` reads the library, ``library`` shows it, ``units`` holds the one formula of conversion,
-``pendulum`` and ``rig`` are the two kinds of model, ``quantities`` finds a rig's numbers from what
-was given, ``files`` reads and writes TOML.
+``effects`` reads the library, ``library`` shows it, ``formula`` is an effect of the user's own,
+``units`` holds the one formula of conversion, ``pendulum`` and ``rig`` are the two kinds of model,
+``quantities`` finds a rig's numbers from what was given, ``files`` reads and writes TOML.
 """
 
 from pendmap.model.effects import Effect
 from pendmap.model.files import load_model, save_model
+from pendmap.model.formula import Formula, load_formulas
 from pendmap.model.pendulum import PRESETS, Pendulum
 from pendmap.model.rig import Rig, without_dimensions
 from pendmap.model.units import Units
@@ -14,9 +15,11 @@ from pendmap.model.units import Units
 __all__ = [
     "PRESETS",
     "Effect",
+    "Formula",
     "Pendulum",
     "Rig",
     "Units",
+    "load_formulas",
     "load_model",
     "save_model",
     "without_dimensions",

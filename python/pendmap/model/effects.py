@@ -12,9 +12,13 @@ from pendmap import checks
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from pendmap.model.formula import Formula, FormulaKey
     from pendmap.model.units import Units
 
-__all__ = ["SHAPES", "Effect", "definition", "library"]
+__all__ = ["SHAPES", "Effect", "definition", "is_phase", "library"]
+
+_TURN: Final = 6.0
+"""A parameter whose typical range is at least this wide around 0 is a phase, rad."""
 
 SHAPES: Final = ("n", "th0", "w", "vs")
 """Parameters of effects that say how they act, not how strongly."""
@@ -29,6 +33,12 @@ def library() -> dict[str, dict[str, Any]]:
     from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
 
     return {entry["name"]: entry for entry in _core.effects()}
+
+
+def is_phase(entry: Mapping[str, Any]) -> bool:
+    """Whether a parameter is a phase, by its definition: typical of it is a whole turn, in rad."""
+    low, high = entry["typical"]
+    return bool(entry["unit"] == "rad" and low < 0 < high and high - low > _TURN)
 
 
 def definition(name: object) -> dict[str, Any]:
@@ -52,7 +62,7 @@ def definition(name: object) -> dict[str, Any]:
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """An effect of the library with values for its parameters.
+    """An effect of the library, or a formula, with values for its parameters.
 
     In a :class:`pendmap.Pendulum` its parameters are without dimensions, in a
     :class:`pendmap.Rig` in the SI units that the library states; each is the one without dimensions
@@ -70,6 +80,8 @@ class Effect:
         Where it was diagnosed, the probability that its name is right.
     approximate : bool, optional
         Whether its form is only nearly right.
+    formula : Formula, optional
+        Where the library has none of that name: the user's own.
 
     Raises
     ------
@@ -83,9 +95,12 @@ class Effect:
     ci95: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     probability: float | None = None
     approximate: bool | None = None
+    formula: Formula | None = None
 
     def __post_init__(self) -> None:
-        names = [entry["name"] for entry in definition(self.name)["parameters"]]
+        if self.formula is not None and self.formula.name != self.name:
+            raise InputError(f"name is {checks.shown(self.name)}: allowed is {self.formula.name}")
+        names = [entry["name"] for entry in self.definition["parameters"]]
         given = _mapping(f"{self.name}: parameters", self.parameters, names)
         missing = [name for name in names if name not in given]
         if missing:
@@ -107,6 +122,16 @@ class Effect:
 
     def __hash__(self) -> int:
         return hash((self.name, *self.parameters.values()))
+
+    @property
+    def definition(self) -> dict[str, Any]:
+        """What the library, or the formula, says about it."""
+        return definition(self.name) if self.formula is None else self.formula.entry
+
+    @property
+    def kernel(self) -> tuple[str | FormulaKey, list[float]]:
+        """It as the kernel takes it."""
+        return (self.name if self.formula is None else self.formula.key), self.values
 
     @classmethod
     def blank(cls, name: str, units: Units) -> Effect:
@@ -134,11 +159,14 @@ class Effect:
     @property
     def sizes(self) -> list[str]:
         """The names of its parameters that say how strong it is, not how it acts."""
-        return [name for name in self.parameters if name not in SHAPES]
+        if self.formula is None:
+            return [name for name in self.parameters if name not in SHAPES]
+        first, *others = self.definition["parameters"]
+        return [first["name"], *(entry["name"] for entry in others if is_phase(entry))]
 
     def described(self) -> list[str]:
         """Return the names of its parameters with their SI units."""
-        entries = definition(self.name)["parameters"]
+        entries = self.definition["parameters"]
         return [f"{entry['name']} ({entry['unit']})" for entry in entries]
 
     @property
@@ -148,23 +176,23 @@ class Effect:
 
     @property
     def drives(self) -> bool:
-        """Whether it moves the pivot."""
-        return bool(definition(self.name)["group"] == "drive")
+        """Whether it moves the pivot, or pushes with the phase of what does."""
+        return bool(self.definition["group"] == "drive")
 
     @property
     def brakes(self) -> bool:
         """Whether it is a kind of damping or friction."""
-        return bool(definition(self.name)["group"] == "damping")
+        return bool(self.definition["group"] == "damping")
 
     @property
     def reads(self) -> bool:
         """Whether it changes the sensor's reading alone, not the motion."""
-        return bool(definition(self.name)["group"] == "reading")
+        return bool(self.definition["group"] == "reading")
 
     @property
     def drifts(self) -> bool:
         """Whether it changes with the time in the laboratory; maps hold that still."""
-        return bool(definition(self.name)["mappable"] == "frozen")
+        return bool(self.definition["mappable"] == "frozen")
 
     def title(self, units: Units) -> str:
         """Return name and parameters, short: with their units in SI, else with those of angles."""
@@ -191,7 +219,7 @@ class Effect:
             # The exponents have the power 0: they are the same in all units.
             return own if less is None else own - self.parameters[less]
 
-        powers = {entry["name"]: power(entry) for entry in definition(self.name)["parameters"]}
+        powers = {entry["name"]: power(entry) for entry in self.definition["parameters"]}
         return dataclasses.replace(
             self,
             parameters={n: scale(value, powers[n]) for n, value in self.parameters.items()},

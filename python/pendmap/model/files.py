@@ -14,6 +14,7 @@ from pendmap.errors import InputError
 from pendmap.files import toml_text, whole_file
 from pendmap.model import quantities
 from pendmap.model.effects import Effect
+from pendmap.model.formula import Formula, formulas_of
 from pendmap.model.pendulum import Pendulum
 from pendmap.model.rig import COUNTERPARTS, Rig
 from pendmap.model.units import Units
@@ -39,8 +40,9 @@ def load_model(
     The table ``[pendulum]`` has the parameters of a :class:`Pendulum`, or those of a :class:`Rig`
     in SI with the other ways to write them that :meth:`Rig.of` takes; without dimensions ``zeta``
     may stand for ``gamma`` = 2 zeta. A key that is left out is 0. Each ``[[effect]]`` has a
-    ``name`` and ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``;
-    ``[covariance]`` and ``[provenance]`` are kept as they are in the model's ``notes``.
+    ``name`` and ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``; each
+    ``[[formula]]`` is a :class:`Formula`, which effects may name; ``[covariance]`` and
+    ``[provenance]`` are kept as they are in the model's ``notes``.
 
     Parameters
     ----------
@@ -69,7 +71,7 @@ def load_model(
     try:
         _check_top(content)
         table = _pendulum_table(content)
-        effects = _effects(content.get("effect", []))
+        effects = _effects(content.get("effect", []), formulas_of(content.get("formula", [])))
         notes: dict[str, Any] = {name: content[name] for name in _NOTES if name in content}
         if _is_si(table):
             return Rig.of(**_typed_over(table, typed), effects=effects, notes=notes)
@@ -106,6 +108,9 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
     if isinstance(model, Rig) and model.Omega == 0:
         del numbers["Omega"]  # nothing is driven
     content: dict[str, Any] = {"format_version": _FORMAT, "pendulum": numbers}
+    formulas = [effect.formula.table for effect in model.effects if effect.formula is not None]
+    if formulas:
+        content["formula"] = formulas
     if model.effects:
         content["effect"] = [_table(effect) for effect in model.effects]
     try:
@@ -134,11 +139,11 @@ def _pendulum_table(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check_top(content: dict[str, Any]) -> None:
-    known = ("pendulum", "effect", *_NOTES, "format_version")
+    known = ("pendulum", "formula", "effect", *_NOTES, "format_version")
     unknown = [key for key in content if key not in known]
     if unknown:
         shown = f"[{unknown[0]}]" if isinstance(content[unknown[0]], dict) else unknown[0]
-        tables = "[pendulum], [[effect]], [covariance], [provenance]"
+        tables = "[pendulum], [[formula]], [[effect]], [covariance], [provenance]"
         raise InputError(f"{shown} is not known: allowed are {tables} and format_version")
     version = content.get("format_version", _FORMAT)
     checks.whole("format_version", version, 1, _FORMAT)
@@ -226,19 +231,19 @@ def _pendulum(
     return Pendulum(**(zeros | numbers), effects=effects, notes=notes)
 
 
-def _effects(tables: object) -> tuple[Effect, ...]:
+def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, ...]:
     if not isinstance(tables, list):
         raise InputError(f"effect is {checks.shown(tables)}: allowed is [[effect]], one table each")
     effects = []
     for count, table in enumerate(tables, 1):
         try:
-            effects.append(_effect(table))
+            effects.append(_effect(table, formulas))
         except InputError as error:
             raise InputError(f"[[effect]] {count}: {error}") from None
     return tuple(effects)
 
 
-def _effect(table: object) -> Effect:
+def _effect(table: object, formulas: Mapping[str, Formula]) -> Effect:
     if not isinstance(table, dict):
         raise InputError(f"{checks.shown(table)}: allowed is a table")
     unknown = [key for key in table if key not in _EFFECT]
@@ -247,7 +252,15 @@ def _effect(table: object) -> Effect:
     for key, example in (("name", '"quadratic_drag"'), ("parameters", "{ q = 0.01 }")):
         if key not in table:
             raise InputError(f"{key} is missing: allowed is like {key} = {example}")
-    return Effect(**table)
+    name = table["name"]
+    formula = formulas.get(name) if isinstance(name, str) else None
+    try:
+        return Effect(**table, formula=formula)
+    except InputError as error:
+        own = ", ".join(formulas)
+        if formula is None and formulas and str(error).startswith("name is"):
+            raise InputError(f"{error}, and this file's [[formula]] are {own}") from None
+        raise
 
 
 def _table(effect: Effect) -> dict[str, Any]:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pendmap.model.effects import library
 
-__all__ = ["EffectDefinition", "EffectParameter", "effects"]
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pendmap.model.formula import Formula
+
+__all__ = ["EffectDefinition", "EffectParameter", "effects", "of_formulas"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,7 +25,7 @@ class EffectParameter:
         Its key in model files.
     unit : str
         Its unit in SI.
-    power_of_w0 : int
+    power_of_w0 : float
         Its value in SI is the one without dimensions times this power of ``w0``;
     power_of_w0_less : str or None
         where it names another parameter of the effect, the power is that much less.
@@ -34,7 +39,7 @@ class EffectParameter:
 
     name: str
     unit: str
-    power_of_w0: int
+    power_of_w0: float
     power_of_w0_less: str | None
     range: tuple[float, float]
     typical: tuple[float, float]
@@ -85,6 +90,11 @@ def effects() -> list[EffectDefinition]:
     ['-q v |v|']
     """
     return [_effect(entry) for entry in library().values()]
+
+
+def of_formulas(formulas: Iterable[Formula]) -> list[EffectDefinition]:
+    """Return the same about effects of a user's own."""
+    return [_effect(formula.entry) for formula in formulas]
 
 
 def _effect(entry: dict[str, Any]) -> EffectDefinition:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.model.effects import Effect, definition
+from pendmap.model.effects import Effect
+from pendmap.model.formula import FormulaKey
 from pendmap.model.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
 
 __all__ = ["PRESETS", "Kernel", "Pendulum", "checked_effects"]
 
-Kernel = tuple[float, float, float, float, float, float, float, list[tuple[str, list[float]]]]
+Kernel = tuple[
+    float, float, float, float, float, float, float, list[tuple[str | FormulaKey, list[float]]]
+]
 """What the kernel takes: the six of eq. 1.2 and 2.1, time in the laboratory, effects."""
 
 
@@ -30,7 +33,7 @@ class Pendulum:
     ``tau = w0 t``, ``w0 = sqrt(g / l)``; ``th = 0`` hangs down. At rest it stays there while the
     load, ``torque`` less the term with ``sin th``, is no greater than ``theta_r``.
 
-    ``effects`` of the library add further terms.
+    ``effects`` of the library, and of your own (:class:`pendmap.Formula`), add further terms.
 
     Any real number will do for a parameter, numpy's too; a float is kept.
 
@@ -127,7 +130,7 @@ class Pendulum:
     def parameters(self) -> Kernel:
         """All that the kernel takes."""
         own = (self.gamma, self.p, self.omega, self.phase, self.torque, self.theta_r)
-        return (*own, self.lab_time, [(effect.name, effect.values) for effect in self.effects])
+        return (*own, self.lab_time, [effect.kernel for effect in self.effects])
 
     @property
     def attributes(self) -> dict[str, float | str]:
@@ -199,8 +202,10 @@ def checked_effects(
         raise InputError(f"{what} is {checks.shown(effects)}: allowed is a tuple of Effect")
     for effect in effects:
         checks.of_type(what, effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
+        if effect.formula is not None:
+            continue
         # The library names the only parameter of such an effect as the paper names it.
-        names = [entry["name"] for entry in definition(effect.name)["parameters"]]
+        names = [entry["name"] for entry in effect.definition["parameters"]]
         if len(names) == 1 and names[0] in own:
             called, value = own[names[0]]
             if value != 0:
@@ -212,8 +217,14 @@ def checked_effects(
 
 
 def effects_json(effects: tuple[Effect, ...]) -> str:
-    """Return effects as a list of names and parameters, in JSON."""
-    return json.dumps([{"name": e.name, "parameters": dict(e.parameters)} for e in effects])
+    """Return effects as a list of names and parameters, in JSON; formulas with their terms."""
+    return json.dumps(
+        [
+            {"name": e.name, "parameters": dict(e.parameters)}
+            | ({} if e.formula is None else {"formula": e.formula.table})
+            for e in effects
+        ]
+    )
 
 
 PRESETS: Final = {

@@ -15,6 +15,8 @@ pub enum Family {
     Drive,
     /// Sensor and clock.
     Reading,
+    /// A formula of the user's own, which may be any of these.
+    Own,
 }
 
 impl Family {
@@ -27,6 +29,7 @@ impl Family {
             Self::PositionTorque => "position torque",
             Self::Drive => "drive",
             Self::Reading => "reading",
+            Self::Own => "own",
         }
     }
 }
@@ -66,6 +69,7 @@ impl Kind {
             | Self::EncoderEccentricity
             | Self::SensorLag
             | Self::Timebase => Family::Reading,
+            Self::Formula(_) => Family::Own,
         }
     }
 }

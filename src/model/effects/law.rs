@@ -96,6 +96,8 @@ impl Mappable {
 pub enum Power {
     /// `w0^k`.
     Of(i32),
+    /// The same where `k` is not whole.
+    Real(f64),
     /// `w0^(2 - n)` where `n` is the effect's parameter of that place.
     TwoMinus(usize),
 }
@@ -155,6 +157,8 @@ pub struct Point<R> {
     pub per_gravity: R,
     /// Time in the laboratory.
     pub lab: R,
+    /// Phase of the harmonic drive, rad; it is 0 where no formula asks for it.
+    pub phase: R,
 }
 
 impl<R: Real> Point<R> {

@@ -1,7 +1,8 @@
 //! The library of effects: one file each, and the list of them.
 //!
 //! [`law`] says what an effect is. A new one is one file with a [`Law`] and one line in the list
-//! below; Python, the command line, model files, maps and fits read it from here.
+//! below; Python, the command line, model files, maps and fits read it from here. A user's own
+//! effect needs neither: it is a [`Formula`].
 
 pub mod family;
 pub mod law;
@@ -10,6 +11,7 @@ pub use family::Family;
 pub use law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
 
 use super::drive::Motion;
+use super::formula::Formula;
 use crate::error::Error;
 use crate::lanes::Real;
 
@@ -17,13 +19,15 @@ macro_rules! library {
     ($($module:ident :: $law:ident,)*) => {
         $(mod $module;)*
 
-        /// An effect of the library.
+        /// An effect of the library, or one of a user's own.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Kind {
             $(
                 #[doc = concat!("`", stringify!($module), "`")]
                 $law,
             )*
+            /// A formula.
+            Formula(&'static Formula),
         }
 
         impl Kind {
@@ -35,6 +39,7 @@ macro_rules! library {
             pub const fn definition(self) -> &'static Definition {
                 match self {
                     $(Self::$law => &<$module::$law as Law>::DEFINITION,)*
+                    Self::Formula(formula) => formula.definition(),
                 }
             }
 
@@ -43,22 +48,25 @@ macro_rules! library {
             pub fn ready<R: Real>(self, parameters: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
                 match self {
                     $(Self::$law => $module::$law::ready(parameters),)*
+                    Self::Formula(_) => parameters,
                 }
             }
 
-            /// [`Law::torque`].
+            /// [`Law::torque`]; of a formula all of it, friction too, in the sense of `at`.
             #[inline(always)]
             pub fn torque<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::torque(parameters, at),)*
+                    Self::Formula(formula) => formula.whole(parameters, at),
                 }
             }
 
-            /// [`Law::friction`].
+            /// [`Law::friction`]; none of a formula, which is in its torque.
             #[inline(always)]
             pub fn friction<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::friction(parameters, at),)*
+                    Self::Formula(_) => at.constant(0.0),
                 }
             }
 
@@ -71,6 +79,7 @@ macro_rules! library {
             ) -> Option<R> {
                 match self {
                     $(Self::$law => $module::$law::switch(parameters, at),)*
+                    Self::Formula(formula) => formula.switch(parameters, at),
                 }
             }
 
@@ -79,6 +88,7 @@ macro_rules! library {
             pub fn inertia<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::inertia(parameters, at),)*
+                    Self::Formula(_) => at.constant(0.0),
                 }
             }
 
@@ -86,6 +96,7 @@ macro_rules! library {
             pub fn drive<R: Real>(self, parameters: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
                 match self {
                     $(Self::$law => $module::$law::drive(parameters, motion),)*
+                    Self::Formula(_) => {}
                 }
             }
 
@@ -98,6 +109,7 @@ macro_rules! library {
             ) -> R {
                 match self {
                     $(Self::$law => $module::$law::reading(parameters, theta, velocity),)*
+                    Self::Formula(_) => theta,
                 }
             }
 
@@ -106,6 +118,7 @@ macro_rules! library {
             pub fn keeps_mirror(self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
                 match self {
                     $(Self::$law => $module::$law::keeps_mirror(parameters),)*
+                    Self::Formula(formula) => formula.keeps_mirror(parameters),
                 }
             }
 
@@ -114,6 +127,7 @@ macro_rules! library {
             pub fn bars_maps(self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
                 match self {
                     $(Self::$law => $module::$law::bars_maps(parameters),)*
+                    Self::Formula(formula) => formula.bars_maps(parameters),
                 }
             }
         }
@@ -164,6 +178,17 @@ impl Kind {
             .copied()
             .find(|kind| kind.definition().name == name)
             .ok_or_else(|| Error::Effect { name: name.to_owned() })
+    }
+}
+
+impl Kind {
+    /// The same; of a formula, its corner stepped over.
+    #[must_use]
+    pub fn loosened(self) -> Self {
+        match self {
+            Self::Formula(formula) => Self::Formula(formula.loosened()),
+            other => other,
+        }
     }
 }
 
@@ -228,6 +253,23 @@ impl Effect {
     #[must_use]
     pub fn rubs(&self) -> bool {
         self.is(&[Action::Friction, Action::SlidingFriction, Action::LoadedFriction])
+    }
+
+    /// Whether steps end at a corner of it.
+    #[must_use]
+    pub fn has_corner(&self) -> bool {
+        let nowhere = Point {
+            theta: 0.0,
+            velocity: 0.0,
+            sense: 1.0,
+            side: 1.0,
+            sine: 0.0,
+            vertical: 1.0,
+            per_gravity: 1.0,
+            lab: 0.0,
+            phase: 0.0,
+        };
+        self.kind.switch(&self.parameters, &nowhere).is_some()
     }
 
     /// Whether it is the same for the mirrored motion, at the same phase of the drive.

@@ -1,0 +1,324 @@
+"""Effects that a user writes: a torque as a formula."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap import checks
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pendmap.model.effects import Effect
+
+__all__ = ["Formula", "FormulaKey", "formulas_of", "load_formulas"]
+
+_FORMULA: Final = ("name", "term", "parameters", "revealed_by")
+_PARAMETER: Final = ("power", "typical", "range", "unit", "meaning")
+_TYPICAL: Final = (1e-4, 0.3)
+"""Values of interest where none are said: as of the library's sizes."""
+_LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
+
+_ParameterKey = tuple[str, float, int | None, str, tuple[float, float], tuple[float, float], str]
+FormulaKey = tuple[str, str, str, tuple[_ParameterKey, ...]]
+"""A formula as the kernel takes it: name, term, revealed_by, parameters."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Formula:
+    """An effect of your own, written as a formula.
+
+    It joins whatever effects of the library do: models, trajectories, maps, fits, the candidates of
+    a diagnosis. Called with values for its parameters it makes an
+    :class:`~pendmap.Effect`.
+
+    Parameters
+    ----------
+    name : str
+        A name that the library does not have: a letter, then letters, digits and ``_``.
+    term : str
+        The torque per moment of inertia on the right of ``th'' = ...``: numbers, ``pi``, ``+ - * /
+        ^`` and brackets; ``theta`` (rad, not wrapped), ``v`` (velocity), ``phase`` (of the harmonic
+        drive, rad), ``t`` (time in the laboratory, which maps hold), ``w0``, ``a`` (the pivot's
+        upward acceleration over gravity) and the parameters; ``sqrt exp log sin cos tanh abs sign
+        min max`` and ``wrap``, which takes whole turns off an angle. It means the same in SI and
+        without dimensions, where ``w0`` is 1.
+    parameters : mapping
+        For each parameter, one to three, its power of ``w0`` or a mapping of
+
+        - ``power``: its value in SI is the one without dimensions times this power of ``w0``; or
+          ``"2 - n"``, with another parameter ``n``;
+        - ``typical``: the smallest and the largest value of interest, without dimensions, where a
+          search looks; by default 1e-4 and 0.3;
+        - ``range``: the least and the greatest value allowed, without dimensions; by default any;
+        - ``unit``, in SI, and ``meaning``: for those who read.
+
+        The first one says how strong the effect is; a diagnosis wants a term that is proportional
+        to it. A further one is a phase where its unit is ``rad`` and its typical values are those
+        of a whole turn, else a shape, of which a diagnosis scans the first.
+    revealed_by : str
+        Which data show it, for the advice of a diagnosis.
+
+    Raises
+    ------
+    InputError
+        If something is missing, the term cannot be read, its units do not balance, it is no number
+        somewhere, or it jumps elsewhere than where the velocity passes zero; on one line.
+
+    Notes
+    -----
+    ``sign(v)`` times what does not vanish at rest is dry friction and sticks as exactly as the
+    library's. Where the argument of one ``abs``, ``min`` or ``max`` passes zero steps end, so that
+    precision is kept; with several such arguments it falls to a low order there, and more steps are
+    taken.
+
+    Examples
+    --------
+    >>> drag = Formula("root_drag", "-k*sqrt(abs(v))*sign(v)", {"k": 1.5})
+    >>> drag(k=0.02).title
+    'root_drag (k = 0.02)'
+    """
+
+    name: str
+    term: str
+    parameters: Mapping[str, Any]
+    revealed_by: str = ""
+    key: FormulaKey = dataclasses.field(init=False, repr=False, compare=True)
+    entry: dict[str, Any] = dataclasses.field(init=False, repr=False, compare=False)
+    proportional: bool = dataclasses.field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        from pendmap import _core  # noqa: PLC0415 (only models with formulas need it)
+
+        for what in ("name", "term", "revealed_by"):
+            if not isinstance(getattr(self, what), str):
+                shown = checks.shown(getattr(self, what))
+                raise InputError(f"formula: {what} is {shown}: allowed is a text")
+        if not isinstance(self.parameters, Mapping) or not self.parameters:
+            shown = checks.shown(self.parameters)
+            raise InputError(
+                f"formula '{self.name}': parameters is {shown}: allowed is like {{'k': 1.5}}, with "
+                "their powers of w0"
+            )
+        names = list(self.parameters)
+        try:
+            parts = tuple(_parameter(n, self.parameters[n], names) for n in names)
+        except InputError as error:
+            raise InputError(f"formula '{self.name}': {error}") from None
+        key = (self.name, self.term, self.revealed_by, parts)
+        try:
+            entry, proportional = _core.formula(key)
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        kept = {part[0]: _said(part, names) for part in parts}
+        for what, value in (
+            ("parameters", kept),
+            ("key", key),
+            ("entry", entry),
+            ("proportional", proportional),
+        ):
+            object.__setattr__(self, what, value)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __call__(self, **parameters: float) -> Effect:
+        """Return the effect with values for its parameters."""
+        from pendmap.model.effects import Effect  # noqa: PLC0415 (effects may be formulas)
+
+        return Effect(self.name, parameters, formula=self)
+
+    @classmethod
+    def of(
+        cls, function: Callable[..., Any], parameters: Mapping[str, Any], *, name: str | None = None
+    ) -> Formula:
+        """Return the formula that a Python function computes.
+
+        The function is called once, with names in place of numbers: what it computes becomes the
+        term, which then runs compiled, in maps too. The function itself is not kept.
+
+        Parameters
+        ----------
+        function : callable
+            ``function(theta, v, t, phase, parameters)`` of arrays and a mapping of numbers; it
+            returns the torque per moment of inertia, by arithmetic and functions of numpy.
+        parameters : mapping
+            As of :class:`Formula`.
+        name : str, optional
+            By default the function's.
+
+        Raises
+        ------
+        InputError
+            If the function branches on values, looks up a table, or does something else that no
+            formula can say; or as :class:`Formula`.
+
+        Examples
+        --------
+        >>> def root_drag(theta, v, t, phase, parameters):
+        ...     return -parameters["k"] * np.sqrt(np.abs(v)) * np.sign(v)
+        >>> Formula.of(root_drag, {"k": 1.5}).term
+        '-k*sqrt(abs(v))*sign(v)'
+        """
+        from pendmap.model.traced import term_of  # noqa: PLC0415 (it loads numpy)
+
+        called = str(getattr(function, "__name__", "")) if name is None else name
+        if not callable(function):
+            shown = checks.shown(function)
+            raise InputError(f"function is {shown}: allowed is a function of five arguments")
+        if not isinstance(parameters, Mapping):
+            return cls(called, "0", parameters)  # which says what is wrong with them
+        return cls(called, term_of(function, parameters, called), parameters)
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """It as a table ``[[formula]]`` of a file."""
+        table = {"name": self.name, "term": self.term, "parameters": dict(self.parameters)}
+        return table | ({"revealed_by": self.revealed_by} if self.revealed_by else {})
+
+
+def formulas_of(tables: object) -> dict[str, Formula]:
+    """Return the formulas of a file's ``[[formula]]`` by name.
+
+    Raises
+    ------
+    InputError
+        If one is not as :class:`Formula` wants it, or a name is there twice.
+    """
+    if not isinstance(tables, list):
+        raise InputError(
+            f"formula is {checks.shown(tables)}: allowed is [[formula]], one table each"
+        )
+    found: dict[str, Formula] = {}
+    for count, table in enumerate(tables, 1):
+        where = f"[[formula]] {count}"
+        if not isinstance(table, dict):
+            raise InputError(f"{where}: {checks.shown(table)}: allowed is a table")
+        unknown = [key for key in table if key not in _FORMULA]
+        if unknown:
+            allowed = ", ".join(_FORMULA)
+            raise InputError(f"{where}: {unknown[0]} is not known: allowed are {allowed}")
+        missing = [key for key in _FORMULA[:3] if key not in table]
+        if missing:
+            raise InputError(f"{where}: {missing[0]} is missing: a formula needs it")
+        formula = Formula(**table)
+        if formula.name in found:
+            raise InputError(f"{where}: the name {formula.name} is there twice: allowed is once")
+        found[formula.name] = formula
+    return found
+
+
+def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
+    """Read the formulas of a file: its tables ``[[formula]]``.
+
+    Parameters
+    ----------
+    path : str or path
+        A TOML file: formulas alone, or a model with formulas.
+
+    Raises
+    ------
+    InputError
+        If it is not TOML, has no formulas, or one that is not as :class:`Formula` wants it.
+    OSError
+        If it cannot be read.
+    """
+    shown = os.fspath(path)
+    try:
+        content = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{shown}: not a TOML file: {error}") from None
+    if "pendulum" not in content:
+        unknown = [key for key in content if key not in ("formula", "format_version")]
+        if unknown:
+            raise InputError(f"{shown}: {unknown[0]} is not known: allowed are tables [[formula]]")
+    if not content.get("formula"):
+        raise InputError(f"{shown}: has no table [[formula]]")
+    try:
+        return list(formulas_of(content["formula"]).values())
+    except InputError as error:
+        raise InputError(f"{shown}: {error}") from None
+
+
+def _parameter(name: object, given: object, names: list[Any]) -> _ParameterKey:
+    if not isinstance(name, str):
+        raise InputError(f"parameter {checks.shown(name)}: allowed is a name")
+    said = given if isinstance(given, Mapping) else {"power": given}
+    unknown = [key for key in said if key not in _PARAMETER]
+    if unknown:
+        raise InputError(
+            f"parameter '{name}': {checks.shown(unknown[0])} is not known: allowed are "
+            f"{', '.join(_PARAMETER)}"
+        )
+    if "power" not in said:
+        raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
+    power, less = _power(name, said["power"], names)
+    plain = "1" if power == 0 and less is None else _unit(power, less, names)
+    unit = _text(name, "unit", said.get("unit", plain))
+    meaning = _text(name, "meaning", said.get("meaning", ""))
+    typical = _bounds(name, "typical", said.get("typical", _TYPICAL))
+    allowed = _bounds(name, "range", said.get("range", (-math.inf, math.inf)))
+    return name, power, less, unit, allowed, typical, meaning
+
+
+def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | None]:
+    if not isinstance(value, str):
+        return checks.number(f"parameter '{name}': power", value), None
+    match = _LESS.fullmatch(value)
+    if match is None or match[1] not in names or match[1] == name:
+        others = " or ".join(f'"2 - {n}"' for n in names if n != name)
+        raise InputError(
+            f"parameter '{name}': power is {checks.shown(value)}: allowed is a number"
+            + (f", or {others}" if others else "")
+        )
+    return 2.0, names.index(match[1])
+
+
+def _text(name: str, what: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"parameter '{name}': {what} is {checks.shown(value)}: allowed is a text")
+    return value
+
+
+def _unit(power: float, less: int | None, names: list[Any]) -> str:
+    return f"s^({names[less]}-2)" if less is not None else f"s^{-power:g}"
+
+
+def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
+        shown = checks.shown(value)
+        raise InputError(f"parameter '{name}': {what} is {shown}: allowed is [low, high]")
+    low, high = value
+    infinite = what == "range"
+    ends = (
+        float(end)
+        if infinite and isinstance(end, float) and math.isinf(end)
+        else checks.number(f"parameter '{name}': {what}", end)
+        for end in (low, high)
+    )
+    low, high = ends
+    return low, high
+
+
+def _said(part: _ParameterKey, names: list[str]) -> dict[str, Any]:
+    """Return a parameter as a table says it; what is as by default is left out."""
+    _, power, less, unit, allowed, typical, meaning = part
+    said: dict[str, Any] = {"power": power if less is None else f"2 - {names[less]}"}
+    if typical != _TYPICAL:
+        said["typical"] = list(typical)
+    if allowed != (-math.inf, math.inf):
+        said["range"] = list(allowed)
+    plain = "1" if power == 0 and less is None else _unit(power, less, names)
+    if unit != plain:
+        said["unit"] = unit
+    if meaning:
+        said["meaning"] = meaning
+    return said

@@ -1,0 +1,440 @@
+//! An effect that its user writes as a formula: a torque per inertia as text.
+//!
+//! - [`parse`]: from text to a [`tree`]
+//! - [`probe`]: what the term does, by its values
+//! - [`program`]: the tree as operations over lanes, single numbers and numbers with derivatives
+//!
+//! A term that jumps where the velocity passes zero is dry friction: of `T`, held at either sense of
+//! the motion, `-(T(+) - T(-))/2` is the friction and `(T(+) + T(-))/2` a torque. So it sticks and
+//! slips as exactly as the library's. Where the argument of one absolute value passes zero steps end
+//! ([`Law::switch`](super::effects::Law::switch)); more kinks than one are stepped over.
+
+mod parse;
+mod probe;
+mod program;
+mod tree;
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use self::program::{Kinks, Program, SLOTS};
+use self::tree::{Function, Tree, Variable};
+use super::effects::law::NOT_PERIODIC;
+use super::effects::{
+    Action, Definition, Group, Kind, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
+use crate::error::Error;
+use crate::lanes::Real;
+
+/// Why a map cannot have a torque that differs from period to period.
+const NOT_IN_STEP: &str =
+    "it does not repeat every period of the drive, and a map takes whole periods";
+
+/// A formula as its user gives it.
+#[derive(Clone, Debug)]
+pub struct Spec {
+    /// Its name.
+    pub name: String,
+    /// The torque per inertia, over `theta`, `v`, `phase`, `t`, `w0`, `a` and the parameters.
+    pub term: String,
+    /// Which data show it; nothing where that is to follow from the term.
+    pub revealed_by: String,
+    /// The parameters, in order.
+    pub parameters: Vec<ParameterSpec>,
+}
+
+/// A parameter of a formula as its user gives it.
+#[derive(Clone, Debug)]
+pub struct ParameterSpec {
+    /// Its name.
+    pub name: String,
+    /// Its power of `w0`.
+    pub power: f64,
+    /// The place of the parameter whose value is taken off the power.
+    pub less: Option<usize>,
+    /// Its unit in SI.
+    pub unit: String,
+    /// The least and the greatest value allowed, without dimensions.
+    pub range: [f64; 2],
+    /// The smallest and the largest value of interest, without dimensions.
+    pub typical: [f64; 2],
+    /// What it is.
+    pub meaning: String,
+}
+
+/// A formula that is ready to run.
+#[derive(Debug)]
+pub struct Formula {
+    definition: Definition,
+    tree: Tree,
+    program: Program,
+    switch: Option<Program>,
+    /// The same, its corner stepped over: for a model in which another effect has one.
+    loose: Option<&'static Self>,
+    timed: bool,
+    driven: bool,
+}
+
+impl PartialEq for Formula {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
+impl Eq for Formula {}
+
+/// All formulas so far. They last as long as the library: each text is kept once.
+static KNOWN: Mutex<BTreeMap<String, &'static Formula>> = Mutex::new(BTreeMap::new());
+
+impl Formula {
+    /// Reads and checks a formula.
+    ///
+    /// # Errors
+    /// [`Error::Formula`] for a name that is taken, a term that cannot be read, units that do not
+    /// balance, a jump elsewhere than where the velocity passes zero, or a value that is no number.
+    pub fn new(spec: &Spec) -> Result<&'static Self, Error> {
+        let key = format!("{spec:?}");
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(formula) = known.get(&key) {
+            return Ok(formula);
+        }
+        let formula =
+            Self::made(spec).map_err(|why| Error::Formula { name: spec.name.clone(), why })?;
+        known.insert(key, formula);
+        Ok(formula)
+    }
+
+    fn made(spec: &Spec) -> Result<&'static Self, String> {
+        check_names(spec)?;
+        let names: Vec<String> = spec.parameters.iter().map(|p| p.name.clone()).collect();
+        let tree = parse::parse(&spec.term, &names)?;
+        let parameters: Vec<Parameter> = spec.parameters.iter().map(ParameterSpec::kept).collect();
+        check_term(&tree, &parameters)?;
+        let jumps = probe::jumps(&tree, &parameters);
+        let steep_sign = !jumps && tree.has_steep_speed();
+        let kinks = tree.kinks();
+        let corner = if kinks.len() == 1 { Some(kinks[0]) } else { None };
+        let compiled = |tree: &Tree, corner| {
+            let few = format!("takes more than {SLOTS} values at a time: split it in two formulas");
+            Program::new(tree, Kinks { corner, steep_sign }).ok_or(few)
+        };
+        let program = compiled(&tree, corner)?;
+        let switch = corner.map(|argument| compiled(argument, None)).transpose()?;
+        let only_rubs = jumps && is_odd(&program, &parameters);
+        let timed = tree.names(|v| v == Variable::Phase);
+        let driven = timed || tree.names(|v| v == Variable::Pivot);
+        let action = action(&tree, jumps, only_rubs, driven || corner.is_some());
+        let bare =
+            |tree: &Tree| probe::usual(&parameters).any(|values| bar(tree, &values).is_some());
+        let mappable = if bare(&tree) {
+            Mappable::No
+        } else if tree.names(|v| v == Variable::Lab) {
+            Mappable::Frozen
+        } else {
+            Mappable::Yes
+        };
+        let group = match action {
+            _ if timed => Group::Drive,
+            Action::Position => Group::Torque,
+            _ => Group::Damping,
+        };
+        let definition = Definition {
+            name: kept(&spec.name),
+            group,
+            action,
+            formula: kept(&spec.term),
+            parameters: Box::leak(parameters.into_boxed_slice()),
+            revealed_by: if spec.revealed_by.is_empty() {
+                revealed_by(group, action)
+            } else {
+                kept(&spec.revealed_by)
+            },
+            mappable,
+        };
+        let loose = if switch.is_some() {
+            let program = compiled(&tree, None)?;
+            Some(Self {
+                definition,
+                tree: tree.clone(),
+                program,
+                switch: None,
+                loose: None,
+                timed,
+                driven,
+            })
+        } else {
+            None
+        };
+        let loose = loose.map(|formula| &*Box::leak(Box::new(formula)));
+        let whole = Self { definition, tree, program, switch, loose, timed, driven };
+        Ok(Box::leak(Box::new(whole)))
+    }
+
+    /// What is said about it.
+    #[must_use]
+    pub const fn definition(&'static self) -> &'static Definition {
+        &self.definition
+    }
+
+    /// Whether it is proportional to its first parameter, as a candidate must be.
+    #[must_use]
+    pub fn is_proportional(&self) -> bool {
+        probe::is_proportional(&self.tree, self.definition.parameters)
+    }
+
+    /// Whether it changes with the phase of the drive, also where the pivot rests.
+    #[must_use]
+    pub fn is_timed(&self) -> bool {
+        self.timed
+    }
+
+    /// Whether it changes with the drive.
+    #[must_use]
+    pub fn is_driven(&self) -> bool {
+        self.driven
+    }
+
+    /// The same without a corner of its own.
+    #[must_use]
+    pub fn loosened(&'static self) -> &'static Self {
+        self.loose.unwrap_or(self)
+    }
+
+    /// All of it, in the sense of the motion that is held.
+    #[inline(always)]
+    pub fn whole<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        self.program.run(parameters, at)
+    }
+
+    /// The magnitude of its friction: half of what it loses where the sense changes.
+    pub fn friction<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        if !self.rubs() {
+            return at.constant(0.0);
+        }
+        let [forth, back] = [1.0, -1.0]
+            .map(|sense| self.whole(parameters, &Point { sense: at.constant(sense), ..*at }));
+        (back - forth).scale(0.5)
+    }
+
+    fn rubs(&self) -> bool {
+        let frictions = [Action::Friction, Action::SlidingFriction, Action::LoadedFriction];
+        frictions.contains(&self.definition.action)
+    }
+
+    /// The argument of its absolute value.
+    #[inline(always)]
+    pub fn switch<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> Option<R> {
+        match &self.switch {
+            Some(program) => Some(program.run(parameters, at)),
+            None => None,
+        }
+    }
+
+    /// Whether it pushes the mirrored motion the other way.
+    #[must_use]
+    pub fn keeps_mirror(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
+        probe::mirrors(&self.tree, parameters)
+    }
+
+    /// Why a map cannot have it with these parameters.
+    #[must_use]
+    pub fn bars_maps(&self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
+        bar(&self.tree, parameters)
+    }
+}
+
+impl ParameterSpec {
+    fn kept(&self) -> Parameter {
+        let whole = self.power.fract() == 0.0 && self.power.abs() < 64.0;
+        Parameter {
+            name: kept(&self.name),
+            unit: kept(&self.unit),
+            power: match self.less {
+                Some(place) => Power::TwoMinus(place),
+                None if whole => Power::Of(self.power as i32),
+                None => Power::Real(self.power),
+            },
+            range: self.range,
+            typical: self.typical,
+            meaning: kept(&self.meaning),
+        }
+    }
+}
+
+fn kept(text: &str) -> &'static str {
+    String::leak(text.to_owned())
+}
+
+fn is_name(name: &str) -> bool {
+    let mut characters = name.chars();
+    characters.next().is_some_and(|c| c.is_ascii_alphabetic())
+        && characters.all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+fn check_names(spec: &Spec) -> Result<(), String> {
+    let allowed = "a letter, then letters, digits and _";
+    if !is_name(&spec.name) {
+        return Err(format!("its name: allowed is {allowed}"));
+    }
+    if Kind::named(&spec.name).is_ok() {
+        return Err("its name is one of the library: allowed is another".to_owned());
+    }
+    let count = spec.parameters.len();
+    if !(1..=MOST_PARAMETERS).contains(&count) {
+        return Err(format!(
+            "has {count} parameters: allowed are 1 to {MOST_PARAMETERS}; other numbers may stand in \
+             the term"
+        ));
+    }
+    for (k, parameter) in spec.parameters.iter().enumerate() {
+        let name = &parameter.name;
+        if !is_name(name) {
+            return Err(format!("parameter '{name}': allowed is {allowed}"));
+        }
+        if parse::is_taken(name) {
+            return Err(format!("parameter '{name}' has a meaning of its own: allowed is another"));
+        }
+        if spec.parameters[..k].iter().any(|p| p.name == *name) {
+            return Err(format!("parameter '{name}' is there twice"));
+        }
+        let ([low, high], [least, greatest]) = (parameter.typical, parameter.range);
+        if !(low < high && low.is_finite() && high.is_finite()) {
+            return Err(format!(
+                "parameter '{name}': typical is [{low}, {high}]: allowed are two numbers, the lower \
+                 first"
+            ));
+        }
+        if !(least <= low && high <= greatest) {
+            return Err(format!(
+                "parameter '{name}': range is [{least}, {greatest}]: allowed is one that holds the \
+                 typical [{low}, {high}]"
+            ));
+        }
+        if !parameter.power.is_finite() || parameter.less.is_some_and(|p| p >= count || p == k) {
+            return Err(format!("parameter '{name}': power is no number"));
+        }
+    }
+    Ok(())
+}
+
+fn check_term(tree: &Tree, parameters: &[Parameter]) -> Result<(), String> {
+    for (k, parameter) in parameters.iter().enumerate() {
+        let used = |tree: &Tree| {
+            let mut values: Vec<bool> = vec![false; MOST_PARAMETERS];
+            mark(tree, &mut values);
+            values[k]
+        };
+        if !used(tree) {
+            return Err(format!("parameter '{}' is not in the term", parameter.name));
+        }
+    }
+    let mut abrupt = false;
+    tree.functions(&mut |function, inner| {
+        abrupt |= function == Function::Sign && inner.moves() && !inner.is_velocity();
+    });
+    if abrupt {
+        return Err("jumps where what is under sign(...) passes zero: allowed is sign(v), or \
+                    tanh(x/width) for sign(x)"
+            .to_owned());
+    }
+    if let Some((at, values)) = probe::gap(tree, parameters) {
+        let given: Vec<String> = parameters
+            .iter()
+            .zip(&values)
+            .map(|(p, value)| format!("{} = {value:.3}", p.name))
+            .collect();
+        return Err(format!(
+            "is no finite number at theta = {:.3}, v = {:.3}, {} (without dimensions)",
+            at.theta,
+            at.velocity,
+            given.join(", ")
+        ));
+    }
+    probe::balances(tree, parameters).map_err(|power| {
+        let unit = "the term is an acceleration in rad/s^2, v a velocity, t a time";
+        match power {
+            Some(power) => format!(
+                "its units do not balance: {unit}; allowed is power = {power} for '{}'",
+                parameters[0].name
+            ),
+            None => format!(
+                "its units do not balance: {unit}; the powers of w0 of its parameters are wrong, or \
+                 a w0 is missing"
+            ),
+        }
+    })
+}
+
+/// Marks the parameters that a tree names.
+fn mark(tree: &Tree, used: &mut [bool]) {
+    match tree {
+        Tree::Variable(Variable::Parameter(place)) => used[*place] = true,
+        Tree::Number(_) | Tree::Variable(_) => {}
+        Tree::Apply(_, inner) => mark(inner, used),
+        Tree::Join(_, left, right) => {
+            mark(left, used);
+            mark(right, used);
+        }
+    }
+}
+
+/// Whether all of it changes its sign with the sense of the motion.
+fn is_odd(program: &Program, parameters: &[Parameter]) -> bool {
+    probe::usual(parameters).all(|values| {
+        let given = std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0));
+        [0.7_f64, -0.4, 1.9].into_iter().all(|velocity| {
+            let theta = 2.0 * velocity + 0.3;
+            let at = |sense: f64| Point {
+                theta,
+                velocity,
+                sense,
+                side: 1.0,
+                sine: theta.sin(),
+                vertical: 1.0 + 0.3 * velocity,
+                per_gravity: 1.0,
+                lab: 3.0,
+                phase: 1.1 - velocity,
+            };
+            let [forth, back] = [1.0, -1.0].map(|sense| program.run(&given, &at(sense)));
+            (forth + back).abs() <= 1e-12 * (forth.abs() + back.abs())
+        })
+    })
+}
+
+/// Which path of the kernel runs.
+fn action(tree: &Tree, jumps: bool, only_rubs: bool, loaded: bool) -> Action {
+    let mut speeds = false;
+    let mut beside = false;
+    tree.functions(&mut |function, inner| {
+        let kink = matches!(function, Function::Abs | Function::Sign) && inner.is_velocity();
+        speeds |= kink;
+        beside |= kink && function == Function::Abs;
+    });
+    let plain = beside || tree.names_velocity_plainly();
+    match (jumps, speeds) {
+        (true, _) if loaded => Action::LoadedFriction,
+        (true, _) if plain || !only_rubs => Action::SlidingFriction,
+        (true, _) => Action::Friction,
+        (false, true) => Action::Kinked,
+        (false, false) if tree.names(|v| v == Variable::Velocity) => Action::Velocity,
+        (false, false) => Action::Position,
+    }
+}
+
+fn bar(tree: &Tree, values: &[f64]) -> Option<&'static str> {
+    if !probe::repeats_every_turn(tree, values) {
+        return Some(NOT_PERIODIC);
+    }
+    (!probe::repeats_every_period(tree, values)).then_some(NOT_IN_STEP)
+}
+
+const fn revealed_by(group: Group, action: Action) -> &'static str {
+    match (group, action) {
+        (Group::Drive, _) => "forced runs at several frequencies",
+        (_, Action::Position) => "large swings and turns",
+        (_, Action::Friction | Action::SlidingFriction | Action::LoadedFriction) => {
+            "the last swings, and large ones"
+        }
+        _ => "large amplitudes and rotation, against small ones",
+    }
+}

@@ -1,0 +1,112 @@
+"""``diagnose`` with candidates of the user's own."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from bumpy import BUMP, FILE, experiment, torque
+from pendmap import Formula, InputError, Rig, load_formulas, load_model
+from pendmap.discrepancy import TorqueFunction, diagnose
+from pendmap.discrepancy.summary import as_text
+from pendmap.records import read_experiment
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Run
+
+
+def test_what_only_a_formula_explains_is_named(tmp_path: Path, pendmap_command: Run) -> None:
+    records = experiment(tmp_path / "records")
+    own = tmp_path / "own.toml"
+    own.write_text(FILE, encoding="utf-8")
+    out = tmp_path / "found.toml"
+    run = pendmap_command(
+        "diagnose", str(records), "--effects", str(own), "--out", str(out), "--json"
+    )
+    assert run.returncode == 0, run.stderr
+    found = json.loads(run.stdout)
+    assert found["verdict"] == "named"
+    (bump,) = found["effects"]
+    assert bump["name"] == "bump"
+    for name, true in BUMP.items():
+        low, high = bump["ci95"][name]
+        assert low - (high - low) < true < high + (high - low), name
+    assert found["gap"]["held_out_after"] < 1.1 * found["gap"]["noise_floor"]
+    # The new model is whole: it needs no other file.
+    model = load_model(out)
+    assert isinstance(model, Rig)
+    assert model.effects[-1].formula is not None
+    drive = ("--p", "0.6", "--omega", "2", "--gamma", "0.2")
+    run = pendmap_command("basins", "--model", str(out), *drive, "--grid", "10", "--json")
+    assert run.returncode == 0, run.stderr
+
+
+# ruff: noqa: ARG001 (a function takes all that a torque may depend on)
+def _table(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
+    grid = np.linspace(-math.pi, math.pi, 2001)
+    return np.interp(np.angle(np.exp(1j * theta)), grid, [torque(x) for x in grid])
+
+
+def _slope(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
+    return parameters["size"] * np.sin(5 * theta)
+
+
+def test_functions_are_scored_beside(tmp_path: Path) -> None:
+    records = read_experiment(experiment(tmp_path / "records"))
+    functions = [TorqueFunction("table", _table), TorqueFunction("slope", _slope, {"size": 0.1})]
+    # No formula: nothing that the library has is named for the bump.
+    found = diagnose(records, effects=functions)
+    assert found.verdict not in {"none", "named"}
+    table, slope = found.functions
+    assert (table.name, slope.name) == ("table", "slope")
+    assert table.size == pytest.approx(1.0, abs=0.3)
+    level = found.base.trial.remainder.level
+    best = max(score.gain for score in found.scores.scores) / level
+    assert table.gain > best
+    assert table.gain > 2 * slope.gain
+    # Beside a formula that is right nothing is left for them.
+    (tmp_path / "own.toml").write_text(FILE, encoding="utf-8")
+    found = diagnose(records, effects=[*load_formulas(tmp_path / "own.toml"), *functions])
+    assert [effect.name for effect in found.effects] == ["bump"]
+    assert all(score.left < 12 for score in found.functions)
+    assert any(line.startswith("Function table") for line in as_text(found))
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda *_: np.zeros(3), "fails with ValueError"),
+        (lambda th, *_: th / 0.0, "allowed are finite numbers"),
+        (lambda th: th, "fails with TypeError"),
+    ],
+)
+def test_a_function_s_faults_are_said_on_one_line(
+    function: Callable[..., Any], said: str, tmp_path: Path
+) -> None:
+    records = read_experiment(experiment(tmp_path / "records"))
+    with (
+        np.errstate(divide="ignore", invalid="ignore"),
+        pytest.raises(InputError, match=said) as caught,
+    ):
+        diagnose(records, max_effects=0, effects=[TorqueFunction("mine", function)])
+    assert str(caught.value).count("\n") == 0
+
+
+def test_what_cannot_be_a_candidate_is_refused(tmp_path: Path) -> None:
+    records = read_experiment(experiment(tmp_path / "records"))
+    lopsided = Formula("two", "-k*v - c*v^3", {"k": 1, "c": -1})
+    with pytest.raises(InputError, match="is not proportional to its first parameter k"):
+        diagnose(records, effects=[lopsided])
+    with pytest.raises(InputError, match="has one twice"):
+        diagnose(records, effects=[Formula("one", "-k*v^3", {"k": -1})] * 2)
+    with pytest.raises(InputError, match="allowed is a list of Formula"):
+        diagnose(records, effects=3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="allowed is a Formula, like"):
+        diagnose(records, effects=["bump"])  # type: ignore[list-item]

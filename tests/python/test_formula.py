@@ -1,0 +1,208 @@
+"""Effects of a user's own: formulas, and Python functions that are read as formulas."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import pendmap
+from bumpy import FILE
+from pendmap import (
+    Effect,
+    Formula,
+    InputError,
+    Pendulum,
+    Rig,
+    load_formulas,
+    load_model,
+    save_model,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Run
+
+DRAG = Formula("own_drag", "-q*v*abs(v)", {"q": 0})
+ROOT = Formula("root_drag", "-k*sqrt(abs(v))*sign(v)", {"k": 1.5})
+POWER = Formula(
+    "own_power",
+    "-q*abs(v)^n*sign(v)",
+    {"q": {"power": "2 - n"}, "n": {"power": 0, "typical": [1.1, 3], "range": [1, 4]}},
+)
+
+
+def test_a_formula_gives_the_map_of_the_library_s_effect() -> None:
+    grid = pendmap.Grid.square(30)
+    library = Pendulum(p=0.6, effects=(Effect("quadratic_drag", {"q": 0.05}),))
+    own = Pendulum(p=0.6, effects=(DRAG(q=0.05),))
+    a, b = (pendmap.basins(model, grid) for model in (library, own))
+    assert (a.label.values == b.label.values).all()
+    assert list(a.attractor.values) == list(b.attractor.values)
+    assert json.loads(b.attrs["effects"])[0]["formula"]["term"] == "-q*v*abs(v)"
+
+
+@pytest.mark.parametrize(("formula", "values"), [(ROOT, {"k": 0.3}), (POWER, {"q": 0.1, "n": 1.7})])
+def test_si_and_no_dimensions_mean_the_same(formula: Formula, values: dict[str, float]) -> None:
+    rig = Rig(w0=6.2, c_over_m=0.1, effects=(formula(**values),))
+    slow = pendmap.simulate(rig, 1.5, 0.0, until=4.0)
+    bare = pendmap.simulate(rig.pendulum, 1.5, 0.0, until=4.0 * 6.2)
+    assert float(slow.theta[-1]) == pytest.approx(float(bare.theta[-1]), abs=1e-9)
+    # Against a power law of the library with the same numbers.
+    q, n = (values["k"], 0.5) if "k" in values else (values["q"], values["n"])
+    other = Rig(w0=6.2, c_over_m=0.1, effects=(Effect("power_law_drag", {"q": q, "n": n}),))
+    known = pendmap.simulate(other, 1.5, 0.0, until=4.0)
+    assert float(slow.theta[-1]) == pytest.approx(float(known.theta[-1]), abs=1e-9)
+
+
+def test_a_model_file_carries_its_formulas(tmp_path: Path) -> None:
+    rig = Rig(w0=6.2, effects=(ROOT(k=0.3), POWER(q=0.1, n=1.7)))
+    path = save_model(rig, tmp_path / "model.toml")
+    again = load_model(path)
+    assert again == rig
+    assert [effect.formula for effect in again.effects] == [ROOT, POWER]
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert content["formula"][0] == {
+        "name": "root_drag",
+        "term": ROOT.term,
+        "parameters": {"k": {"power": 1.5}},
+    }
+    assert content["formula"][1]["parameters"]["q"] == {"power": "2 - n"}
+    assert [formula.name for formula in load_formulas(path)] == ["root_drag", "own_power"]
+    assert save_model(again, tmp_path / "again.toml").read_bytes() == path.read_bytes()
+
+
+def test_a_formula_s_name_does_not_do_for_another(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    text = '[pendulum]\ngamma = 0.1\n[[effect]]\nname = "root_drag"\nparameters = { k = 1.0 }\n'
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="name is 'root_drag': allowed is an effect"):
+        load_model(path)
+    path.write_text(text + FILE, encoding="utf-8")
+    with pytest.raises(InputError, match=r"this file's \[\[formula\]\] are bump, lean"):
+        load_model(path)
+    with pytest.raises(InputError, match="allowed is root_drag"):
+        Effect("other", {"k": 1.0}, formula=ROOT)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("x", "-k*thetta", {"k": 2}), r"unknown name 'thetta' at 4: allowed are theta, v, phase"),
+        (("x", "-k*v", {"k": 2}), r"units do not balance.*allowed is power = 1 for 'k'"),
+        (("x", "-k*v", {"k": {}}), "power is missing"),
+        (("x", "-k*v", {"k": {"power": "x"}}), "power is 'x': allowed is a number"),
+        (
+            ("x", "-k*v", {"k": {"power": 1, "typical": 3}}),
+            r"typical is 3: allowed is \[low, high\]",
+        ),
+        (("x", "-k*v", {"k": {"power": 1, "typical": [3, 1]}}), "the lower first"),
+        (("x", "-k*v", {"k": {"power": 1, "color": 3}}), "'color' is not known"),
+        (("x", "-k*v", {"k": {"power": 1, "unit": 3}}), "unit is 3: allowed is a text"),
+        (("x", "-k*v", {"k": {"power": 1, "range": [1, 2]}}), "holds the typical"),
+        (("x", "-k*v", {}), "with their powers of w0"),
+        (("x", "-k*v", 3), "with their powers of w0"),
+        (("x", 3, {"k": 1}), "term is 3: allowed is a text"),
+        (("magnet", "-k*v", {"k": 1}), "one of the library"),
+        (("x y", "-k*v", {"k": 1}), "a letter, then letters"),
+        (("x", "-v*v", {"v": 1}), "'v' has a meaning of its own"),
+        (("x", "k", {"k": 2, "q": 0}), "parameter 'q' is not in the term"),
+        (
+            ("x", "a*b*c*d", {"b": 2, "c": 0, "d": 0, "e": 0}),
+            "has 4 parameters: allowed are 1 to 3",
+        ),
+        (("x", "k*sign(theta)", {"k": 2}), "jumps where"),
+        (("x", "k/theta", {"k": 2}), "is no finite number at theta = 0.000"),
+    ],
+)
+def test_what_is_wrong_is_said_on_one_line(given: tuple[Any, ...], said: str) -> None:
+    with pytest.raises(InputError, match=said) as caught:
+        Formula(*given)
+    assert str(caught.value).count("\n") == 0
+
+
+def test_files_of_formulas(tmp_path: Path, pendmap_command: Run) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(FILE, encoding="utf-8")
+    run = pendmap_command("effects", "--effects", str(path), "--json")
+    assert run.returncode == 0, run.stderr
+    listed = json.loads(run.stdout)["effects"]
+    assert [effect["name"] for effect in listed] == ["bump", "lean"]
+    assert [effect["group"] for effect in listed] == ["torque", "damping"]
+    assert [effect["mappable"] for effect in listed] == ["yes", "yes"]
+    shown = pendmap_command("effects", "--effects", str(path), "lean")
+    assert shown.returncode == 0, shown.stderr
+    # What it shows for a model file is one.
+    model = tmp_path / "model.toml"
+    example = shown.stdout.partition("take by --model:")[2]
+    model.write_text(f"{example}\n[pendulum]\ngamma = 0.1\np = 0.6\nomega = 2\n", encoding="utf-8")
+    run = pendmap_command("basins", "--model", str(model), "--grid", "20", "--json")
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["attractors"]
+    for text, said in (
+        ("", "has no table [[formula]]"),
+        ("[[formula]]\nname = 'x'", "term is missing"),
+        (FILE + FILE, "the name bump is there twice"),
+        ("[[formular]]\nname = 'x'", "formular is not known"),
+        (FILE.replace("wrap(", "wrp("), "unknown function 'wrp' at 14"),
+    ):
+        path.write_text(text, encoding="utf-8")
+        run = pendmap_command("effects", "--effects", str(path))
+        assert run.returncode == 2, run.stdout
+        assert said in run.stderr
+        assert run.stderr.count("\n") == 1
+
+
+def test_maps_refuse_what_does_not_repeat() -> None:
+    spring = Formula("spring", "-k*theta", {"k": 2})
+    with pytest.raises(InputError, match="spring: allowed in one trajectory, not in maps"):
+        pendmap.basins(Pendulum(effects=(spring(k=0.1),)), pendmap.Grid.square(10))
+    assert pendmap.simulate(Pendulum(effects=(spring(k=0.1),)), 1.0, 0.0, until=1.0) is not None
+
+
+# ruff: noqa: ARG001, ARG005 (each function takes all that a torque may depend on)
+def _drag(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
+    return -parameters["k"] * np.sqrt(np.abs(v)) * np.sign(v)
+
+
+def _mixed(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
+    k = parameters["k"]
+    return k * (np.cos(2 * (theta - 1)) ** 2 - np.tanh(-np.sin(theta) / 0.3)) - 0.1 * -k * (
+        np.maximum(np.sin(phase), 0.0) - 2 ** (-np.cos(theta))
+    ) / np.square(3 - np.sin(theta))
+
+
+@pytest.mark.parametrize(("function", "power"), [(_drag, 1.5), (_mixed, 2.0)])
+def test_a_function_is_read_as_what_it_computes(function: Callable[..., Any], power: float) -> None:
+    formula = Formula.of(function, {"k": power}, name="mine")
+    pendulum = Pendulum(gamma=0.0, p=0.0, omega=1.7, effects=(formula(k=0.1),))
+    rng = np.random.default_rng(5)
+    for theta, v in zip(rng.uniform(-3, 3, 40), rng.uniform(-3, 3, 40), strict=True):
+        # The first instants of a trajectory show its acceleration.
+        path = pendmap.simulate(pendulum, theta, v, until=2e-3, samples=3)
+        seen = (float(path.velocity[-1]) - float(path.velocity[0])) / 2e-3
+        own = -np.sin(theta) + function(theta, v, 0.0, 0.0, {"k": 0.1})
+        assert seen == pytest.approx(own, abs=2e-2 * (1 + abs(v)))
+    assert formula.term.count("k") >= 1
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda th, v, t, ph, p: p["k"] if v > 0 else 0.0, "numpy.greater, which no formula has"),
+        (lambda th, v, t, ph, p: p["k"] * np.interp(th, [0, 1], [0, 1]), "numpy.interp"),
+        (lambda th, v, t, ph, p: p["q"] * v, "asks for a parameter 'q': allowed are k"),
+        (lambda th, v, t, ph, p: p["k"] * th.foo, "fails with AttributeError"),
+        (lambda th, v: v, "fails with TypeError"),
+        (lambda th, v, t, ph, p: None, "the value None"),
+    ],
+)
+def test_what_cannot_be_read_is_said(function: Callable[..., Any], said: str) -> None:
+    with pytest.raises(InputError, match=said) as caught:
+        Formula.of(function, {"k": 2}, name="mine")
+    assert str(caught.value).count("\n") == 0
