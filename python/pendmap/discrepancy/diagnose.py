@@ -19,6 +19,7 @@ from pendmap.discrepancy.runs import RunByRun, run_by_run
 from pendmap.discrepancy.select import Attempt, Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
+from pendmap.model.effects import definition
 from pendmap.notebook import Readable
 
 if TYPE_CHECKING:
@@ -67,6 +68,8 @@ class Discrepancy(Readable):
         Candidates that were refitted.
     advice : Advice
         What to record next, and what these records would have shown.
+    own : tuple of Formula
+        Candidates of the user's own beside the library's.
     functions : tuple of FunctionScore
         What Python functions of the user explain, to first order.
     """
@@ -85,7 +88,12 @@ class Discrepancy(Readable):
     scores: Scores
     attempts: tuple[Attempt, ...]
     advice: Advice
+    own: tuple[Formula, ...] = ()
     functions: tuple[FunctionScore, ...] = ()
+
+    def definition(self, name: str) -> dict[str, Any]:
+        """What the library, or the user's formula, says about a candidate."""
+        return next((f.entry for f in self.own if f.name == name), None) or definition(name)
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects)
@@ -205,5 +213,6 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         scores,
         tuple(search.attempts),
         advice_of(judgement, scores, search.level()),
+        own,
         function_scores(evidence, search.base.trial, best.trial, functions),
     )

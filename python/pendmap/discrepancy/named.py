@@ -55,6 +55,11 @@ class NamedEffect:
     formula: Formula | None = None
 
     @property
+    def definition(self) -> dict[str, Any]:
+        """What the library, or the user's formula, says about it."""
+        return self.effect.definition
+
+    @property
     def effect(self) -> Effect:
         """As a model has it."""
         return Effect(

@@ -80,6 +80,6 @@ def draw_coefficients(axes: Axes, found: Discrepancy, shown: str) -> None:
     names = [short(found.evidence.fitted[k].name) for k, _, _ in known]
     axes.set_xticks(range(len(known)), names, rotation=45, ha="right")
     times = f"10$^{{{power}}}$ " if power else ""
-    axes.set_ylabel(f"{times}{unit_of(shown)}".strip(), labelpad=2)
+    axes.set_ylabel(f"{times}{unit_of(shown, found.definition)}".strip(), labelpad=2)
     claimed = "" if found.effects else " (not claimed)"
     axes.set_title(f"{shown} run by run{claimed}")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pendmap.figures.blocks import Box
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
 
-__all__ = ["BLOCK", "draw_panels"]
+__all__ = ["BLOCK", "draw_errors", "draw_panels"]
 
 PEAK: Final = "measured peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 _SI: Final = Units(si=True)
@@ -36,7 +36,18 @@ def _draw(
     figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
 ) -> None:
     errors = {name: report.table.errors[name] for name in drawn(report.table.errors)}
-    peaks = report.peaks
+    draw_errors(figure, box, errors, report.peaks, letters, title)
+
+
+def draw_errors(  # noqa: PLR0913, PLR0917 (where, what, and how it is named)
+    figure: Figure,
+    box: Box,
+    errors: Mapping[str, PeakErrors],
+    peaks: Peaks,
+    letters: Iterator[str],
+    title: str,
+) -> None:
+    """Draw :func:`draw_panels` with a heading and names."""
     if not errors:
         room = blocks.named(figure, box, title)
         blocks.say(figure, room, NOTHING)

@@ -196,7 +196,7 @@ class Effect:
 
     def title(self, units: Units) -> str:
         """Return name and parameters, short: with their units in SI, else with those of angles."""
-        entries = definition(self.name)["parameters"]
+        entries = self.definition["parameters"]
         shown = []
         for entry in entries:
             said = units.si or (entry["power_of_w0"] == 0 and entry["power_of_w0_less"] is None)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.model.effects import definition
+from pendmap.model import effects
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from pendmap.model.units import Units
 
 __all__ = ["ANGLE", "clock", "per_time", "speed", "unit_of", "velocity"]
@@ -33,8 +35,13 @@ _UNITS: Final = {
 """Units of what is fitted, in SI."""
 
 
-def unit_of(parameter: str) -> str:
-    """Return the unit in SI of what a fit calls this, as ``w0`` or ``quadratic_drag.q``."""
+def unit_of(
+    parameter: str, definition: Callable[[str], Mapping[str, Any]] = effects.definition
+) -> str:
+    """Return the unit in SI of what a fit calls this, as ``w0`` or ``quadratic_drag.q``.
+
+    ``definition`` tells what is said of an effect, where there are others than the library's.
+    """
     effect, _, own = parameter.partition("[")[0].rpartition(".")
     if not effect:
         return _UNITS.get(own, "")

@@ -9,7 +9,6 @@ from pendmap.discrepancy.rivals import ALIKE
 from pendmap.discrepancy.select import GATE
 from pendmap.discrepancy.strength import strength_of
 from pendmap.discrepancy.summary import ranking_table
-from pendmap.model.effects import definition
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Formula, Items, Name, Paragraph, Picture, Section, Table
 from pendmap.report.wording import compared, gained, joined, mrad, own_parameters, share, values
@@ -48,7 +47,7 @@ def added(found: Discrepancy) -> Section:
     blocks: list[Block] = []
     terms, meant = [], ["v = theta'", "a the pivot's acceleration over gravity"]
     for effect in found.effects:
-        entry = definition(effect.name)
+        entry = effect.definition
         if entry["group"] not in {"drive", "reading"}:
             term, _, said = str(entry["formula"]).partition(", ")
             terms.append((_signed(term), effect.name))
@@ -62,7 +61,7 @@ def added(found: Discrepancy) -> Section:
     if terms:
         blocks.append(Paragraph(f"with {'; '.join(meant)}."))
     for effect in found.effects:
-        entry = definition(effect.name)
+        entry = effect.definition
         if entry["group"] in {"drive", "reading"}:
             where = "drive" if entry["group"] == "drive" else "sensor"
             blocks.append(Paragraph((f"In the {where}: ", Name(entry["formula"]), ".")))
@@ -117,7 +116,7 @@ def _parameters(found: Discrepancy) -> Table:
         rows.append(
             (
                 Name(name),
-                unit_of(name),
+                unit_of(name, found.definition),
                 _said(old),
                 _said(now),
                 f"{moved / error:+.2g}" if error and moved else "0",
@@ -224,7 +223,7 @@ def run_by_run(found: Discrepancy) -> Section:
         pairs = found.runs.coefficients[size]
         spread = found.runs.spread(size)
         estimate = found.nearest.trial.fit.estimates[size]
-        label = unit_of(size)
+        label = unit_of(size, found.definition)
         shown = [(n, v, e) for n, (v, e) in zip(names, pairs, strict=True) if math.isfinite(e)]
         blind = [n for n, (_, e) in zip(names, pairs, strict=True) if not math.isfinite(e)]
         differ = (

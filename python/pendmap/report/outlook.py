@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from pendmap.discrepancy.select import GATE
 from pendmap.identification.left_out import left_out
-from pendmap.model.effects import definition
+from pendmap.pictures.names import unit_of
 from pendmap.report.document import Items, Name, Paragraph, Section, Table
-from pendmap.report.wording import gained, joined, unit
+from pendmap.report.wording import gained, joined
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def set_aside(found: Discrepancy) -> Section:
             Table(
                 ("effect", "parameter", "would have shown from"),
                 tuple(
-                    (Name(name), Name(_size(name)), _limit(name, limit))
+                    (Name(name), Name(_size(found, name)), _limit(found, name, limit))
                     for name, limit in limits.items()
                 ),
                 words=("parameter",),
@@ -79,11 +79,12 @@ def set_aside(found: Discrepancy) -> Section:
     return Section("What was left out, and what would have shown", tuple(blocks))
 
 
-def _size(effect: str) -> str:
-    return str(definition(effect)["parameters"][0]["name"])
+def _size(found: Discrepancy, effect: str) -> str:
+    return str(found.definition(effect)["parameters"][0]["name"])
 
 
-def _limit(effect: str, limit: float) -> str:
+def _limit(found: Discrepancy, effect: str, limit: float) -> str:
     if not math.isfinite(limit):
         return "not at any size"
-    return f"{limit:.2g}{unit(effect, _size(effect))}"
+    unit = unit_of(f"{effect}.{_size(found, effect)}", found.definition)
+    return f"{limit:.2g} {unit}".rstrip()

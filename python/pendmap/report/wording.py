@@ -24,7 +24,6 @@ __all__ = [
     "own_parameters",
     "quantity",
     "share",
-    "unit",
     "values",
 ]
 
@@ -64,15 +63,11 @@ def joined(names: Iterable[str], last: str = "and") -> Parts:
     return tuple(parts)
 
 
-def unit(effect: str, parameter: str) -> str:
-    """Return the unit of an effect's parameter in SI, after a blank; nothing if it has none."""
-    return f" {unit_of(f'{effect}.{parameter}')}".rstrip()
-
-
 def quantity(effect: NamedEffect, parameter: str) -> str:
     """Return a parameter of an effect with its interval of 95 % and its unit."""
     value, bounds = effect.parameters[parameter], effect.ci95.get(parameter)
-    after = unit(effect.name, parameter)
+    unit = unit_of(f"{effect.name}.{parameter}", lambda _: effect.definition)
+    after = f" {unit}".rstrip()
     if bounds is None:
         return f"{value:.4g}{after}"
     width = (bounds[1] - bounds[0]) / 2
