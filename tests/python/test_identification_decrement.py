@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from decays import decay, record
 from pendmap.identification import Peaks, combined, de_paula, decrement, log_decrement, repair
+from pendmap.identification.methods import identify_peaks
 from pendmap.identification.period import frequency, mean_period
+from pendmap.identification.scatter import scatter
 
 WIDE = decay()
 
@@ -200,3 +202,23 @@ def test_a_short_record_is_told_how_many_peaks_of_how_many_it_lacks(count: int) 
     found = de_paula.from_peaks(made).warnings
     assert f"2 of {total} peaks between 12 and 90 degrees, 3 are needed" in found[0]
     assert len(found) == (2 if count < 3 else 1)
+
+
+def test_peaks_alone_tell_their_own_scatter() -> None:
+    made = decay(release=2.5)
+    count = 60
+    time, peak = made.peak_time[:count], made.peak[:count]
+    rng = np.random.default_rng(4)
+    noisy = Peaks.of(
+        time + 2e-3 * rng.standard_normal(count), peak + 5e-3 * rng.standard_normal(count)
+    )
+    assert scatter(noisy.time) == pytest.approx(2e-3, rel=0.5)
+    assert scatter(np.abs(noisy.amplitude)) == pytest.approx(5e-3, rel=0.5)
+    found = identify_peaks(noisy, ["combined_repaired", "log_decrement"])
+    w0 = found["combined_repaired"].estimates["w0"]
+    assert w0.stderr is not None
+    assert abs(w0.value - 6.2) < 4 * w0.stderr
+    # Too few to tell a scatter: no intervals of width 0.
+    few = identify_peaks(Peaks.of(time[-12:], peak[-12:]), ["log_decrement"])["log_decrement"]
+    assert all(each.ci95 is None and each.stderr is None for each in few.estimates.values())
+    assert not any("chi^2" in warning for warning in few.warnings)

@@ -108,14 +108,18 @@ def _start(evidence: Evidence) -> Rig:
         good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
         rough = rough_start(run.time[good], run.theta[good], evidence.readings[k].sigma)
         if rough is not None:
-            found = Rig(w0=rough["w0"], c_over_m=rough["c_over_m"], Tr=rough.get("Tr", 0.0))
-            return found if known is None else dataclasses.replace(found, w0=known)
+            return Rig(
+                w0=known or rough["w0"],
+                c_over_m=rough["c_over_m"],
+                Tr=rough.get("Tr", 0.0),
+                gravity=evidence.experiment.gravity,
+            )
     if known is None:
         raise InputError(
             f"{evidence.experiment.path}: no free run shows a natural frequency: allowed is one of "
             "two half swings or more, or w0 under [rig]"
         )
-    return Rig(w0=known, c_over_m=0.01 * known)
+    return Rig(w0=known, c_over_m=0.01 * known, gravity=evidence.experiment.gravity)
 
 
 def _other_starts(evidence: Evidence) -> list[Rig]:
@@ -130,7 +134,8 @@ def _other_starts(evidence: Evidence) -> list[Rig]:
             )
         except InputError:
             continue
-        found.append(Rig(w0=begin.w0, c_over_m=begin.c_over_m, Tr=begin.Tr))
+        gravity = evidence.experiment.gravity
+        found.append(Rig(w0=begin.w0, c_over_m=begin.c_over_m, Tr=begin.Tr, gravity=gravity))
     return found
 
 

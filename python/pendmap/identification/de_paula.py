@@ -105,7 +105,7 @@ def from_peaks(
     error = np.maximum(slack.stderr_amplitude, 1e-12)
     fall, fall_cov, fall_misfit = least_squares_line(slack.time, np.abs(slack.amplitude), error)
     for name, misfit in (("exponential", rate_misfit), ("linear", fall_misfit)):
-        if misfit > _MISFIT:
+        if misfit > _MISFIT and turned.known:
             warnings.append(
                 f"the decay is not {name} where it is taken for it: chi^2 per degree of freedom "
                 f"is {misfit:.3g}; the errors are widened by it, and yet too small"

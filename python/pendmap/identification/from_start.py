@@ -101,7 +101,8 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     if isinstance(start, Rig) or not poor:
         return found, tuple(readings)
     try:
-        again = fitted(_by_peaks(time, theta, readings[0].sigma))
+        found_by_peaks = _by_peaks(time, theta, readings[0].sigma)
+        again = fitted(dict(start or {}) | found_by_peaks)
     except InputError:
         return found, tuple(readings)
     better = (again.converged, -again.chi2) > (found.converged, -found.chi2)

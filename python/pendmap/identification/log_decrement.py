@@ -110,6 +110,8 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     found = compute(values)
     slopes = jacobian(compute, values, stderr / 10)
     covariance = slopes * stderr**2 @ slopes.T
+    if not small.known:
+        misfit = math.nan
     if misfit > _MISFIT and reading == "line":
         covariance = covariance * np.array([[1.0, misfit**0.5], [misfit**0.5, misfit]])
     if misfit > _MISFIT:
@@ -131,5 +133,5 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
         used,
         tuple(warnings),
         covariance=(names, np.asarray(covariance)),
-        misfit=misfit,
+        misfit=misfit if small.known else None,
     )

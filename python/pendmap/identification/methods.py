@@ -17,7 +17,8 @@ from pendmap.identification import (
 )
 from pendmap.identification.clock import from_first
 from pendmap.identification.peaks import find_peaks, samples
-from pendmap.identification.result import Identification
+from pendmap.identification.result import Estimate, Identification
+from pendmap.identification.scatter import with_scatter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -142,10 +143,11 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
 def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[str, Identification]:
     """Do the same where nothing but peaks was measured.
 
-    Methods that need every sample say that they are not applicable.
+    Methods that need every sample say that they are not applicable. Where the peaks have no
+    standard errors their own scatter tells them; too few for that, and there are no intervals.
     """
     found = {}
-    peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
+    peaks = with_scatter(peaks.later(-float(peaks.time[0])) if len(peaks) else peaks)
     for name in check_names(methods):
         from_peaks = METHODS[name].from_peaks
         text = "not applicable: the record holds peaks alone, and this method needs every sample"
@@ -154,4 +156,12 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
             if from_peaks is None
             else from_peaks(peaks)
         )
-    return found
+    return found if peaks.known else {n: _without_errors(one) for n, one in found.items()}
+
+
+def _without_errors(found: Identification) -> Identification:
+    """Return it without errors of 0, which nobody has; a fit tells its own from what it leaves."""
+    if any(each.stderr for each in found.estimates.values()):
+        return found
+    bare = {name: Estimate(each.value) for name, each in found.estimates.items()}
+    return dataclasses.replace(found, estimates=bare, covariance=None)

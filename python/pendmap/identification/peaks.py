@@ -92,6 +92,11 @@ class Peaks:
         return self.time.size
 
     @property
+    def known(self) -> bool:
+        """Whether their standard errors are known."""
+        return bool(np.any(self.stderr_time > 0) or np.any(self.stderr_amplitude > 0))
+
+    @property
     def odd(self) -> NDArray[np.bool_]:
         """Which peaks begin an odd half cycle, shape (P,)."""
         return np.asarray(self.index % 2 == 1)

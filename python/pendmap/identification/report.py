@@ -112,7 +112,10 @@ class IdentificationReport(Readable):
     @property
     def model(self) -> Rig:
         """The pendulum that the best method found, with its effects."""
-        return self.best.rig
+        best = self.best
+        if best.model is not None:
+            return best.model
+        return dataclasses.replace(best.rig, gravity=self.experiment.gravity)
 
 
 def decay_of(experiment: Experiment) -> Run:
@@ -216,7 +219,9 @@ def _best(
 ) -> tuple[JointFit | None, Identification]:
     others = [r for r in experiment.runs if r.kind == "free" and not r.hold_out and r is not run]
     runs = [run, *(r for r in others if r.moves and not r.peaks_only)]
-    known = {} if experiment.w0 is None else {"w0": experiment.w0}
+    known = {"gravity": experiment.gravity}
+    if experiment.w0 is not None:
+        known["w0"] = experiment.w0
     try:
         joint = fit_together(runs, start=start, known=known, effects=effects)
     except TooShortError as error:

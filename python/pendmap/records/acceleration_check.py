@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.accelerometer import GRAVITY, Accelerometer
+from pendmap.model.quantities import GRAVITY
+from pendmap.records.accelerometer import Accelerometer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import Column
 
-__all__ = ["GRAVITY", "LIKE", "Accelerometer", "Place", "accelerometer_of", "place_of"]
-
-GRAVITY: Final = 9.81
-"""m/s^2, where [rig] does not say otherwise."""
+__all__ = ["LIKE", "Accelerometer", "Place", "accelerometer_of", "place_of"]
 
 LIKE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
 """What a place looks like in [columns]."""

@@ -11,7 +11,8 @@ import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.records.accelerometer import GRAVITY, Accelerometer, accelerometer_of
+from pendmap.model.quantities import GRAVITY
+from pendmap.records.accelerometer import Accelerometer, accelerometer_of
 from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain
 

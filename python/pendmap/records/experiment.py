@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Any, Literal
 
 from pendmap.errors import InputError
+from pendmap.model.quantities import GRAVITY
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -184,6 +185,11 @@ class Experiment:
         """The ``w0`` of ``[rig]``, rad/s, unless the period of a record speaks against it."""
         doubtful = any(f.what == "period-unlike-rig" for f in self._said())
         return None if doubtful or "w0" not in self.known else float(self.known["w0"])
+
+    @property
+    def gravity(self) -> float:
+        """The ``gravity`` of ``[rig]``, m/s^2; 9.81 where nothing is said."""
+        return float(self.known.get("gravity", GRAVITY))
 
     def refuse_still(self, runs: Iterable[Run]) -> None:
         """Refuse runs of which none moves.

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.model.quantities import GRAVITY
 from pendmap.records.robust import normal_scale
 from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of, turn_to_rest
@@ -41,9 +42,6 @@ SAMPLES: Final = 8.0
 
 UNLIKE: Final = 0.25
 """Share by which a period may miss what is known of the rig: a starting value may be wrong."""
-
-GRAVITY: Final = 9.81
-"""m/s^2, where none is given: it differs by half a per cent over the earth."""
 
 FEWEST: Final = 6
 """Periods that a relation is taken from."""
