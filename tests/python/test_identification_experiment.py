@@ -12,6 +12,7 @@ import pendmap
 from decays import decay, record
 from driven_decays import motion
 from pendmap import InputError
+from pendmap.discrepancy import diagnose
 from pendmap.identification import find_peaks, identify, identify_experiment
 from pendmap.identification.left_out import left_out
 from pendmap.records import Experiment, Run
@@ -125,3 +126,17 @@ def test_a_long_hold_before_the_release_does_no_harm(tmp_path: Path) -> None:
         assert found.stderr is not None
         assert abs(found.value - true) < 4 * found.stderr
     assert np.isnan(report.joint.fit.curves[0][0][1400])  # type: ignore[union-attr]
+
+
+def test_gravity_of_the_rig_goes_into_every_model(tmp_path: Path) -> None:
+    time, angle = record(decay(release=0.5, until=60.0), seconds=50)
+    np.savetxt(tmp_path / "a.csv", np.column_stack([time, angle]), "%.6f", ",", header="t,theta")
+    (tmp_path / "experiment.toml").write_text(
+        "[rig]\ngravity = 1.62\n"
+        '[columns]\ntime = { name = "t" }\nangle = { name = "theta", unit = "rad" }\n'
+        '[[run]]\nfile = "a.csv"\nkind = "free"\n'
+    )
+    experiment = pendmap.read_experiment(tmp_path)
+    for method in ("trajectory", "combined_repaired"):
+        assert identify_experiment(experiment, methods=[method]).model.gravity == 1.62
+    assert diagnose(experiment, max_effects=0).best.trial.fit.model.gravity == 1.62

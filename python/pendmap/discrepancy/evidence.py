@@ -26,6 +26,10 @@ __all__ = ["Evidence", "evidence_of"]
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Parts of a run that are held back where no whole run is: a fifth, at large and small swings."""
 
+FEWEST_FORCED: Final = 2
+FEWEST_FREE: Final = 3
+"""Runs of a kind of which one is held back whole."""
+
 FEWEST: Final = 20
 """Samples that a stretch held back has at least; two are needed for its initial state."""
 
@@ -79,10 +83,11 @@ class Evidence:
 def evidence_of(experiment: Experiment) -> Evidence:
     """Divide an experiment into what is fitted and what is held back.
 
-    Runs marked ``hold_out`` are held back; where there are none, two stretches of each free decay,
-    which the fitted motion passes through without being drawn to them. Where no run is free either,
-    stretches of the forced ones, with initial states of their own: windows there are too short to
-    pass through.
+    Runs marked ``hold_out`` are held back; where there are none, the middle one of two forced runs
+    or more, on which what the drive lacks is tried, and of three free ones or more. Of fewer, two
+    stretches of each free decay, which the fitted motion passes through without being drawn to
+    them; where no run is free, stretches of the forced one, with initial states of their own:
+    windows there are too short to pass through.
 
     Raises
     ------
@@ -104,7 +109,7 @@ def evidence_of(experiment: Experiment) -> Evidence:
         reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
     )
     every = [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)]
-    marked = [k for k, run in enumerate(runs) if run.hold_out]
+    marked = [k for k, run in enumerate(runs) if run.hold_out] or _middle_runs(every)
     if marked:
         others = [k for k in range(len(runs)) if k not in marked]
         if not others:
@@ -121,6 +126,18 @@ def evidence_of(experiment: Experiment) -> Evidence:
             inside=False,
         )
     return _stretched(experiment, runs, readings, every)
+
+
+def _middle_runs(every: Sequence[FitRun]) -> list[int]:
+    """Return the runs to hold back where none is marked; none of too few."""
+    forced = [k for k, run in enumerate(every) if run.forced]
+    free = [k for k, run in enumerate(every) if not run.forced]
+    if len(forced) < FEWEST_FORCED:
+        return []
+    held = [forced[len(forced) // 2]]
+    if len(free) >= FEWEST_FREE:
+        held.append(free[len(free) // 2])
+    return held
 
 
 def _stretched(
