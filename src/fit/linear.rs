@@ -84,7 +84,7 @@ struct Follow<'a> {
 }
 
 impl Follow<'_> {
-    /// What the sensor is given, angle and velocity or an accelerometer's reading and nothing, with
+    /// What the sensor is given, angle and velocity or a rod sensor's reading and nothing, with
     /// its derivatives in `N` directions from `first` on.
     fn pass<const N: usize>(
         &self,
@@ -101,7 +101,7 @@ impl Follow<'_> {
             let place = direction.map_or(usize::MAX, |direction| direction.wrapping_sub(first));
             Tangent::<f64, N>::seeded(value, place)
         };
-        let Shaped { pendulum, gravity, accelerometer } = self.shaped;
+        let Shaped { pendulum, gravity, rod_sensor } = self.shaped;
         let parameter = |index: usize, value: f64| number(Slot::Parameter(index), value);
         let mut course = Course::new(pendulum, true, self.problem.tolerance, parameter)
             .watched()
@@ -119,7 +119,7 @@ impl Follow<'_> {
         };
         let run =
             sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
-        let given: Vec<[Tangent<f64, N>; 2]> = match accelerometer {
+        let given: Vec<[Tangent<f64, N>; 2]> = match rod_sensor {
             None => run.states.clone(),
             Some(sensor) => {
                 let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
@@ -143,7 +143,7 @@ impl Follow<'_> {
     /// What the sensor makes of what it is given.
     fn read(&self, states: Vec<State>, heard: &[State], slopes: &[State]) -> Linear {
         let record = &self.problem.records[self.window.record];
-        let sensor = match self.shaped.accelerometer {
+        let sensor = match self.shaped.rod_sensor {
             None => Some(Sensor::new(&self.shaped.pendulum, self.columns)),
             Some(_) => None,
         };

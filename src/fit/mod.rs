@@ -1,7 +1,7 @@
 //! Fitting a pendulum to records: least squares by multiple shooting on the reference integrator.
 //!
 //! - [`problem`]: records, and which parameters of their pendulums are free
-//! - [`accelerometer`]: what an accelerometer on the rod reads of a motion
+//! - [`rod_sensor`]: what a gyroscope or an accelerometer on the rod reads of a motion
 //! - [`window`]: a record cut into windows, each with an initial state of its own
 //! - [`linear`]: residuals of a window and their derivatives
 //! - [`normal`]: the equations of all windows, their initial states eliminated
@@ -13,15 +13,15 @@
 //! continuity between windows, so that each window stands for itself. Time is counted in `1 / w_ref`
 //! with a fixed `w_ref` near `w0`; `w0` itself is the parameter [`Slot::Gravity`](problem::Slot).
 
-pub mod accelerometer;
 pub mod descent;
 pub mod linear;
 pub mod normal;
 pub mod problem;
 pub mod profile;
+pub mod rod_sensor;
 pub mod stages;
 pub mod window;
 
-pub use accelerometer::Accelerometer;
 pub use problem::{Free, Problem, Record, Slot};
+pub use rod_sensor::RodSensor;
 pub use stages::{Fit, Settings, fit};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::accelerometer::Accelerometer;
+use super::rod_sensor::RodSensor;
 use crate::error::Error;
 use crate::model::effects::Action;
 use crate::model::{Pendulum, Recorded};
@@ -19,11 +19,11 @@ pub struct Record {
     pub recorded: Option<Arc<Recorded>>,
     /// Times of the samples, times `w_ref`; each after the one before it.
     pub times: Vec<f64>,
-    /// What the sensor read, rad; of an accelerometer in the unit of its factors.
+    /// What the sensor read, rad; of a sensor on the rod in the unit of its factors.
     pub readings: Vec<f64>,
-    /// The accelerometer that read, where it was no sensor of the angle; effects on the reading do
+    /// The gyroscope or accelerometer that read, where it was no sensor of the angle; effects on the reading do
     /// not act on it.
-    pub accelerometer: Option<Accelerometer>,
+    pub rod_sensor: Option<RodSensor>,
     /// About which angles these were, rad, where the readings are none: initial states begin there.
     pub angles: Option<Vec<f64>>,
     /// One over the standard error of each reading; 0 for readings that are not to be trusted.
@@ -39,9 +39,9 @@ pub enum Slot {
     Gravity,
     /// That place in [`Pendulum::parameters`].
     Parameter(usize),
-    /// [`Accelerometer::bias`].
+    /// [`RodSensor::bias`].
     Bias,
-    /// [`Accelerometer::tilt`].
+    /// [`RodSensor::tilt`].
     Tilt,
 }
 
@@ -79,8 +79,8 @@ pub struct Shaped {
     pub pendulum: Pendulum,
     /// `(w0 / w_ref)^2`.
     pub gravity: f64,
-    /// The record's accelerometer.
-    pub accelerometer: Option<Accelerometer>,
+    /// The record's sensor on the rod.
+    pub rod_sensor: Option<RodSensor>,
 }
 
 /// The free parameters of one record: their places in [`Problem::free`], and what they are.
@@ -126,10 +126,9 @@ impl Problem {
                     let allowed = "one of those given";
                     return Err(range("record of a free parameter", *record as f64, allowed));
                 };
-                if matches!(slot, Slot::Bias | Slot::Tilt)
-                    && records[*record].accelerometer.is_none()
+                if matches!(slot, Slot::Bias | Slot::Tilt) && records[*record].rod_sensor.is_none()
                 {
-                    let allowed = "one with an accelerometer";
+                    let allowed = "one with a gyroscope or an accelerometer";
                     return Err(range("record of a bias or tilt", *record as f64, allowed));
                 }
                 if let Slot::Parameter(index) = *slot
@@ -189,9 +188,9 @@ impl Problem {
     /// allowed: what is missing in a model may drive them there.
     #[must_use]
     pub fn shaped(&self, index: usize, values: &[f64]) -> Option<Shaped> {
-        let Record { pendulum, accelerometer, .. } = &self.records[index];
-        let (pendulum, accelerometer) = (pendulum.clone(), *accelerometer);
-        let mut shaped = Shaped { pendulum, gravity: 1.0, accelerometer };
+        let Record { pendulum, rod_sensor, .. } = &self.records[index];
+        let (pendulum, rod_sensor) = (pendulum.clone(), *rod_sensor);
+        let mut shaped = Shaped { pendulum, gravity: 1.0, rod_sensor };
         for (free, value) in self.free.iter().zip(values) {
             match free.slot(index) {
                 Some(Slot::Gravity) => shaped.gravity = *value,
@@ -213,9 +212,9 @@ impl Problem {
 }
 
 impl Shaped {
-    fn change(&mut self, change: impl FnOnce(&mut Accelerometer)) {
-        if let Some(accelerometer) = &mut self.accelerometer {
-            change(accelerometer);
+    fn change(&mut self, change: impl FnOnce(&mut RodSensor)) {
+        if let Some(sensor) = &mut self.rod_sensor {
+            change(sensor);
         }
     }
 
@@ -229,7 +228,7 @@ impl Shaped {
             };
             parameters.iter().zip(effect.values()).all(fits)
         });
-        let read = self.accelerometer.is_none_or(|sensor| sensor.is_sound());
+        let read = self.rod_sensor.is_none_or(|sensor| sensor.is_sound());
         finite && in_range && read && self.pendulum.motion().omega > 0.0 && self.gravity > 0.0
     }
 }

@@ -14,14 +14,14 @@ use crate::fit::descent::Point;
 use crate::fit::normal::linearised;
 use crate::fit::profile::intervals;
 use crate::fit::window::Window;
-use crate::fit::{Accelerometer, Free, Problem, Record, Settings, Slot, fit};
+use crate::fit::{Free, Problem, Record, RodSensor, Settings, Slot, fit};
 use crate::model::Recorded;
 use crate::model::recorded::{Quantity, Samples};
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
 /// `([(record, place), ...], start)`: which place in the list of parameters it is in which records,
-/// -1 for gravity, -2 and -3 for an accelerometer's bias and tilt; where the search starts.
+/// -1 for gravity, -2 and -3 for bias and tilt of a sensor on the rod; where the search starts.
 type FreeTuple = (Vec<(usize, isize)>, f64);
 
 /// `(record, first sample, one after the last, angle, velocity)`.
@@ -54,10 +54,11 @@ impl Pivot<'_> {
     }
 }
 
-/// An accelerometer as Python hands it over: its factors, and about which angles it saw.
+/// A sensor on the rod as Python hands it over: its factors, and about which angles it saw.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Sensor<'py> {
+    rate: f64,
     place: f64,
     gravity: f64,
     interval: f64,
@@ -74,16 +75,17 @@ pub struct Run<'py> {
     weight: Floats<'py>,
     longest: f64,
     pivot: Option<Pivot<'py>>,
-    accelerometer: Option<Sensor<'py>>,
+    rod_sensor: Option<Sensor<'py>>,
 }
 
 impl Run<'_> {
     fn record(self) -> PyResult<Record> {
         let recorded = self.pivot.as_ref().map(Pivot::recorded).transpose()?;
         let angles = |sensor: &Sensor<'_>| Ok::<_, PyErr>(sensor.angle.as_slice()?.to_vec());
-        let angles = self.accelerometer.as_ref().map(angles).transpose()?;
-        let accelerometer =
-            self.accelerometer.map(|Sensor { place, gravity, interval, .. }| Accelerometer {
+        let angles = self.rod_sensor.as_ref().map(angles).transpose()?;
+        let rod_sensor =
+            self.rod_sensor.map(|Sensor { rate, place, gravity, interval, .. }| RodSensor {
+                rate,
                 place,
                 gravity,
                 bias: 0.0,
@@ -96,7 +98,7 @@ impl Run<'_> {
             times: self.time.as_slice()?.to_vec(),
             readings: self.reading.as_slice()?.to_vec(),
             weights: self.weight.as_slice()?.to_vec(),
-            accelerometer,
+            rod_sensor,
             angles,
             longest: self.longest,
         })

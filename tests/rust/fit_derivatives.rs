@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pendmap::fit::window::Window;
-use pendmap::fit::{Accelerometer, Problem, Record, Slot};
+use pendmap::fit::{Problem, Record, RodSensor, Slot};
 use pendmap::integrate::State;
 use pendmap::integrate::course::Course;
 use pendmap::integrate::event::EventKind;
@@ -17,7 +17,7 @@ use crate::support::{driven, undriven};
 /// The largest difference of the rows from finite differences, over the size of the column or 1.
 fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
     let (mut slots, mut own) = everything(&record.pendulum);
-    if let Some(sensor) = record.accelerometer {
+    if let Some(sensor) = record.rod_sensor {
         slots.extend([Slot::Bias, Slot::Tilt]);
         own.extend([sensor.bias, sensor.tilt]);
     }
@@ -76,7 +76,7 @@ fn derivatives_hold_for_a_decay_to_rest() {
 }
 
 #[test]
-fn derivatives_hold_for_what_an_accelerometer_reads() {
+fn derivatives_hold_for_what_sensors_on_the_rod_read() {
     let pendulum = with(
         undriven(0.02, 0.003).with_friction(0.05).expect("in range"),
         &[(Kind::LoadDependentFriction, &[0.01]), (Kind::QuadraticDrag, &[0.004])],
@@ -84,20 +84,20 @@ fn derivatives_hold_for_what_an_accelerometer_reads() {
     let start = [2.0, -0.1];
     let mut record = record(pendulum, None, start, 90.0);
     record.angles = Some(record.readings.clone());
-    // At two thirds of the equivalent length, leaning and with gravity; then without it.
-    for (place, gravity) in [(2.0 / 3.0, 1.0), (-1.0, 0.0)] {
-        record.accelerometer =
-            Some(Accelerometer { place, gravity, bias: 0.01, interval: 0.06, tilt: 0.03 });
+    // At two thirds of the equivalent length, leaning and with gravity; without it; a gyroscope.
+    for (rate, place, gravity) in [(0.0, 2.0 / 3.0, 1.0), (0.0, -1.0, 0.0), (1.1, 0.0, 0.0)] {
+        let (bias, interval, tilt) = (0.01, 0.06, 0.03);
+        record.rod_sensor = Some(RodSensor { rate, place, gravity, bias, interval, tilt });
         let error = worst(record.clone(), None, start);
         assert!(error < 1e-6, "{error:e}");
     }
 }
 
 #[test]
-fn a_bias_needs_an_accelerometer() {
+fn a_bias_needs_a_sensor_on_the_rod() {
     let record = record(undriven(0.02, 0.0), None, [1.0, 0.0], 20.0);
     let fault = Problem::new(vec![record], free(&[Slot::Bias], 1, &[0.0]), TOLERANCE);
-    assert!(fault.expect_err("no accelerometer").to_string().contains("accelerometer"));
+    assert!(fault.expect_err("no such sensor").to_string().contains("gyroscope"));
 }
 
 #[test]

@@ -46,7 +46,7 @@ pub fn record(
         recorded,
         times,
         readings,
-        accelerometer: None,
+        rod_sensor: None,
         angles: None,
         weights,
         longest: f64::INFINITY,

@@ -103,7 +103,13 @@ def evidence_of(experiment: Experiment) -> Evidence:
     if made:
         raise InputError(
             f"{made[0].name}: its angle is made of an acceleration, whose own errors are not among"
-            " the effects: allowed is a record with an angle or a velocity"
+            " the effects: allowed is a record with an angle"
+        )
+    rated = [run for run in runs if run.gyroscope is not None]
+    if rated:
+        raise InputError(
+            f"{rated[0].name}: its angle is a velocity integrated, whose errors add up: allowed is"
+            " a record with an angle"
         )
     readings = tuple(
         reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs

@@ -157,7 +157,8 @@ def _over_record(axes: Axes, one: RunComparison) -> None:
     every = max(1, run.time.size // MOST)
     shown = np.where(run.trusted, run.theta, np.nan)
     # The reading of the model: what the sensor makes of its angle stands in the residual alone.
-    made = np.where(run.trusted, run.theta - one.residual, np.nan)
+    angle = run.theta - one.residual if run.rod_sensor is None else one.curve[0]
+    made = np.where(run.trusted, angle, np.nan)
     axes.plot(run.time[::every], shown[::every], ".", color=MEASURED, ms=1.5, rasterized=True)
     axes.plot(run.time[::every], made[::every], color=look(MODEL).colour, lw=0.7)
     sides.angle_axis(axes, shown[np.isfinite(shown)])

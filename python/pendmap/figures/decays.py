@@ -232,17 +232,22 @@ def _residuals(axes: Axes, report: IdentificationReport) -> None:
 def draw_residuals(
     axes: Axes, run: Run, residual: NDArray[np.float64], sigma: float, method: str
 ) -> None:
-    """Draw the residuals of a model over a record, with the noise ``sigma`` as lines."""
-    away = 1e3 * np.where(run.trusted, residual, np.nan)
+    """Draw the residuals of a model over a record, with the noise ``sigma`` as lines.
+
+    Of a gyroscope they are drawn as the rates that they are.
+    """
+    gyroscope = run.gyroscope
+    size, unit = (1e3, "mrad") if gyroscope is None else (1e3 * gyroscope.gain, "mrad/s")
+    away = size * np.where(run.trusted, residual, np.nan)
     every = max(1, away.size // MOST)
     one = look(method)
     axes.plot(run.time[::every], away[::every], ".", color=one.colour, ms=1.2, rasterized=True)
-    noise = 1e3 * sigma
+    noise = size * sigma
     for side in (-noise, noise):
         axes.axhline(side, color=MEASURED, lw=0.8, ls="--")
     known = np.abs(away[np.isfinite(away)])
     top = max(1.4 * float(np.percentile(known, 99.5)), 1.6 * noise) if known.size else noise
-    sides.middle_axis(axes, top, "mrad")
+    sides.middle_axis(axes, top, unit)
 
 
 BLOCK: Final = blocks.Block("decay", "The decay by each model", _height, _draw)

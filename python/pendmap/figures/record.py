@@ -16,7 +16,7 @@ from pendmap.figures import style
 from pendmap.records.local_fit import local_fit
 from pendmap.records.noise import noise_floor
 from pendmap.records.runs_of import true_runs
-from pendmap.records.summary import noise_said
+from pendmap.records.summary import noise_said, noise_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,9 +96,8 @@ def _refuse_small(size: tuple[float, float] | None, across: float, down: float) 
 def _subtitle(run: Run) -> str:
     if run.peaks_only:
         return f"{run.time.size} turning points, {run.time[0]:.6g} to {run.time[-1]:.6g} s"
-    said = (
-        noise_said(noise_floor(run)).split(",", maxsplit=1)[0].replace("+-", "\N{PLUS-MINUS SIGN}")
-    )
+    said = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
+    said = said.replace("+-", "\N{PLUS-MINUS SIGN}")
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
     return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {said}"
 
@@ -267,7 +266,8 @@ def _decay(axes: Axes, run: Run) -> None:
 def _residuals(axes: Axes, run: Run) -> None:
     """Draw what samples are away from their neighbours, against speed, and the noise found."""
     noise = noise_floor(run)
-    fit = local_fit(run.time, run.theta)
+    read = run.theta if run.gyroscope is None else run.read
+    fit = local_fit(run.time, read)
     keep = run.trusted[fit.middle]
     speed, residual = np.abs(fit.slope[keep]), 1e3 * np.abs(fit.residual[keep])
     stride = max(speed.size // MOST_POINTS, 1)
@@ -283,12 +283,16 @@ def _residuals(axes: Axes, run: Run) -> None:
         level = 1e3 * part.sigma
         axes.plot([part.speed_from, high], [level, level], color=FALSE, lw=1.8)
     top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
+    # What is read changes by speeds, a rate by accelerations.
     speeds = "|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)"
+    if run.gyroscope is not None:
+        two = "\N{SUPERSCRIPT TWO}"
+        speeds = f"|d{two}\N{GREEK SMALL LETTER THETA}/dt{two}| (rad/s{two})"
     fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
     axes.set_xlim(0, max(fastest * 1.03, 1e-9))
     axes.set_ylim(0, max(top, 1e-9))
     style.scale(axes, "x", axes.get_xlim(), speeds)
-    style.scale(axes, "y", axes.get_ylim(), "residual (mrad)")
+    style.scale(axes, "y", axes.get_ylim(), f"residual (m{noise_unit(run)})")
     axes.text(
         0.98, 0.96, "line: standard deviation", transform=axes.transAxes, ha="right", va="top",
         color=FALSE, fontsize=8.5,

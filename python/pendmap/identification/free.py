@@ -32,7 +32,7 @@ PLACES: Final[Mapping[str, int]] = {
 """Places in the core's list of parameters; those of effects follow. -1 is gravity."""
 
 SENSOR: Final[Mapping[str, int]] = {"bias": -2, "tilt": -3}
-"""The same of an accelerometer's own, run by run: they are always fitted."""
+"""The same of the own of a sensor on the rod, run by run: they are always fitted."""
 
 PER_RUN: Final = ("p", "Omega", "phi")
 """What belongs to the drive of one run."""
@@ -89,7 +89,7 @@ def free_quantities(
         The records and the pendulum of each.
     free : sequence of str
         Names as in :func:`pendmap.identification.fitting.fit_runs`; a phase that a run does not
-        know is added, and so are bias and tilt of an accelerometer.
+        know is added, and so are bias and tilt of a sensor on the rod.
     start : mapping of str to float
         Starts other than the rigs' values.
 
@@ -121,8 +121,8 @@ def free_quantities(
             for k in unknown_phase
         ]
     for k, run in enumerate(runs):
-        if run.accelerometer is not None:
-            quantities += _of_sensor(run.accelerometer, k, f"[{k}]" if len(runs) > 1 else "")
+        if run.rod_sensor is not None:
+            quantities += _of_sensor(run.rod_sensor, k, f"[{k}]" if len(runs) > 1 else "")
     return [
         dataclasses.replace(
             q, start=start.get(q.name, start.get(q.name.partition("[")[0], _value_of(q, rigs)))
@@ -132,7 +132,7 @@ def free_quantities(
 
 
 def _of_sensor(sensor: RodSensor, k: int, which: str) -> list[Quantity]:
-    """Return what is not known of an accelerometer: its reading of nothing, and how it leans."""
+    """Return what is not known of a sensor on the rod: its reading of nothing, and how it leans."""
     own = [Quantity(f"bias{which}", 0, [(k, SENSOR["bias"])], math.nan, sensor.unit)]
     if sensor.leans:
         own.append(Quantity(f"tilt{which}", 0, [(k, SENSOR["tilt"])], math.nan))

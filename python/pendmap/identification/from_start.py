@@ -75,8 +75,8 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     time, theta = first.time[good], first.angle[good]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
-    # An accelerometer has a bias instead.
-    zeroed = offset and any(run.accelerometer is None for run in runs)
+    # A sensor on the rod does not see where the angle is 0; it has a bias instead.
+    zeroed = offset and any(run.rod_sensor is None for run in runs)
 
     def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
         model = _start_of(begin, time, theta, readings[0].sigma)

@@ -67,35 +67,41 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         pivot=pivot,
         lab_time_s=run.lab_time_s + first,
         name=run.name,
-        accelerometer=_rod_sensor(run),
+        rod_sensor=_rod_sensor(run),
     )
 
 
 def as_angles(run: Run) -> NDArray[np.float64]:
-    """Return a run's readings: its angles, or those of its accelerometer over the gain.
+    """Return a run's readings: its angles, or those of a sensor on the rod over its gain.
 
     The gain makes them angles of small free swings.
     """
-    if run.accelerometer is None or run.acceleration is None:
-        return run.theta
-    return run.acceleration / run.accelerometer.gain
+    return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
 
 
 def reading_of_run(run: Run) -> Reading:
     """Return what the readings of a run are worth; see :func:`reading_of`."""
-    time = from_first(run.time)[0]
-    if run.accelerometer is None:
+    time, sensor = from_first(run.time)[0], run.rod_sensor
+    if sensor is None:
         return reading_of(time, run.theta, trusted=run.trusted, count=run.count_rad)
-    return reading_of(time, as_angles(run), trusted=run.trusted)
+    found = reading_of(time, as_angles(run), trusted=run.trusted)
+    law = found.law
+    if law is not None and run.gyroscope is not None:
+        # What a late reading of a rate is off by, the acceleration says.
+        law = dataclasses.replace(law, grows_with="acceleration")
+    return dataclasses.replace(found, law=law, gain=abs(sensor.gain), unit=sensor.unit)
 
 
 def _rod_sensor(run: Run) -> RodSensor | None:
+    if run.gyroscope is not None:
+        gain = run.gyroscope.gain
+        return RodSensor(run.theta, rate=1 / gain, unit=gain, leans=False)
     sensor = run.accelerometer
     if sensor is None:
         return None
     place, gravity = sensor.distance_m / sensor.gain, sensor.gravity / sensor.gain
     leans = sensor.direction != "angular"
-    return RodSensor(place, gravity, run.theta, sensor.gain, leans=leans)
+    return RodSensor(run.theta, place=place, gravity=gravity, unit=sensor.gain, leans=leans)
 
 
 def fit_together(

@@ -47,6 +47,9 @@ class Reading:
     shift : float or ndarray of float, shape (n,)
         By how much instants that miss their stamps move the readings on average, rad; a fit takes
         it off.
+    gain, unit : float, str
+        What was read over the angle that it counts for, and the unit of what was read; 1 and rad of
+        an angle.
     """
 
     sigma: float
@@ -57,6 +60,8 @@ class Reading:
     alike: NDArray[np.float64]
     law: SpeedLaw | None = None
     shift: NDArray[np.float64] | float = 0.0
+    gain: float = 1.0
+    unit: str = "rad"
 
 
 def reading_of(

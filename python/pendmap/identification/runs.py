@@ -63,30 +63,34 @@ class Pivot:
 
 @dataclasses.dataclass(frozen=True)
 class RodSensor:
-    """An accelerometer on the rod, whose readings a fit compares instead of angles.
+    """A gyroscope or an accelerometer on the rod, whose readings a fit compares instead of angles.
 
-    It reads ``place (th'' cos(tilt) + th'**2 sin(tilt)) + gravity sin(th + tilt) + bias``, where
+    A gyroscope reads ``rate th' + bias``, an accelerometer
+    ``place (th'' cos(tilt) + th'**2 sin(tilt)) + gravity sin(th + tilt) + bias``, where
     ``bias`` and ``tilt`` are fitted. Where friction turns round, at every turn, ``th''`` and the
     reading jump by ``2 place Tr``, which the reading whose interval of sampling holds the turn
     shares; while friction holds the pendulum, ``th''`` is 0.
 
     Parameters
     ----------
-    place : float
-        Reading per rad/s^2.
-    gravity : float
-        Reading of the whole of gravity; 0 where the sensor gives none.
     angle : ndarray of float, shape (n,)
         About which angles the readings were taken, rad: where the search starts.
+    rate : float
+        Reading per rad/s; 0 of an accelerometer.
+    place : float
+        Reading per rad/s^2; 0 of a gyroscope.
+    gravity : float
+        Reading of the whole of gravity; 0 where the sensor gives none.
     unit : float
         What a bias is given in, over the unit of the readings.
     leans : bool
         Whether its axis has a tilt.
     """
 
-    place: float
-    gravity: float
     angle: NDArray[np.float64]
+    rate: float = 0.0
+    place: float = 0.0
+    gravity: float = 0.0
     unit: float = 1.0
     leans: bool = True
 
@@ -100,7 +104,7 @@ class FitRun:
     time : ndarray of float, shape (n,)
         In s; each after the one before it. The drive's phase counts from ``time = 0``.
     theta : ndarray of float, shape (n,)
-        What the sensor read, rad, unwrapped; of an accelerometer in the unit of its factors.
+        What the sensor read, rad, unwrapped; of a sensor on the rod in the unit of its factors.
     sigma : float or ndarray of float, shape (n,)
         Standard error of the readings, rad; above 0.
     trusted : ndarray of bool, shape (n,), or None
@@ -115,7 +119,7 @@ class FitRun:
         The longest window; none: the whole record for a free decay, three swings for a forced run.
     name : str
         What to call it.
-    accelerometer : RodSensor or None
+    rod_sensor : RodSensor or None
         What read, if it was no sensor of the angle; effects on the reading do not act on it.
     """
 
@@ -128,12 +132,12 @@ class FitRun:
     lab_time_s: float = 0.0
     longest_s: float | None = None
     name: str = ""
-    accelerometer: RodSensor | None = None
+    rod_sensor: RodSensor | None = None
 
     @property
     def angle(self) -> NDArray[np.float64]:
-        """The angle, rad; of an accelerometer the one that was made of its readings."""
-        return self.theta if self.accelerometer is None else self.accelerometer.angle
+        """The angle, rad; of a sensor on the rod the one that was made of its readings."""
+        return self.theta if self.rod_sensor is None else self.rod_sensor.angle
 
     @property
     def forced(self) -> bool:
@@ -170,17 +174,19 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
         "weight": np.ascontiguousarray(weight),
         "longest": float(units.bare(longest, -1)),
         "pivot": None if run.pivot is None else _bare_pivot(run.pivot, rig, units),
-        "accelerometer": _bare_sensor(run, units),
+        "rod_sensor": _bare_sensor(run, units),
     }
 
 
 def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
-    sensor = run.accelerometer
+    sensor = run.rod_sensor
     if sensor is None:
         return None
-    if run.forced:
+    # What the pivot does is no part of a rate, but of an acceleration.
+    if run.forced and (sensor.place or sensor.gravity):
         raise InputError(f"{run.name or 'run'}: an accelerometer on a moving pivot is not fitted")
     return {
+        "rate": float(units.given(sensor.rate, 1)),
         "place": float(units.given(sensor.place, 2)),
         "gravity": sensor.gravity,
         # A reading is the mean over an interval of sampling.

@@ -134,13 +134,14 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
     motions = "one motion" if whole == 1 else f"{whole} motions"
     how = f"as {motions}" if count == whole else f"in {count} windows"
     total = sum(len(reading.each) for reading in readings)
-    noise = " to ".join(
-        f"{x:.2e}" for x in sorted({min(r.sigma for r in readings), max(r.sigma for r in readings)})
-    )
+    units = {r.unit for r in readings}
+    sigmas = [r.sigma * (r.gain if len(units) == 1 else 1.0) for r in readings]
+    noise = " to ".join(f"{x:.2e}" for x in sorted({min(sigmas), max(sigmas)}))
+    noise += f" {units.pop() if len(units) == 1 else 'rad'}"
     return Identification(
         METHOD,
         estimates=estimates,
-        used=f"{fit.samples} readings of {total}, {part}, {how}; noise {noise} rad",
+        used=f"{fit.samples} readings of {total}, {part}, {how}; noise {noise}",
         warnings=tuple(_warnings(fit, estimates, readings)),
         covariance=(names, fit.widening * fit.covariance),
         misfit=fit.chi2 / max(fit.degrees, 1),
@@ -227,11 +228,12 @@ def _warnings(
     lost = [name for name, e in wanted.items() if e.ci95 is None]
     if lost:
         found.append(f"no end was found for the interval of {', '.join(lost)}")
-    found += [f"{r.law}: each reading counts by the noise at its speed" for r in readings if r.law]
-    coarse = [reading.count for reading in readings if reading.coarse]
+    laws = [reading.law for reading in readings if reading.law]
+    found += [f"{law}: each reading counts by the noise at its {law.grows_with}" for law in laws]
+    coarse = [f"{r.gain * r.count:.3g} {r.unit}" for r in readings if r.coarse]
     if coarse:
         found.append(
-            f"the sensor's count ({max(coarse):.3g} rad) is coarser than its noise: readings on "
-            "one count are taken for one"
+            f"the sensor's count ({', '.join(dict.fromkeys(coarse))}) is coarser than its noise: "
+            "readings on one count are taken for one"
         )
     return found

@@ -11,7 +11,7 @@ from pendmap.errors import InputError
 from pendmap.records.accelerometer import LIKE
 from pendmap.records.circle import circle_angle
 from pendmap.records.from_acceleration import angle_from
-from pendmap.records.swings import swings
+from pendmap.records.gyroscope import angle_of_rate
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -101,8 +101,13 @@ def _derived(work: Work) -> None:
         return
     if "velocity" in work.extra:
         _finite(work, "velocity", work.extra["velocity"])
-        work.theta = _integrated(work, work.extra["velocity"])
-        text = "the angle is the velocity integrated; its zero is the middle of the swing"
+        rate = work.extra["velocity"]
+        work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST)
+        work.integrated = True
+        text = (
+            "the angle is the velocity integrated; its zero is the middle of the swing: for"
+            " pictures and the methods of peaks; the trajectory method fits the velocity itself"
+        )
         work.say("angle-integrated", text, mended=True)
         return
     _accelerated(work)
@@ -144,34 +149,6 @@ def _accelerated(work: Work) -> None:
     work.say("angle-from-acceleration", text, mended=True)
     if found.doubt:
         work.say("acceleration-weak", found.doubt)
-
-
-def _integrated(work: Work, velocity: Floats) -> Floats:
-    """Integrate a velocity; a straight line that the sensor's bias adds is taken out."""
-    from scipy.interpolate import CubicSpline
-
-    velocity = np.where(np.abs(velocity) > LARGEST, 0.0, velocity)
-    time = work.time - work.time[0]
-    theta: Floats = CubicSpline(time, velocity).antiderivative()(time)
-    if np.ptp(theta - np.median(theta)) > 2 * TURN:
-        return np.asarray(theta - theta[-1])  # it turns: where it hangs is not seen here
-    middle = _middles(time, theta)
-    if middle is None:
-        return np.asarray(theta - np.median(theta))
-    line = np.polyfit(*middle, 1)
-    return np.asarray(theta - np.polyval(line, time))
-
-
-def _middles(time: Floats, theta: Floats) -> tuple[Floats, Floats] | None:
-    """Return times and values halfway between turning points of either side."""
-    trend = np.polyval(np.polyfit(time, theta, 1), time)
-    found = swings(time, theta - trend)
-    if found.peak_time.size < 4:
-        return None
-    peaks = found.peak + np.interp(found.peak_time, time, trend)
-    # Halves of (1, 2, 1): what the decay does to a plain mean of two turns cancels.
-    value = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
-    return found.peak_time[1:-1], value
 
 
 def _unwrap(work: Work) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.accelerometer import Accelerometer
+    from pendmap.records.gyroscope import Gyroscope
 
     Floats = NDArray[np.float64]
 
@@ -100,6 +101,8 @@ class Run:
         m/s^2 (or rad/s^2), where it was measured.
     accelerometer : Accelerometer or None
         Where it was measured, if the angle was made of it alone.
+    gyroscope : Gyroscope or None
+        What read the velocity, if the angle was made of it alone.
     drive : mapping or None
         ``p``, ``Omega`` and ``phi`` (``None``: to be fitted) of a(t) = p cos(Omega t + phi).
     pivot : mapping of str to ndarray, or None
@@ -132,6 +135,7 @@ class Run:
     velocity: Floats | None = None
     acceleration: Floats | None = None
     accelerometer: Accelerometer | None = None
+    gyroscope: Gyroscope | None = None
     drive: Mapping[str, float | None] | None = None
     pivot: Mapping[str, Floats] | None = None
     pivot_unit: str | None = None
@@ -146,6 +150,17 @@ class Run:
     def moves(self) -> bool:
         """Whether anything in it is for fitting."""
         return bool(self.trusted.any())
+
+    @property
+    def rod_sensor(self) -> Accelerometer | Gyroscope | None:
+        """What read in place of a sensor of the angle, whose readings a fit compares."""
+        return self.accelerometer or self.gyroscope
+
+    @property
+    def read(self) -> Floats:
+        """What was read: the angle, or what it was made of, in the unit of its sensor."""
+        made_of = self.acceleration if self.accelerometer else self.velocity
+        return self.theta if self.rod_sensor is None or made_of is None else made_of
 
     @property
     def rate_hz(self) -> float:

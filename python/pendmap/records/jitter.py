@@ -62,18 +62,21 @@ class SpeedLaw:
         Standard deviation of the instants of sampling that makes the rest, s.
     fastest : float
         Phase that the motion passes in a second at most, rad/s.
+    grows_with : str
+        What ``v`` is of the motion: the speed where angles are read.
     """
 
     still: float
     tau: float
     stderr: float
     fastest: float
+    grows_with: str = "speed"
 
     def __str__(self) -> str:
         """What it says, in words."""
         return (
-            "the noise grows with speed, as if the instants of sampling missed their stamps by "
-            f"{1e3 * self.tau:.3g} +- {1e3 * self.stderr:.1g} ms"
+            f"the noise grows with {self.grows_with}, as if the instants of sampling missed their "
+            f"stamps by {1e3 * self.tau:.3g} +- {1e3 * self.stderr:.1g} ms"
         )
 
     def sigma(self, time: Floats, theta: Floats) -> Floats:

@@ -211,8 +211,8 @@ def _segment(work: Work, what: str, low: int, high: int, *, used: bool) -> Segme
 
 def check_zero(work: Work) -> None:
     """Say where a free run rests, or about what it swings, if that is not 0."""
-    if work.plan.kind != "free" or not work.releases or work.made_of is not None:
-        return  # of an acceleration: the middle was taken for 0 as the angle was made
+    if work.plan.kind != "free" or not work.releases or work.made_of is not None or work.integrated:
+        return  # of a sensor on the rod: the middle was taken for 0 as the angle was made
     _, limit = _limits(work)
     last = work.segments[-1]
     if last.what == "rest":

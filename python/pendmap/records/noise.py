@@ -30,6 +30,7 @@ import numpy as np
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
 from pendmap.records.local_fit import LocalFit, local_fit
 from pendmap.records.robust import broad_scale
+from pendmap.records.steps import step_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -137,11 +138,16 @@ class NoiseFloor:
 def noise_floor(run: Run) -> NoiseFloor:
     """Return the noise of a run, from the samples that are trusted; see :func:`noise_of`.
 
-    Where none is, since nothing moves, all show it.
+    Of a gyroscope alone it is that of the rate, in rad/s, by its change in rad/s^2.
+    Where no sample is trusted, since nothing moves, all show it.
     """
     if run.peaks_only:
         return NoiseFloor(math.nan, math.nan)
     trusted = run.trusted if run.trusted.any() else None
+    if run.gyroscope is not None:
+        found = noise_of(run.time, run.read, trusted=trusted, count=step_of(run.read))
+        law = found.law and dataclasses.replace(found.law, grows_with="acceleration")
+        return dataclasses.replace(found, law=law)
     return noise_of(run.time, run.theta, trusted=trusted, count=run.count_rad)
 
 

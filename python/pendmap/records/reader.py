@@ -23,6 +23,7 @@ from pendmap.records import (
 from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
+from pendmap.records.gyroscope import gyroscope_of
 from pendmap.records.table import read_table
 from pendmap.records.work import Work
 
@@ -145,6 +146,9 @@ def _runs(
 
 def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
     plan = work.plan
+    gyroscope = None
+    if work.integrated:
+        gyroscope = gyroscope_of(work.time, work.theta, work.extra["velocity"])
     return Run(
         name=name,
         file=plan.file,
@@ -157,6 +161,7 @@ def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
         velocity=work.extra.get("velocity"),
         acceleration=work.extra.get("acceleration"),
         accelerometer=work.made_of,
+        gyroscope=gyroscope,
         drive=plan.drive,
         pivot=work.pivot(),
         pivot_unit=channels.pivot_unit,

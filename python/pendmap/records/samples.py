@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap.records import false_samples
+from pendmap.records.gyroscope import angle_of_rate
 from pendmap.records.runs_of import equal_runs
 from pendmap.records.steps import step_of
 from pendmap.words import counted
@@ -40,9 +42,16 @@ def check(work: Work) -> None:
         # What may be false is the acceleration: the angle made of it has corners of its own.
         false_samples.find_spikes(work, work.extra["acceleration"], work.made_of.unit)
         return
+    if work.integrated:
+        rate = work.extra["velocity"]
+        read = dataclasses.replace(work, theta=rate, count=step_of(rate))
+        _clipped(read, "rad/s")
+        false_samples.find_spikes(work, rate, "rad/s")
+        work.theta = angle_of_rate(work.time, rate, work.trusted)
+        return
     work.seen = step_of(work.theta)
     work.count = _count(work)
-    _clipped(work)
+    _clipped(work, "rad")
     _frozen(work)
     false_samples.find(work)
 
@@ -58,6 +67,8 @@ def _count(work: Work) -> float:
 
 def say_steps(work: Work) -> None:
     """Say what steps the readings come in, once their unit is certain."""
+    if work.integrated:
+        return  # an integral has none
     counts, seen = work.known.get("encoder_counts"), work.seen
     work.count = _count(work)
     if counts is None:
@@ -73,7 +84,7 @@ def say_steps(work: Work) -> None:
         work.say("counts-differ", text)
 
 
-def _clipped(work: Work) -> None:
+def _clipped(work: Work, unit: str) -> None:
     """Mark plateaus at the ends of the range that the motion runs into at speed."""
     marked = np.zeros(work.theta.size, bool)
     ends = []
@@ -94,7 +105,7 @@ def _clipped(work: Work) -> None:
         at = np.flatnonzero(marked)
         work.trusted[at] = False
         text = (
-            f"the sensor ends at {' and '.join(ends[::-1])} rad:"
+            f"the sensor ends at {' and '.join(ends[::-1])} {unit}:"
             f" {counted(at.size, 'clipped sample')} not for fitting"
         )
         work.say("clipped", text, at=at)

@@ -127,7 +127,9 @@ def _seconds(work: Work, found: Periods) -> Periods:
         work.time *= factor
         text = f"the times are {name}: as seconds the period would be {small:.4g} s"
         work.say("time-unit", text, mended=True)
-        return Periods(found.amplitude, found.period * factor)
+        size = factor if work.integrated else 1.0
+        work.theta *= size
+        return Periods(found.amplitude * size, found.period * factor)
     if not SHORTEST < small < LONGEST:
         work.say("time-unit", f"a period of {small:.4g} s is no pendulum's: the unit is doubtful")
     return found
@@ -139,13 +141,14 @@ def _radians(work: Work, found: Periods) -> Periods:
     about = float(np.median(found.amplitude))
     if largest > math.pi and about > 0:
         degrees = largest * DEGREE <= math.pi
-        declared = "angle" in work.declared
+        declared = ("velocity" if work.integrated else "angle") in work.declared
         text = f"swings of {largest:.4g} rad are no pendulum's"
         if not degrees or declared:
             work.say("angle-unit", f"{text}: the unit or the scale is wrong")
             return found
         _rescale(work, DEGREE)
-        work.say("angle-unit", f"the angles are degrees: {text}", mended=True)
+        read = "velocities are degrees a second" if work.integrated else "angles are degrees"
+        work.say("angle-unit", f"the {read}: {text}", mended=True)
         return Periods(found.amplitude * DEGREE, found.period)
     _curvature(work, found, largest)
     return found
@@ -153,6 +156,8 @@ def _radians(work: Work, found: Periods) -> Periods:
 
 def _rescale(work: Work, factor: float) -> None:
     work.theta *= factor
+    if work.integrated:
+        work.extra["velocity"] = work.extra["velocity"] * factor
     work.count *= factor
     work.seen *= factor
 

@@ -71,7 +71,7 @@ def _velocity(work: Work) -> None:
         work.say("velocity-missing", text)
         del work.extra["velocity"]
         return
-    if any(finding.what == "angle-integrated" for finding in work.findings):
+    if work.integrated:
         return  # nothing to compare it with
     fit = local_fit(work.time, work.theta)
     which = work.trusted[fit.middle]

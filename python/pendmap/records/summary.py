@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
-__all__ = ["as_json", "as_text", "findings_said", "noise_said"]
+__all__ = ["as_json", "as_text", "findings_said", "noise_said", "noise_unit"]
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def as_json(experiment: Experiment) -> dict[str, Any]:
 
 
 def _run(run: Run) -> dict[str, Any]:
-    noise = dataclasses.asdict(noise_floor(run))
+    noise = dataclasses.asdict(noise_floor(run)) | {"unit": noise_unit(run)}
     used = run.theta[run.trusted]
     return {
         "name": run.name,
@@ -66,6 +66,7 @@ def _run(run: Run) -> dict[str, Any]:
         "count_rad": run.count_rad or None,
         "peaks_only": run.peaks_only,
         "noise": noise,
+        "gyroscope_bias": _bias(run),
         "segments": [dataclasses.asdict(segment) for segment in run.segments],
         "findings": [_finding(found) for found in run.findings],
     }
@@ -111,7 +112,10 @@ def _lines(run: Run) -> Iterator[str]:
         )
         yield f"  pivot     {ways or 'no numbers'}"
     if not run.peaks_only:
-        yield f"  noise     {noise_said(noise_floor(run))}"
+        yield f"  noise     {noise_said(noise_floor(run), noise_unit(run))}"
+    if (bias := _bias(run)) is not None:
+        said = f"{bias:+.3g} rad/s, what the gyroscope reads of nothing by the angle's drift"
+        yield f"  bias      {said}; left to the fit"
     for segment in run.segments:
         used = "for fitting" if segment.used else "not for fitting"
         yield f"  {segment.what:<9} {segment.from_s:.6g} to {segment.to_s:.6g} s, {used}"
@@ -148,15 +152,26 @@ def _steps(run: Run) -> str:
     return f", in steps of {run.count_rad:.4g} rad ({2 * math.pi / run.count_rad:.5g} a turn)"
 
 
-def noise_said(noise: NoiseFloor) -> str:
+def noise_unit(run: Run) -> str:
+    """Return the unit of :func:`noise_floor`."""
+    return "rad" if run.gyroscope is None else run.gyroscope.unit
+
+
+def _bias(run: Run) -> float | None:
+    bias = math.nan if run.gyroscope is None else run.gyroscope.bias
+    return bias if math.isfinite(bias) else None
+
+
+def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
     """Return the noise in words."""
     if not math.isfinite(noise.sigma):
         return "too few samples to tell"
-    degrees = math.degrees(noise.sigma)
-    said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} rad ({degrees:.2g} degrees)"
+    degrees = f"{math.degrees(noise.sigma):.2g} degrees{unit.removeprefix('rad')}"
+    said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
     if noise.limited_by_count:
         return f"{said}, that of counting: the record shows no more"
     slow, fast = noise.by_speed[0], noise.by_speed[-1]
     if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
-        said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high speed"
+        what = "speed" if unit == "rad" else "acceleration"
+        said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high {what}"
     return said

@@ -39,9 +39,9 @@ class Work:
     ``count`` is the step of the readings as it is known, ``seen`` as they show it, 0 for none.
     ``extra`` holds further channels by name, those of the pivot as ``pivot:vertical`` and
     ``pivot:horizontal``. ``accelerometer`` says where an acceleration was measured, or
-    ``place_missing`` which keys would. ``releases`` are the stretches for fitting of a free
-    record, first place and the one after the last; ``edge`` and ``phase`` what [columns] says of
-    the trigger.
+    ``place_missing`` which keys would; ``integrated`` whether the angle was made of the velocity.
+    ``releases`` are the stretches for fitting of a free record, first place and the one after the
+    last; ``edge`` and ``phase`` what [columns] says of the trigger.
     """
 
     where: str
@@ -59,6 +59,7 @@ class Work:
     seen: float = 0.0
     peaks_only: bool = False
     accelerometer: Accelerometer | None = None
+    integrated: bool = False
     place_missing: str = ""
     releases: list[tuple[int, int]] = dataclasses.field(default_factory=list)
     edge: str | None = None

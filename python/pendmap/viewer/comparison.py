@@ -89,8 +89,9 @@ def comparisons(report: IdentificationReport) -> list[Comparison]:
         (theta, speed), residual = joint.fit.curves[k], joint.fit.residuals[k]
         counted = run.trusted & np.isfinite(theta)
         # The fit gives the angle itself: the sensor's errors are added, as they are nearby where a
-        # sample does not count.
-        offset = (run.theta - residual - theta)[counted]
+        # sample does not count; those of a sensor on the rod are none of an angle.
+        off = run.theta - residual - theta if run.rod_sensor is None else 0 * theta
+        offset = off[counted]
         error = np.interp(run.time, run.time[counted], offset) if offset.size else 0.0
         known = np.where(counted, residual, math.nan)
         own = run is report.run

@@ -1,6 +1,7 @@
-//! An accelerometer on the rod, at the distance `r` from the pivot.
+//! A sensor on the rod that reads no angle: a gyroscope, or an accelerometer.
 //!
-//! It does not measure `r th''` but the specific force, acceleration less gravity. Towards positive
+//! A gyroscope reads `th'`, wherever it sits. An accelerometer at the distance `r` from the pivot
+//! does not measure `r th''` but the specific force, acceleration less gravity. Towards positive
 //! theta that is `r th'' + g sin th`, towards the pivot `r th'^2 + g cos th`; an axis that is turned
 //! by `d` out of the tangential direction reads
 //! `r (th'' cos d + th'^2 sin d) + g sin(th + d)`.
@@ -15,11 +16,14 @@ use crate::integrate::course::Course;
 use crate::integrate::tangent::Number;
 use crate::lanes::sine::Fine;
 
-/// What an accelerometer reads of a motion: `place (th'' cos tilt + th'^2 sin tilt) + gravity
-/// sin(th + tilt) + bias`, in any unit that the readings have.
+/// What a sensor on the rod reads of a motion: `rate th' + place (th'' cos tilt + th'^2 sin tilt) +
+/// gravity sin(th + tilt) + bias`, in any unit that the readings have. A gyroscope has a rate alone,
+/// an accelerometer none.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Accelerometer {
-    /// The factor on `th''`, time being counted in `1 / w_ref`.
+pub struct RodSensor {
+    /// The factor on `th'`, time being counted in `1 / w_ref`.
+    pub rate: f64,
+    /// The factor on `th''`.
     pub place: f64,
     /// The factor on gravity's part; 0 where gravity has been taken out.
     pub gravity: f64,
@@ -31,7 +35,7 @@ pub struct Accelerometer {
     pub tilt: f64,
 }
 
-impl Accelerometer {
+impl RodSensor {
     /// The reading in one state; `signs` are the sense of the motion and the side of a corner, none
     /// where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
     pub fn read<N: Number>(
@@ -42,6 +46,10 @@ impl Accelerometer {
         signs: Option<[f64; 2]>,
         [bias, tilt]: [N; 2],
     ) -> N {
+        let turning = velocity.scale(self.rate) + bias;
+        if self.place == 0.0 && self.gravity == 0.0 {
+            return turning;
+        }
         let leaning = (theta + tilt).scale(FRAC_1_PI).sine::<Fine>().scale(self.gravity);
         let turned = tilt.scale(FRAC_1_PI);
         let pull = signs.map_or(N::constant(0.0), |signs| {
@@ -49,7 +57,7 @@ impl Accelerometer {
         });
         let inward = velocity * velocity * turned.sine::<Fine>();
         let moving = pull.mul_add(turned.cosine::<Fine>(), inward);
-        moving.scale_add(self.place, leaning) + bias
+        moving.scale_add(self.place, leaning) + turning
     }
 
     /// `th''`, with the jump of friction at a turn less than half an interval away shared: the turn
@@ -80,7 +88,7 @@ impl Accelerometer {
     /// Whether all of it are numbers, and it shows anything.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        let all = [self.place, self.gravity, self.bias, self.interval, self.tilt];
-        all.iter().all(|x| x.is_finite()) && (self.place != 0.0 || self.gravity != 0.0)
+        let all = [self.rate, self.place, self.gravity, self.bias, self.interval, self.tilt];
+        all.iter().all(|x| x.is_finite()) && all[..3].iter().any(|factor| *factor != 0.0)
     }
 }
