@@ -119,6 +119,8 @@ def _draw(
     figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
 ) -> None:
     raw, zero, source = triplets_of(report.peaks), _zero(report), _source(report)
+    if report.table.left_out:
+        source = None  # peaks of an angle that is only roughly made judge no model
     if not raw.size.size:
         room = blocks.named(figure, box, title)
         blocks.say(figure, room, "Fewer than three peaks in a row.")

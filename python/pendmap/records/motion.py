@@ -12,6 +12,7 @@ from pendmap.errors import InputError
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
 from pendmap.records.local_fit import local_fit
+from pendmap.records.noise import noise_of
 from pendmap.records.releases import enough, grown, held_short, releases
 from pendmap.records.robust import normal_scale
 from pendmap.records.runs_of import true_runs
@@ -92,7 +93,8 @@ def check(work: Work) -> None:
     span = (int(ends[0]), int(ends[-1]) + 1)
     if work.made_of is not None:
         period = 2 * math.pi / work.made_of.w0
-        free = swinging(told.time[slice(*span)], told.theta[slice(*span)], noise).free
+        time, readings = told.time[slice(*span)], told.theta[slice(*span)]
+        free = swinging(time, readings, noise_of(time, readings).sigma).free
         parts = [(span[0] + a, span[0] + b) for a, b in free]
         parts = [piece for part in parts for piece in grown(told, part, middle, limit)]
     else:

@@ -83,7 +83,11 @@ def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
     noise : float
         Standard error of a reading.
     """
+    from scipy.ndimage import median_filter
+
     least = max(QUIET * noise, 1e-12)
+    # A lone false reading is neither a step nor the end of a hold.
+    reading = np.asarray(median_filter(reading, 3, mode="nearest"))
     crossing = swings(time, reading - middle_over(time, reading, least), least=least).crossing
     whole = [(0, time.size)]
     if crossing.size < FEWEST:
