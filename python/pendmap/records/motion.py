@@ -91,20 +91,14 @@ def check(work: Work) -> None:
     middle = float(np.median(good)) if middle is None else middle
     ends = np.flatnonzero(work.trusted)
     span = (int(ends[0]), int(ends[-1]) + 1)
+    period = _period(work, middle)
+    if period is None:
+        work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
+        return
     if work.made_of is not None:
-        period = 2 * math.pi / work.made_of.w0
-        time, readings = told.time[slice(*span)], told.theta[slice(*span)]
-        free = swinging(time, readings, noise_of(time, readings).sigma).free
-        parts = [(span[0] + a, span[0] + b) for a, b in free]
-        parts = [piece for part in parts for piece in grown(told, part, middle, limit)]
+        parts = _let_swing(told, middle, limit, span)
     else:
-        found = periods_of(work, middle)
-        period = found.small if found else _known_period(work)
-        if period is None:
-            work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
-            return
-        stretches = _still(work, period, limit, span)
-        parts = _moving(span, stretches)
+        parts = _moving(span, _still(work, period, limit, span))
         parts = releases(work, parts, middle, limit, period, noise)
     if not parts:
         return
@@ -126,6 +120,22 @@ def _felt(work: Work, sensor: Accelerometer) -> Work:
     bad = ~work.trusted
     readings[bad] = np.interp(work.time[bad], work.time[~bad], readings[~bad])
     return dataclasses.replace(work, theta=readings / sensor.gain)
+
+
+def _let_swing(told: Work, middle: float, limit: float, span: Places) -> list[Places]:
+    """Return where an accelerometer feels free swings."""
+    time, readings = told.time[slice(*span)], told.theta[slice(*span)]
+    free = swinging(time, readings, noise_of(time, readings).sigma).free
+    parts = [(span[0] + low, span[0] + high) for low, high in free]
+    return [piece for part in parts for piece in grown(told, part, middle, limit)]
+
+
+def _period(work: Work, middle: float) -> float | None:
+    """Return the period of small swings, s, roughly."""
+    if work.made_of is not None:
+        return 2 * math.pi / work.made_of.w0
+    found = periods_of(work, middle)
+    return found.small if found else _known_period(work)
 
 
 def _noise(work: Work) -> float:
