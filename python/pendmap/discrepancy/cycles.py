@@ -75,7 +75,7 @@ def cycles_of(evidence: Evidence, base: Found, best: Found) -> tuple[Cycles, ...
     """
     found = []
     for k, (run, reading) in enumerate(zip(evidence.runs, evidence.readings, strict=True)):
-        if run.kind != "free":
+        if run.kind != "free" or run.accelerometer is not None:  # that angle is only roughly made
             continue
         peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
         if len(peaks.turned) < FEWEST:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.figures import sheet as sheets
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     from pendmap.identification import IdentificationReport
 
-__all__ = ["NOISE", "NOISE_SAID", "Block", "Box", "named", "say"]
+__all__ = ["NOISE", "NOISE_SAID", "Block", "Box", "named", "say", "sentence"]
 
 HEADING: Final = 0.30
 """Inches of a heading."""
@@ -126,6 +127,11 @@ def named(
         )
         used += ROW * rows + 0.05
     return box.less(left=sheets.LEFT + 0.06, right=0.16, top=used + TITLE, bottom=BELOW)
+
+
+def sentence(text: str, width: int = 90) -> str:
+    """Return words as a sentence, on lines of at most ``width`` characters."""
+    return textwrap.fill(f"{text[:1].upper()}{text[1:]}.", width)
 
 
 def say(figure: Figure, box: Box, text: str) -> None:

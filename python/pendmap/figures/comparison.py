@@ -14,6 +14,7 @@ from pendmap.figures import sheet as sheets
 from pendmap.figures.decays import MOST, draw_residuals
 from pendmap.figures.errors import draw_panels
 from pendmap.identification.compare import MODEL
+from pendmap.identification.joint import as_angles
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.pictures.methods import MEASURED, look
@@ -145,7 +146,9 @@ def _row(figure: Figure, box: Box, one: RunComparison, letters: Iterator[str]) -
         axes.set_xlim(*ends)
         style.scale(axes, "x", ends, names.clock(_SI))
     if one.errors is None:
-        blocks.say(figure, cells[2], "Fewer than three peaks:\nno errors of periods and peaks.")
+        few = "Fewer than three peaks:\nno errors of periods and peaks."
+        why = one.table.left_out
+        blocks.say(figure, cells[2], blocks.sentence(why, 40) if why else few)
         return
     titles = (next(letters) + "error of each period", next(letters) + "error of each peak")
     periods, peaks = (cell.panel(figure) for cell in cells[2:])
@@ -155,10 +158,23 @@ def _row(figure: Figure, box: Box, one: RunComparison, letters: Iterator[str]) -
 def _over_record(axes: Axes, one: RunComparison) -> None:
     run = one.run
     every = max(1, run.time.size // MOST)
-    shown = np.where(run.trusted, run.theta, np.nan)
+    sensor = run.accelerometer
+    factor = 1.0 if sensor is None else sensor.gain
+    readings = run.theta if sensor is None else factor * as_angles(run)
+    shown = np.where(run.trusted, readings, np.nan)
     # The reading of the model: what the sensor makes of its angle stands in the residual alone.
-    angle = run.theta - one.residual if run.rod_sensor is None else one.curve[0]
+    angle = readings - factor * one.residual
+    if sensor is None and run.rod_sensor is not None:
+        angle = one.curve[0]  # a gyroscope reads no angle
     made = np.where(run.trusted, angle, np.nan)
     axes.plot(run.time[::every], shown[::every], ".", color=MEASURED, ms=1.5, rasterized=True)
     axes.plot(run.time[::every], made[::every], color=look(MODEL).colour, lw=0.7)
-    sides.angle_axis(axes, shown[np.isfinite(shown)])
+    known = shown[np.isfinite(shown)]
+    if sensor is None:
+        sides.angle_axis(axes, known)
+        return
+    pad = 0.05 * float(np.ptp(known))
+    ends = (float(known.min()) - pad, float(known.max()) + pad)
+    axes.set_ylim(*ends)
+    unit = sensor.unit.replace("s2", "s\u00b2")
+    style.scale(axes, "y", ends, f"acceleration ({unit})")

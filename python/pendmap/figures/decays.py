@@ -84,7 +84,7 @@ def _simulated(rig: Rig, peaks: Peaks, zero: float) -> Decay:
 
 def _able(report: IdentificationReport) -> list[str]:
     """Return the methods whose models are drawn; none where there is too little to compare."""
-    if len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
+    if report.table.left_out or len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return []
     return drawn(n for n, m in report.methods.items() if m.applicable and "w0" in m.estimates)
 
@@ -108,7 +108,7 @@ def handles_of(methods: list[str]) -> tuple[list[Artist], list[str]]:
 
 def _height(report: IdentificationReport) -> float:
     if not _able(report):
-        return 0.9
+        return 0.9 if report.joint is None or not report.table.left_out else 2.6
     return 6.3 + (0.0 if report.joint is None else 1.3)
 
 
@@ -118,7 +118,10 @@ def _draw(
     decays = _decays(report)
     if not decays:
         room = blocks.named(figure, box, title)
-        blocks.say(figure, room, NOTHING)
+        left_out = report.table.left_out
+        blocks.say(figure, room, blocks.sentence(left_out) if left_out else NOTHING)
+        if left_out and report.joint is not None:
+            _over_time(room.less(top=0.6).panel(figure), report, letters)
         return
     handles, texts = handles_of(list(decays))
     dot = Line2D([], [], color=MEASURED, ls="none", marker=".", ms=5)
@@ -151,10 +154,7 @@ def _draw(
         _near(near, course, decays, span, only=report.run.peaks_only)
         near.set_title(next(letters) + text)
     if report.joint is not None:
-        last = cells[3].panel(figure)
-        _residuals(last, report)
-        last.set_title(next(letters) + "the record less the trajectory fitted to it")
-        _from_to(last, (float(report.run.time[0]), float(report.run.time[-1])))
+        _over_time(cells[3].panel(figure), report, letters)
 
 
 def _from_to(axes: Axes, ends: tuple[float, float]) -> None:
@@ -218,6 +218,12 @@ def _near(
     sides.angle_axis(axes, np.clip(everything, -bound, bound))
     axes.set_xlim(*span)
     style.scale(axes, "x", span, names.clock(_SI))
+
+
+def _over_time(axes: Axes, report: IdentificationReport, letters: Iterator[str]) -> None:
+    _residuals(axes, report)
+    axes.set_title(next(letters) + "the record less the trajectory fitted to it")
+    _from_to(axes, (float(report.run.time[0]), float(report.run.time[-1])))
 
 
 def _residuals(axes: Axes, report: IdentificationReport) -> None:

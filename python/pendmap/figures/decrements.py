@@ -106,7 +106,12 @@ def _zero(report: IdentificationReport) -> Estimate | None:
 
 
 def _source(report: IdentificationReport) -> Identification | None:
-    """Return the first method that knows frequency, damping and zero, or else the first two."""
+    """Return the first method that knows frequency, damping and zero, or else the first two.
+
+    Peaks of an angle that is only roughly made judge none.
+    """
+    if report.table.left_out:
+        return None
     able = [found for found in report.methods.values() if found.applicable]
     for wanted in ({"w0", "c_over_m", "offset"}, {"w0", "c_over_m"}):
         for found in able:

@@ -35,6 +35,9 @@ def _height(report: IdentificationReport) -> float:
 def _draw(
     figure: Figure, box: Box, report: IdentificationReport, letters: Iterator[str], title: str
 ) -> None:
+    if report.table.left_out:
+        blocks.say(figure, blocks.named(figure, box, title), blocks.sentence(report.table.left_out))
+        return
     errors = {name: report.table.errors[name] for name in drawn(report.table.errors)}
     draw_errors(figure, box, errors, report.peaks, letters, title)
 

@@ -12,7 +12,7 @@ from pendmap.identification.from_start import OFFSET
 from pendmap.identification.joint import as_fit_run, reading_of_run
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.result import Estimate, Identification
-from pendmap.identification.table1 import PeakErrors, Table1, table_of
+from pendmap.identification.table1 import PeakErrors, Table1, table_of_run
 from pendmap.model import Rig
 from pendmap.notebook import Readable
 from pendmap.records.experiment import Experiment
@@ -75,7 +75,7 @@ class RunComparison:
 
     @property
     def errors(self) -> PeakErrors | None:
-        """Errors of periods and peaks; none where there are too few."""
+        """Errors of periods and peaks; none where there are too few, or none was measured."""
         return self.table.errors.get(MODEL)
 
 
@@ -153,7 +153,7 @@ def _compared(model: Rig, run: Run) -> RunComparison:
         fit.residuals[0],
         fit.rms,
         peaks,
-        table_of(peaks, {MODEL: _as_identification(model)}),
+        table_of_run(run, peaks, {MODEL: _as_identification(model)}),
     )
 
 

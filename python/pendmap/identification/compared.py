@@ -49,6 +49,7 @@ def _run(one: RunComparison) -> dict[str, Any]:
             }
             for row in one.table.rows
         ],
+        "table1_left_out": one.table.left_out or None,
         "periods": _pairs(errors and errors.period_time, errors and errors.period_error),
         "peaks": _pairs(errors and errors.peak, errors and errors.peak_error),
         "findings": [found.text for found in one.run.findings],
@@ -95,6 +96,8 @@ def as_text(comparison: Comparison) -> Iterator[str]:
             error = next(iter(row.errors.values()), math.nan)
             said = "the model rests by then" if math.isnan(error) else f"error {error:.3g} %"
             yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {said}"
+        if one.table.left_out:
+            yield f"{one.run.name}: {one.table.left_out}"
         if one.rms > FITS * one.sigma:
             yield (
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "

@@ -267,7 +267,8 @@ def _result(  # noqa: PLR0913, PLR0917 (all that the fit had, and what came of i
     estimates = {}
     for k, (q, value) in enumerate(zip(quantities, values, strict=True)):
         interval = ends.get(k)
-        low, high = (q.given(e, units) for e in interval) if interval else (math.nan, math.nan)
+        # The unit of a bias may be negative.
+        low, high = sorted(q.given(e, units) for e in interval or (math.nan, math.nan))
         estimates[q.name] = Estimate(
             q.given(value, units),
             math.sqrt(covariance[k, k]),

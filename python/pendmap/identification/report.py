@@ -15,7 +15,7 @@ from pendmap.identification.joint import JointFit, fit_together
 from pendmap.identification.methods import check_names, identify, identify_peaks
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.result import Identification
-from pendmap.identification.table1 import Table1, table_of
+from pendmap.identification.table1 import Table1, table_of, table_of_run
 from pendmap.identification.trajectory import METHOD as BEST
 from pendmap.identification.trajectory import identification_of
 from pendmap.model import Rig
@@ -209,7 +209,7 @@ def identify_experiment(
         peaks=peaks,
         progress=lambda done, _total: report(before + done, steps),
     )
-    table = table_of(peaks, found)
+    table = table_of_run(run, peaks, found)
     report(steps, steps)
     return IdentificationReport(experiment, run, peaks, found, joint, table)
 

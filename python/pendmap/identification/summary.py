@@ -49,6 +49,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
             for r in report.table.rows
         ],
+        "table1_left_out": report.table.left_out or None,
         "rms": None if report.joint is None else report.joint.fit.rms,
         "findings": [
             found.text
@@ -109,6 +110,8 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
                 yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
         if report.passed_over:
             yield report.passed_over
+    if report.table.left_out:
+        yield f"{report.run.name}: {report.table.left_out}"
     said = left_out(report.experiment, report.runs)
     if said:
         yield said

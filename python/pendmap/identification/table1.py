@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from pendmap.identification.result import Identification
     from pendmap.model import Rig
+    from pendmap.records import Run
 
     Floats = NDArray[np.float64]
 
@@ -31,6 +32,7 @@ __all__ = [
     "peak_errors",
     "table1",
     "table_of",
+    "table_of_run",
 ]
 
 PERIODS: Final = (0.26, 1.54)
@@ -38,6 +40,12 @@ PERIODS: Final = (0.26, 1.54)
 for it."""
 PEAKS: Final = (1.2, 2.53)
 """Peaks of the paper's table, rad."""
+
+ROUGH: Final = (
+    "no errors of periods and peaks: the angle is made of an acceleration, too roughly to judge a "
+    "model; the residual of the acceleration does"
+)
+"""Why a record of an acceleration alone has none."""
 
 _SAME: Final = 1e-9
 """Events closer than this are one, s."""
@@ -111,11 +119,12 @@ class Table1:
     """Table 1 of a record, and figure 7 behind it.
 
     Rows that fall on the same measured value are one, and none falls on the peak that simulations
-    start from.
+    start from. ``left_out`` says why there is none although there are peaks; else it is empty.
     """
 
     rows: tuple[Row, ...]
     errors: Mapping[str, PeakErrors]
+    left_out: str = ""
 
 
 def _rms(errors: Floats) -> float:
@@ -266,6 +275,13 @@ def table_of(
         if row is not None:
             told.setdefault((row.what, row.measured), row)
     return Table1(tuple(told.values()), errors)
+
+
+def table_of_run(run: Run, found: Peaks, identifications: Mapping[str, Identification]) -> Table1:
+    """Do the same for a run; empty where its angle is none that was measured."""
+    if run.accelerometer is not None:
+        return Table1((), {}, ROUGH)
+    return table_of(found, identifications)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:

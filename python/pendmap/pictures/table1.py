@@ -28,7 +28,8 @@ def columns(report: IdentificationReport) -> list[str]:
         f"period {row.measured:.3g} s" if row.what == "period" else f"peak {row.measured:.3g} rad"
         for row in report.table.rows
     ]
-    return ["method", *(said for _, said in QUANTITIES), *errors, "periods, rms", "peaks, rms"]
+    overall = [] if report.table.left_out else ["periods, rms", "peaks, rms"]
+    return ["method", *(said for _, said in QUANTITIES), *errors, *overall]
 
 
 def rows(report: IdentificationReport) -> list[list[str]]:
@@ -45,10 +46,11 @@ def rows(report: IdentificationReport) -> list[list[str]]:
             for key, _ in QUANTITIES
         ]
         cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
-        errors = report.table.errors.get(name)
-        cells += ["\N{EN DASH}"] * 2 if errors is None else [
-            _percent(errors.period_rms), _percent(errors.peak_rms),
-        ]  # fmt: skip
+        if not report.table.left_out:
+            errors = report.table.errors.get(name)
+            cells += ["\N{EN DASH}"] * 2 if errors is None else [
+                _percent(errors.period_rms), _percent(errors.peak_rms),
+            ]  # fmt: skip
         made.append(cells)
     return made
 

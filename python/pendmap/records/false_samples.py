@@ -20,6 +20,8 @@ from pendmap.records.robust import broad_scale, normal_scale
 from pendmap.words import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from pendmap.records.work import Work
@@ -74,11 +76,12 @@ class _Jump:
     error: float
 
 
-def find_spikes(work: Work, values: Floats, unit: str) -> None:
+def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[tuple[int, int]]) -> None:
     """Mark readings of another kind that are far from their neighbours, and say so.
 
     An accelerometer may jump, where friction turns round; what does not come back is not looked
-    into.
+    into. It does jump where a hand lets go or takes hold, at the ends of the ``free`` swings
+    (first place and the one after the last), and outside of them nothing is fitted.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -91,6 +94,11 @@ def find_spikes(work: Work, values: Floats, unit: str) -> None:
     # What is false shows in every window that it is part of, most in its own.
     highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
     at = fit.middle[(size > 2 * SPIKE * broad_scale(size)) & (size >= highest)]
+    inside = np.zeros(values.size, bool)
+    for low, high in free:
+        begin = low + POINTS if low else 0
+        inside[begin : high if high == values.size else high - POINTS] = True
+    at = at[inside[at]]
     if not at.size or at.size > MOST_SPIKES * values.size:
         return
     near = np.array([np.median(values[max(k - SIDE, 0) : k + SIDE + 1]) for k in at])

@@ -16,33 +16,24 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.records.half_waves import wave_of, waves_of
 from pendmap.records.noise import noise_of
-from pendmap.records.swings import swings
+from pendmap.records.swinging import QUIET, middle_over, swinging
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.accelerometer import Accelerometer
+    from pendmap.records.half_waves import Wave
+    from pendmap.records.swinging import Swinging
 
     Floats = NDArray[np.float64]
+    Places = tuple[int, int]
 
 __all__ = ["FromAcceleration", "angle_from"]
 
 FEWEST: Final = 4
 """Half swings that a period is taken from."""
-
-QUIET: Final = 5.0
-"""Standard errors below which a reading is no swing."""
-
-DIP: Final = 0.01
-"""Share of a hump by which a reading falls at least between two humps ..."""
-
-NOISY: Final = 4.0
-"""... and how many standard errors."""
-
-TALL: Final = 0.75
-"""Share of the largest reading of a swing that humps beside a dip reach at least: they are where
-the sine is 1."""
 
 FOLDED: Final = 0.3
 """Share by which it falls where nobody can take it for noise."""
@@ -85,28 +76,6 @@ class FromAcceleration:
     doubt: str
 
 
-@dataclasses.dataclass(frozen=True)
-class _Wave:
-    """The readings between two passages of the middle: where it dips, how high the humps are."""
-
-    low: int
-    high: int
-    humps: tuple[int, int]
-    top: float
-    dip: float
-    half_period: float = math.nan
-
-    def folded(self, gain: float) -> bool:
-        """Whether it went beyond a quarter turn."""
-        return self.dip > 0 and self.top > TALL * abs(gain)
-
-    def amplitude(self, gain: float) -> float:
-        """The angle at which it turned, rad."""
-        if self.folded(gain):
-            return math.pi - math.asin(1 - self.dip)
-        return math.asin(min(self.top / abs(gain), 1.0))
-
-
 def angle_from(
     time: Floats, reading: Floats, accelerometer: Accelerometer, where: str
 ) -> FromAcceleration:
@@ -129,10 +98,15 @@ def angle_from(
     """
     noise = noise_of(time, reading).sigma
     noise = noise if math.isfinite(noise) else 0.0
-    middle = _middle(time, reading, QUIET * noise)
-    _refuse_radial(reading, middle, accelerometer, where)
+    moves = swinging(time, reading, noise)
+    least = max(QUIET * noise, 1e-12)
+    middles = [middle_over(time[a:b], reading[a:b], least) for a, b in moves.free]
+    middle = float(np.average(middles, weights=[b - a for a, b in moves.free]))
+    free = np.concatenate([reading[a:b] for a, b in moves.free])
+    _refuse_radial(free, middle, accelerometer, where)
     values = reading - middle
-    waves = _waves(time, values, noise)
+    each = [waves_of(time, values, part, noise) for part in moves.free]
+    waves = [wave for part in each for wave in part]
     if len(waves) < FEWEST:
         raise InputError(
             f"{where}: the acceleration shows {len(waves)} half swings: allowed are {FEWEST} and"
@@ -143,26 +117,12 @@ def angle_from(
     signal = largest / noise if noise else math.inf
     weak = signal < 4 * QUIET
     doubt = _refuse_blind(found, waves, where, weak=weak)
-    _refuse_large(waves, found, where)
+    _refuse_large(each, found, where)
+    _refuse_held(values, moves, found, where)
     if weak:
         doubt = f"the largest reading is {signal:.2g} times the noise{doubt and f'; {doubt}'}"
-    return FromAcceleration(_unfolded(values, waves, found, noise), found, signal, doubt)
-
-
-def _middle(time: Floats, reading: Floats, least: float) -> float:
-    """The mean over whole swings, the later half of them: bias, and gravity on a leaning axis."""
-    middle = float(np.median(reading))
-    for _ in range(3):
-        crossing = swings(time, reading - middle, least=least).crossing
-        crossing = crossing[crossing.size // 2 :]
-        if crossing.size < 3:
-            return middle
-        last = crossing[(crossing.size - 1) // 2 * 2]
-        inside = (time >= crossing[0]) & (time < last)
-        if np.count_nonzero(inside) < 3:
-            return middle
-        middle = float(np.mean(reading[inside]))
-    return middle
+    theta = _unfolded(values, each, moves, found, noise)
+    return FromAcceleration(theta, found, signal, doubt)
 
 
 def _refuse_radial(reading: Floats, middle: float, sensor: Accelerometer, where: str) -> None:
@@ -181,37 +141,7 @@ def _refuse_radial(reading: Floats, middle: float, sensor: Accelerometer, where:
     )
 
 
-def _waves(time: Floats, values: Floats, noise: float) -> list[_Wave]:
-    """Return the half swings between passages of the middle."""
-    found = swings(time, values, least=max(QUIET * noise, 1e-12))
-    waves = []
-    for start, end in zip(found.crossing[:-1], found.crossing[1:], strict=True):
-        low, high = (int(k) for k in np.searchsorted(time, (start, end)))
-        if high - low >= 3:
-            waves.append(_wave(values, low, high, noise, end - start))
-    return waves
-
-
-def _wave(
-    values: Floats, low: int, high: int, noise: float, half_period: float = math.nan
-) -> _Wave:
-    size = np.abs(values[low:high])
-    # Noise on few samples makes no dip of three.
-    smooth = np.convolve(np.pad(size, 1, mode="edge"), np.ones(3) / 3, mode="valid")
-    top = int(np.argmax(smooth))
-    before, after = np.maximum.accumulate(smooth), np.maximum.accumulate(smooth[::-1])[::-1]
-    depth = np.minimum(before, after) - smooth
-    at = int(np.argmax(depth))
-    ends = (int(np.argmax(smooth[: at + 1])), at + int(np.argmax(smooth[at:])))
-    height = float(smooth[top])
-    dip = float(depth[at] + height - min(before[at], after[at])) / height if depth[at] > 0 else 0.0
-    if min(before[at], after[at]) < 0.7 * height or depth[at] < max(DIP * height, NOISY * noise):
-        dip, ends = 0.0, (top, top)  # one hump: what noise does on its slope is no dip
-    humps = (low + ends[0], low + ends[1])
-    return _Wave(low, high, humps, height, min(dip, 1.0), half_period)
-
-
-def _frequency(waves: list[_Wave], sensor: Accelerometer) -> float:
+def _frequency(waves: list[Wave], sensor: Accelerometer) -> float:
     """Return ``w0`` from the smaller half swings, their amplitude taken into account."""
     from scipy.special import ellipk
 
@@ -228,7 +158,7 @@ def _frequency(waves: list[_Wave], sensor: Accelerometer) -> float:
     return w0
 
 
-def _refuse_blind(sensor: Accelerometer, waves: list[_Wave], where: str, *, weak: bool) -> str:
+def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak: bool) -> str:
     """Refuse a place that sees nothing of the swing; return what speaks against one near it."""
     if not sensor.gravity:
         return ""
@@ -241,24 +171,26 @@ def _refuse_blind(sensor: Accelerometer, waves: list[_Wave], where: str, *, weak
         lengths = sensor.gravity / slow**2 / WIDE**2, sensor.gravity / slow**2
         if (1 - BLIND) * lengths[0] < sensor.distance_m < (1 + BLIND) * lengths[1]:
             length, away = min(lengths, key=lambda x: abs(x - sensor.distance_m)), 0.0
-    centre = (
-        f"distance_m is {sensor.distance_m:g} and the centre of oscillation g/w0^2 at {length:.4g}"
-        " m from the pivot, where gravity and the swing cancel"
-    )
     if away < BLIND:
+        # Where little of the swing is felt its frequency, and with it the place, is not known well.
         raise InputError(
-            f"{where}: {centre}: nothing but damping is felt there; allowed is another place on the"
-            " rod, or an angle beside it"
+            f"{where}: distance_m is {sensor.distance_m:g}, that of the centre of oscillation,"
+            " g/w0^2 from the pivot, where gravity and the swing cancel: nothing but damping is"
+            " felt there; allowed is another place on the rod, or an angle beside it"
         )
     if away > DIM:
         return ""
     per_mm = 0.1 / abs(length - sensor.distance_m)
-    return f"{centre} to {100 * away:.0f} %: an error of 1 mm makes angles {per_mm:.2g} % wrong"
+    return (
+        f"distance_m is {sensor.distance_m:g} and the centre of oscillation g/w0^2 about"
+        f" {length:.2g} m from the pivot, where gravity and the swing cancel to {100 * away:.0f} %:"
+        f" an error of 1 mm makes angles {per_mm:.2g} % wrong"
+    )
 
 
-def _refuse_large(waves: list[_Wave], sensor: Accelerometer, where: str) -> None:
+def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> None:
     """Refuse readings that no swing has there, and turns over the top."""
-    top = float(np.quantile([wave.top for wave in waves], 0.8))
+    top = float(np.quantile([wave.top for waves in each for wave in waves], 0.8))
     most = abs(sensor.gain)
     if top > MOST * most:
         removed = "" if sensor.gravity else ", gravity removed"
@@ -268,31 +200,62 @@ def _refuse_large(waves: list[_Wave], sensor: Accelerometer, where: str) -> None
             f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
             f" at most {most:.3g}{place}: unit, distance_m, direction or gravity_removed is wrong"
         )
-    folds = [k for k, wave in enumerate(waves) if wave.dip > FOLDED]
-    before = waves[: folds[-1]] if folds else []
-    if any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
+    for waves in each:
+        folds = [k for k, wave in enumerate(waves) if wave.dip > FOLDED]
+        before = waves[: folds[-1]] if folds else []
+        if not any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
+            continue
         raise InputError(
             f"{where}: the pendulum turns over the top, which an acceleration alone does not show:"
             " allowed is an angle or a velocity beside it, or a later from_s"
         )
 
 
-def _unfolded(values: Floats, waves: list[_Wave], sensor: Accelerometer, noise: float) -> Floats:
+def _refuse_held(values: Floats, moves: Swinging, sensor: Accelerometer, where: str) -> None:
+    """Refuse what no hold shows: there a tangential axis reads gravity alone, ``g sin(th)``."""
+    for low, high in moves.held:
+        level = abs(float(np.median(values[low:high])))
+        if sensor.gravity and level > MOST * sensor.gravity:
+            raise InputError(
+                f"{where}: the acceleration is {level:.3g} {sensor.unit} while the pendulum is"
+                f" held, and gravity gives at most {sensor.gravity:.3g}: unit is wrong"
+            )
+
+
+def _unfolded(
+    values: Floats,
+    each: list[list[Wave]],
+    moves: Swinging,
+    sensor: Accelerometer,
+    noise: float,
+) -> Floats:
     """Return the angle of each sample."""
     most = abs(sensor.gain)
-    theta = np.arcsin(np.clip(values / most, -1, 1))
+    theta = np.arcsin(np.clip(values / most, -1, 1)) * math.copysign(1.0, sensor.gain)
+    for (begin, _), waves in zip(moves.free, each, strict=True):
+        for wave in _from_start(values, begin, waves, most, noise):
+            if wave.folded(most):
+                low, high = wave.humps
+                inside = values[low : high + 1]
+                folded = np.arcsin(np.clip(np.abs(inside) / wave.top, 0, 1))
+                sign = np.sign(inside) * math.copysign(1.0, sensor.gain)
+                theta[low : high + 1] = sign * (math.pi - folded)
+    for low, high in moves.held:
+        # Held it does not fall: gravity alone is read, or nothing where it is removed.
+        pull = values[low:high] / sensor.gravity if sensor.gravity else np.zeros(high - low)
+        theta[low:high] = np.arcsin(np.clip(pull, -1, 1))
+    return np.asarray(theta)
+
+
+def _from_start(
+    values: Floats, begin: int, waves: list[Wave], most: float, noise: float
+) -> list[Wave]:
+    """Return the half swings, with what comes before the first passage of the middle."""
+    if not waves or waves[0].low <= begin + 2:
+        return waves
     first = waves[0]
-    parts = list(waves)
-    if first.low > 2:
-        # What comes before the first passage: released beyond a quarter turn it begins in a dip.
-        begin = _wave(values, 0, first.low, noise)
-        if not begin.folded(most) and first.folded(most):
-            begin = dataclasses.replace(begin, humps=(0, begin.humps[1]), dip=first.dip)
-        parts.insert(0, begin)
-    for wave in parts:
-        if wave.folded(most):
-            low, high = wave.humps
-            inside = values[low : high + 1]
-            folded = np.arcsin(np.clip(np.abs(inside) / wave.top, 0, 1))
-            theta[low : high + 1] = np.sign(inside) * (math.pi - folded)
-    return np.asarray(theta * math.copysign(1.0, sensor.gain))
+    # Released beyond a quarter turn it begins in a dip.
+    start = wave_of(values, begin, first.low, noise)
+    if not start.folded(most) and first.folded(most):
+        start = dataclasses.replace(start, humps=(begin, start.humps[1]), dip=first.dip)
+    return [start, *waves]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -11,10 +12,12 @@ from pendmap.errors import InputError
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
 from pendmap.records.local_fit import local_fit
-from pendmap.records.releases import enough, held_short, releases
+from pendmap.records.noise import noise_of
+from pendmap.records.releases import enough, grown, held_short, releases
 from pendmap.records.robust import normal_scale
 from pendmap.records.runs_of import true_runs
 from pendmap.records.scale import periods_of
+from pendmap.records.swinging import swinging
 from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of
 from pendmap.words import counted
@@ -22,6 +25,7 @@ from pendmap.words import counted
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pendmap.records.accelerometer import Accelerometer
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
@@ -77,34 +81,61 @@ def _limits(work: Work) -> tuple[float, float]:
 
 def check(work: Work) -> None:
     """Divide a free record into stretches and trust those that swing freely."""
-    noise, limit = _limits(work)
-    good = work.theta[work.trusted]
     if work.plan.kind != "free":
         return
-    middle = middle_of(work.time[work.trusted], good)
+    # An angle made of an acceleration folds: there the readings tell, over their gain.
+    told = work if work.made_of is None else _felt(work, work.made_of)
+    noise, limit = _limits(told)
+    good = told.theta[told.trusted]
+    middle = middle_of(told.time[told.trusted], good)
     middle = float(np.median(good)) if middle is None else middle
-    found = periods_of(work, middle)
-    period = found.small if found else _known_period(work)
+    ends = np.flatnonzero(work.trusted)
+    span = (int(ends[0]), int(ends[-1]) + 1)
+    period = _period(work, middle)
     if period is None:
         work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
         return
-    ends = np.flatnonzero(work.trusted)
-    span = (int(ends[0]), int(ends[-1]) + 1)
-    stretches = _still(work, period, limit, span)
-    parts = _moving(span, stretches)
-    parts = releases(work, parts, middle, limit, period, noise)
+    if work.made_of is not None:
+        parts = _let_swing(told, middle, limit, span)
+    else:
+        parts = _moving(span, _still(work, period, limit, span))
+        parts = releases(work, parts, middle, limit, period, noise)
     if not parts:
         return
-    held = held_short(work, parts[0], period, noise)
+    held = None if work.made_of else held_short(work, parts[0], period, noise)
     if held is not None:
         parts[0] = (held, parts[0][1])
     parts = trigger.begun(work, parts, period)
-    used = [enough(work, part, middle, limit) for part in parts]
+    used = [enough(told, part, middle, limit) for part in parts]
     if sum(used) == 0:
         longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
         used[longest] = True
     work.releases = [part for part, use in zip(parts, used, strict=True) if use]
     _settle(work, parts, used, middle, span)
+
+
+def _felt(work: Work, sensor: Accelerometer) -> Work:
+    """Return a record with its accelerometer's readings over the gain in place of the angle."""
+    readings = work.extra["acceleration"].copy()
+    bad = ~work.trusted
+    readings[bad] = np.interp(work.time[bad], work.time[~bad], readings[~bad])
+    return dataclasses.replace(work, theta=readings / sensor.gain)
+
+
+def _let_swing(told: Work, middle: float, limit: float, span: Places) -> list[Places]:
+    """Return where an accelerometer feels free swings."""
+    time, readings = told.time[slice(*span)], told.theta[slice(*span)]
+    free = swinging(time, readings, noise_of(time, readings).sigma).free
+    parts = [(span[0] + low, span[0] + high) for low, high in free]
+    return [piece for part in parts for piece in grown(told, part, middle, limit)]
+
+
+def _period(work: Work, middle: float) -> float | None:
+    """Return the period of small swings, s, roughly."""
+    if work.made_of is not None:
+        return 2 * math.pi / work.made_of.w0
+    found = periods_of(work, middle)
+    return found.small if found else _known_period(work)
 
 
 def _noise(work: Work) -> float:

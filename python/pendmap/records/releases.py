@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     Places = tuple[int, int]
 
-__all__ = ["enough", "held_short", "releases"]
+__all__ = ["enough", "grown", "held_short", "releases"]
 
 RISE: Final = 0.1
 """Share of the largest swing by which a free swing grows only if somebody helps."""
@@ -66,7 +66,7 @@ def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motio
         (_let_go(work, part, hand, period, noise), part[1])
         for part in without_hand(work.time, parts, hand, period)
     ]
-    return [piece for part in free for piece in _grown(work, part, middle, limit)]
+    return [piece for part in free for piece in grown(work, part, middle, limit)]
 
 
 def _let_go(work: Work, part: Places, hand: NDArray[np.bool_], period: float, noise: float) -> int:
@@ -99,7 +99,7 @@ def enough(work: Work, part: Places, middle: float, limit: float) -> bool:
     return swings(work.time[good][start:], theta[start:], least=limit).peak.size >= FEWEST
 
 
-def _grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]:
+def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]:
     """Divide a motion where the swing grows: somebody took the pendulum and let it go again."""
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low

@@ -10,8 +10,10 @@ import numpy as np
 
 from pendmap.records import false_samples
 from pendmap.records.gyroscope import angle_of_rate
+from pendmap.records.noise import noise_of
 from pendmap.records.runs_of import equal_runs
 from pendmap.records.steps import step_of
+from pendmap.records.swinging import swinging
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -40,7 +42,9 @@ def check(work: Work) -> None:
     """Mark what is not for fitting, mend missed counts that are certain, and say so."""
     if work.made_of is not None:
         # What may be false is the acceleration: the angle made of it has corners of its own.
-        false_samples.find_spikes(work, work.extra["acceleration"], work.made_of.unit)
+        readings = work.extra["acceleration"]
+        moves = swinging(work.time, readings, noise_of(work.time, readings).sigma)
+        false_samples.find_spikes(work, readings, work.made_of.unit, moves.free)
         return
     if work.integrated:
         rate = work.extra["velocity"]

@@ -1,0 +1,206 @@
+"""Where a pendulum swings and where it is held, as an accelerometer on it feels it.
+
+An angle that is made of its readings folds at a quarter turn, so that what a hand does is told from
+the readings themselves: held they stay the same, swinging freely they come back in nearly equal
+times, and never larger.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.records.runs_of import true_runs
+from pendmap.records.swings import swings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Places = tuple[int, int]
+
+__all__ = ["QUIET", "Swinging", "middle_over", "swinging"]
+
+QUIET: Final = 5.0
+"""Standard errors below which a reading is no swing."""
+
+STILL: Final = 8.0
+"""Standard deviations of noise within which a whole period must stay to be no motion ..."""
+
+SCATTER: Final = 1.5
+"""... or times the noise that half a period may scatter: a sine of 3.6 standard deviations does,
+which a whole period calls still anyway."""
+
+FEWEST_QUIET: Final = 10
+"""Samples of half a period that show whether it is quiet."""
+
+FEWEST: Final = 3
+"""Half swings that are more than a hand on its way."""
+
+UNEVEN: Final = 0.15
+"""Share by which a half swing may miss the one of the same side before it in time ..."""
+
+LARGER: Final = 1.1
+"""... and times which it may be larger ..."""
+
+SMALLER: Final = 0.6
+"""... or at least is: nothing but a hand stops a swing sooner."""
+
+STEP: Final = 2.5
+"""Times the fastest change of a free swing: where the hand lets go the reading jumps by what the
+rod's own acceleration adds to it."""
+
+SMALL: Final = 0.05
+"""Share of the largest swing below which a motion has decayed: what follows it is the rest."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Swinging:
+    """Stretches of a record, as first place and the one after the last.
+
+    Parameters
+    ----------
+    free : list of (int, int)
+        Free swings, in order.
+    held : list of (int, int)
+        Quiet stretches from which the pendulum is let go.
+    """
+
+    free: list[Places]
+    held: list[Places]
+
+
+def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
+    """Return where a pendulum swings freely and where it is held.
+
+    Parameters
+    ----------
+    time, reading : ndarray, shape (N,)
+        s, increasing; of an accelerometer, or an angular acceleration.
+    noise : float
+        Standard error of a reading.
+    """
+    from scipy.ndimage import median_filter
+
+    least = max(QUIET * noise, 1e-12)
+    # A lone false reading is neither a step nor the end of a hold.
+    reading = np.asarray(median_filter(reading, 3, mode="nearest"))
+    crossing = swings(time, reading - middle_over(time, reading, least), least=least).crossing
+    whole = [(0, time.size)]
+    if crossing.size < FEWEST:
+        return Swinging(whole, [])
+    period = float(np.median(crossing[2:] - crossing[:-2]))
+    quiet = _quiet(time, reading, period, noise)
+    edges = [0, *(place for stretch in quiet for place in stretch), time.size]
+    largest, free, held = 0.0, [], []
+    for edge, high in zip(edges[::2], edges[1::2], strict=True):
+        low = edge
+        if high - low <= 5:
+            continue
+        part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
+        if swings(time[low:high], part, least=least).peak.size < FEWEST:
+            continue
+        largest = max(largest, float(np.max(np.abs(part))))
+        low += _let_go(time[low:high], part, period, noise)
+        part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
+        end = low + _untouched(time[low:high], part, least, SMALL * largest, more=high < time.size)
+        held += [stretch for stretch in quiet if stretch[1] == edge]
+        free.append((low, end))
+    return Swinging(free or whole, held)
+
+
+def middle_over(time: Floats, reading: Floats, least: float) -> float:
+    """Return the mean over whole swings, the later half of them.
+
+    This is the sensor's bias, and gravity on a leaning axis.
+    """
+    middle = float(np.median(reading))
+    for _ in range(3):
+        crossing = swings(time, reading - middle, least=least).crossing
+        crossing = crossing[crossing.size // 2 :]
+        if crossing.size < 3:
+            return middle
+        last = crossing[(crossing.size - 1) // 2 * 2]
+        inside = (time >= crossing[0]) & (time < last)
+        if np.count_nonzero(inside) < 3:
+            return middle
+        middle = float(np.mean(reading[inside]))
+    return middle
+
+
+def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[Places]:
+    """Return stretches in which nothing changes, in order."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
+
+    interval = float(np.median(np.diff(time)))
+    width = max(round(period / interval), 5) | 1
+    if width >= reading.size:
+        return []
+    spread = maximum_filter1d(reading, width) - minimum_filter1d(reading, width)
+    limit = min(STILL * noise, 0.4 * float(np.ptp(reading)))
+    still = _all_of(spread <= limit, width)
+    short = (width // 2) | 1
+    if short >= FEWEST_QUIET:
+        away = reading - float(np.median(reading))
+        variance = uniform_filter1d(away**2, short) - uniform_filter1d(away, short) ** 2
+        still |= _all_of(variance <= (SCATTER * noise) ** 2, short)
+    low, high = true_runs(still)
+    return list(zip(low.tolist(), high.tolist(), strict=True))
+
+
+def _all_of(middles: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+    """Return which samples are in windows of ``width`` about places within the record."""
+    from scipy.ndimage import binary_dilation
+
+    half = width // 2
+    middles = middles.copy()
+    middles[:half] = middles[-half:] = False
+    return np.asarray(binary_dilation(middles, iterations=half), bool)
+
+
+def _let_go(time: Floats, values: Floats, period: float, noise: float) -> int:
+    """Return where a hold ends that is too short to be seen quiet; 0 if there is none."""
+    begin, after = (int(np.searchsorted(time, time[0] + k * period)) for k in (1, 3))
+    steps = np.abs(np.diff(values[:after]))
+    if begin >= steps.size:
+        return 0
+    at = int(np.argmax(steps[:begin]))
+    fastest = float(np.max(np.delete(steps, slice(max(at - 1, 0), at + 2)), initial=0.0))
+    sure = steps[at] > max(STEP * fastest, STILL * noise) > 0
+    return at + 1 if sure else 0
+
+
+def _untouched(time: Floats, values: Floats, least: float, small: float, *, more: bool) -> int:
+    """Return where a free swing ends, the place after the last: a hand may take it before.
+
+    ``more`` says that something quiet follows.
+    """
+    found = swings(time, values, least=least)
+    halves, tops = np.diff(found.crossing), np.abs(found.peak)
+    last = tops.size - 1
+    while last >= 2 and not _alike(halves, tops, last, least):
+        last -= 1
+    if last < 2 or tops[last] < max(small, 3 * least):
+        return time.size  # it decays to its rest
+    tail = values[int(np.searchsorted(time, found.crossing[-1])) :]
+    usual = tops[last - 1] * LARGER + least
+    longest = (1 + UNEVEN) * halves[last - 1]
+    grown = np.max(np.abs(tail), initial=0.0) > usual
+    if (
+        not more
+        and last == tops.size - 1
+        and not grown
+        and (time[-1] - found.crossing[-1] < longest)
+    ):
+        return time.size
+    return int(np.searchsorted(time, found.crossing[last + 1]))
+
+
+def _alike(halves: Floats, tops: Floats, k: int, least: float) -> bool:
+    """Whether a half swing is what the one of the same side before it becomes by itself."""
+    even = abs(halves[k] / halves[k - 2] - 1) < UNEVEN
+    slack = least if math.isfinite(least) else 0.0
+    return bool(even and SMALLER * tops[k - 2] - slack < tops[k] < LARGER * tops[k - 2] + slack)
