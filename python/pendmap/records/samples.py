@@ -50,7 +50,7 @@ def check(work: Work) -> None:
         rate = work.extra["velocity"]
         read = dataclasses.replace(work, theta=rate, count=step_of(rate))
         _clipped(read, "rad/s")
-        false_samples.find_spikes(work, rate, "rad/s")
+        false_samples.find_spikes(work, rate, "rad/s", [(0, rate.size)])
         work.theta = angle_of_rate(work.time, rate, work.trusted)
         return
     work.seen = step_of(work.theta)
