@@ -10,6 +10,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
+from pendmap.records.gyroscope import gyroscope_of
 from pendmap.records.local_fit import local_fit
 from pendmap.records.releases import enough, held_short, releases
 from pendmap.records.robust import normal_scale
@@ -108,6 +109,13 @@ def check(work: Work) -> None:
 
 
 def _noise(work: Work) -> float:
+    """Return the noise of an angle; of an integrated one how far it walks in a period."""
+    if work.integrated:
+        rate = work.extra["velocity"]
+        seen = gyroscope_of(work.time, work.theta, rate)
+        interval = float(np.median(np.diff(work.time)))
+        walk = math.sqrt(interval * 2 * math.pi / seen.w0)
+        return normal_scale(local_fit(work.time, rate).residual) * walk
     fit = local_fit(work.time, work.theta)
     return normal_scale(fit.residual)
 
