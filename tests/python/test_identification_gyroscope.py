@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import pendmap
 from decays import decay, record
@@ -16,6 +17,7 @@ from pendmap import InputError, figures
 from pendmap.discrepancy.evidence import evidence_of
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.compare import compare
+from pendmap.identification.joint import fit_together
 from pendmap.records import Experiment, Run
 from pendmap.records.summary import as_json, as_text
 
@@ -150,6 +152,49 @@ def test_a_range_that_ends_and_false_readings(tmp_path: Path) -> None:
     agrees(fitted(run), TRUTH | {"bias": 0.01})
 
 
+def test_rest_is_not_taken_for_releases(tmp_path: Path) -> None:
+    """At rest the integrated angle walks; that is no motion."""
+    time = np.arange(4001) / 100
+    made = decay(c_over_m=0.05, tr=0.5, release=1.0)
+    last = float(made.spline.x[-1])
+    rate = np.where(time < last, made.spline(np.minimum(time, last), 1), 0.0)
+    rate += 0.01 + 5e-3 * np.random.default_rng(3).standard_normal(time.size)
+    run = read(tmp_path, time, rate)
+    said = {found.what for found in run.findings}
+    assert "rest-tail" in said
+    assert "several-releases" not in said
+    assert run.segments[-1].from_s == pytest.approx(last, abs=2.0)
+    agrees(fitted(run), {"w0": 6.2, "c_over_m": 0.05, "Tr": 0.5, "bias": 0.01})
+
+
+def forced(time: Floats) -> Floats:
+    """Return the velocity of a pendulum without dry friction on a pivot that goes up and down."""
+
+    def slope(t: float, y: Floats) -> list[float]:
+        lift = 1 + 0.3 * math.cos(11.0 * t + 0.5)
+        return [y[1], -0.3 * y[1] - TRUTH["w0"] ** 2 * lift * math.sin(y[0])]
+
+    found = solve_ivp(slope, (0, time[-1]), [1.0, 0.0], "DOP853", time, rtol=1e-11, atol=1e-12)
+    return np.asarray(found.y[1])
+
+
+def test_a_forced_run(tmp_path: Path) -> None:
+    """What the pivot does is no part of a rate."""
+    time = np.arange(2000) / 100
+    noise = 5e-3 * np.random.default_rng(0).standard_normal(time.size)
+    written(tmp_path / "run.csv", time, forced(time) + 0.01 + noise)
+    drive = "drive = { p = 0.3, Omega = 11.0, phi = 0.5 }"
+    text = f'[[run]]\nfile = "run.csv"\nkind = "forced"\n{drive}\n'
+    (tmp_path / "experiment.toml").write_text(text, encoding="utf-8")
+    runs = pendmap.read_experiment(tmp_path).runs
+    fit = fit_together(runs, start=pendmap.Rig(w0=6.2, c_over_m=0.2, Tr=0.01)).fit
+    assert fit.widening == 1
+    for name, true in {"w0": 6.2, "c_over_m": 0.3, "Tr": 0.0, "bias": 0.01}.items():
+        stderr = fit.estimates[name].stderr
+        assert stderr is not None
+        assert abs(fit[name] - true) < 3.5 * stderr, name
+
+
 def test_coarse_steps_of_the_rate(tmp_path: Path) -> None:
     """Steps of ten times the noise err evenly, by step / sqrt(12)."""
     time, rate = rates(noise=2e-3)
@@ -171,7 +216,7 @@ def test_look_says_noise_and_bias(tmp_path: Path) -> None:
     text = as_text(experiment)
     assert "rad/s (0.2" in text
     assert "+0.0" in next(line for line in text.splitlines() if "  bias " in line)
-    figures.draw_record(experiment.runs[0], tmp_path / "record.png")
+    figures.draw_record(experiment, tmp_path / "record.png")
 
 
 def test_an_angle_beside_it_is_what_counts(tmp_path: Path) -> None:

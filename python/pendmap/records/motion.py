@@ -11,6 +11,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
+from pendmap.records.gyroscope import gyroscope_of
 from pendmap.records.local_fit import local_fit
 from pendmap.records.noise import noise_of
 from pendmap.records.releases import enough, grown, held_short, releases
@@ -139,6 +140,13 @@ def _period(work: Work, middle: float) -> float | None:
 
 
 def _noise(work: Work) -> float:
+    """Return the noise of an angle; of an integrated one how far it walks in a period."""
+    if work.integrated:
+        rate = work.extra["velocity"]
+        seen = gyroscope_of(work.time, work.theta, rate)
+        interval = float(np.median(np.diff(work.time)))
+        walk = math.sqrt(interval * 2 * math.pi / seen.w0)
+        return normal_scale(local_fit(work.time, rate).residual) * walk
     fit = local_fit(work.time, work.theta)
     return normal_scale(fit.residual)
 

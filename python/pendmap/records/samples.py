@@ -94,17 +94,16 @@ def _clipped(work: Work, unit: str) -> None:
     ends = []
     for end in (float(work.theta.max()), float(work.theta.min())):
         low, high = equal_runs(work.theta, SAME)
-        at_end = np.abs(work.theta[low] - end) <= 1e-9 * max(abs(end), 1.0)
+        ended = np.abs(work.theta - end) <= 1e-9 * max(abs(end), 1.0)
         hits = [
             (a, b)
-            for a, b in zip(low[at_end], high[at_end], strict=True)
+            for a, b in zip(low[ended[low]], high[ended[low]], strict=True)
             if a > 0 and b < work.theta.size and b - a > SAME - 0.5
             if _abrupt(work, a, b) and _cut_off(work, a, b)
         ]
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * SAME):
             ends.append(f"{end:.4g}")
-            for a, b in hits:
-                marked[a:b] = True
+            marked |= ended  # the shorter ones, too
     if marked.any():
         at = np.flatnonzero(marked)
         work.trusted[at] = False
