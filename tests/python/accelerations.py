@@ -2,23 +2,76 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from decays import decay
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     import numpy.typing as npt
 
     Floats = npt.NDArray[np.float64]
 
-__all__ = ["GRAVITY", "TRUTH", "experiment", "readings"]
+__all__ = ["GRAVITY", "SENSORS", "TRUTH", "column", "experiment", "handled", "readings"]
 
 GRAVITY = 9.81
 TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
+
+TANGENTIAL = 'direction = "tangential", distance_m = {:g}'
+SENSORS: dict[str, tuple[dict[str, Any], str]] = {
+    "near": ({"distance": 0.1}, TANGENTIAL.format(0.1)),
+    "far": ({"distance": 0.5}, TANGENTIAL.format(0.5)),
+    "removed": (
+        {"distance": 0.1, "gravity": 0.0},
+        TANGENTIAL.format(0.1) + ", gravity_removed = true",
+    ),
+    "angular": ({"direction": "angular", "noise": 0.2}, 'direction = "angular"'),
+}
+"""What :func:`readings` takes of a sensor, and what [columns] says of it."""
+
+
+def column(sensor: str) -> str:
+    """Return what [columns] says of the acceleration."""
+    unit = "rad/s2" if sensor == "angular" else "m/s2"
+    return f'{{ name = "acc", unit = "{unit}", {SENSORS[sensor][1]} }}'
+
+
+def handled(  # noqa: PLR0913 (the hand's way)
+    sensor: str,
+    releases: Sequence[tuple[float, float]],
+    *,
+    carry: float = 1.5,
+    hold: float = 1.5,
+    tremble: float = 0.0,
+    rate: int = 100,
+) -> tuple[Floats, Floats, list[tuple[float, float]]]:
+    """Return times and readings of several releases, and from when to when each swings freely.
+
+    The pendulum is carried to each angle (rad) along a quintic, held there, and swings for the
+    seconds given; a hand stops it at once. ``tremble`` (rad) is the hand's, at 7 Hz.
+    """
+    given = {"gravity": GRAVITY, "noise": 0.02, "distance": 1.0, **SENSORS[sensor][0]}
+    noise, gravity = given.pop("noise"), given["gravity"]
+    angular = sensor == "angular"
+    parts, free, count, last = [], [], 0, 0.0
+    for angle, seconds in releases:
+        s = np.arange(round(carry * rate)) / round(carry * rate)
+        way = last + (angle - last) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        hand = np.append(way, np.full(round(hold * rate), angle))
+        hand += tremble * np.sin(2 * np.pi * 7 * np.arange(hand.size) / rate)
+        bend = np.gradient(np.gradient(hand, 1 / rate), 1 / rate)
+        felt = bend if angular else given["distance"] * bend + gravity * np.sin(hand)
+        _, theta, swing = readings(**given, noise=0.0, release=angle, seconds=seconds, rate=rate)
+        parts += [felt, swing[:-1]]
+        count += hand.size
+        free.append((count / rate, (count + swing.size - 1) / rate))
+        count, last = count + swing.size - 1, float(theta[-1])
+    drawn = np.random.default_rng(0).standard_normal(count)
+    return np.arange(count) / rate, np.concatenate(parts) + noise * drawn, free
 
 
 def readings(  # noqa: PLR0913 (the pendulum and the sensor)

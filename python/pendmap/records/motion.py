@@ -18,7 +18,7 @@ from pendmap.records.releases import enough, grown, held_short, releases
 from pendmap.records.robust import normal_scale
 from pendmap.records.runs_of import true_runs
 from pendmap.records.scale import periods_of
-from pendmap.records.swinging import swinging
+from pendmap.records.swinging import let_go, swinging
 from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of
 from pendmap.words import counted
@@ -126,9 +126,16 @@ def _felt(work: Work, sensor: Accelerometer) -> Work:
 def _let_swing(told: Work, middle: float, limit: float, span: Places) -> list[Places]:
     """Return where an accelerometer feels free swings."""
     time, readings = told.time[slice(*span)], told.theta[slice(*span)]
-    free = swinging(time, readings, noise_of(time, readings).sigma).free
-    parts = [(span[0] + low, span[0] + high) for low, high in free]
-    return [piece for part in parts for piece in grown(told, part, middle, limit)]
+    noise = noise_of(time, readings).sigma
+    pieces = [
+        piece
+        for low, high in swinging(time, readings, noise).free
+        for piece in grown(told, (span[0] + low, span[0] + high), middle, limit)
+    ]
+    return [
+        (low + let_go(told.time[low:high], told.theta[low:high] - middle, noise), high)
+        for low, high in pieces
+    ]
 
 
 def _period(work: Work, middle: float) -> float | None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Places = tuple[int, int]
 
-__all__ = ["QUIET", "Swinging", "middle_over", "swinging"]
+__all__ = ["QUIET", "Swinging", "let_go", "middle_over", "swinging"]
 
 QUIET: Final = 5.0
 """Standard errors below which a reading is no swing."""
@@ -33,6 +33,10 @@ STILL: Final = 8.0
 SCATTER: Final = 1.5
 """... or times the noise that half a period may scatter: a sine of 3.6 standard deviations does,
 which a whole period calls still anyway."""
+
+STEADY: Final = 0.1
+"""Share of its distance from the middle by which a whole period of readings scatters only where
+a hand holds, were it to tremble: a swing is on both sides."""
 
 FEWEST_QUIET: Final = 10
 """Samples of half a period that show whether it is quiet."""
@@ -104,7 +108,7 @@ def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
         if swings(time[low:high], part, least=least).peak.size < FEWEST:
             continue
         largest = max(largest, float(np.max(np.abs(part))))
-        low += _let_go(time[low:high], part, period, noise)
+        low += let_go(time[low:high], part, noise)
         part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
         end = low + _untouched(time[low:high], part, least, SMALL * largest, more=high < time.size)
         held += [stretch for stretch in quiet if stretch[1] == edge]
@@ -143,11 +147,25 @@ def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[P
     limit = min(STILL * noise, 0.4 * float(np.ptp(reading)))
     still = _all_of(spread <= limit, width)
     short = (width // 2) | 1
-    if short >= FEWEST_QUIET:
-        away = reading - float(np.median(reading))
-        variance = uniform_filter1d(away**2, short) - uniform_filter1d(away, short) ** 2
-        still |= _all_of(variance <= (SCATTER * noise) ** 2, short)
-    low, high = true_runs(still)
+    if short < FEWEST_QUIET:
+        return _runs(still)
+    middle = middle_over(time, reading, QUIET * noise)
+    values = reading - middle
+    away, square = (uniform_filter1d(x, short) for x in (values, values**2))
+    still |= _all_of(square - away**2 <= (SCATTER * noise) ** 2, short)
+    away, square = (uniform_filter1d(x, width) for x in (values, values**2))
+    limits = np.where(np.abs(away) > QUIET * noise, (STEADY * away) ** 2, -1.0)
+    found = []
+    for low, high in _runs(still | _all_of(square - away**2 <= limits, width)):
+        # Where nothing trembles the release is seen to a sample.
+        sure = low + np.flatnonzero(still[low:high]) + 1
+        exact = sure.size and sure[-1] > high - width // 2
+        found.append((low, int(sure[-1]) if exact else high))
+    return found
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[Places]:
+    low, high = true_runs(mask)
     return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
@@ -161,16 +179,25 @@ def _all_of(middles: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
     return np.asarray(binary_dilation(middles, iterations=half), bool)
 
 
-def _let_go(time: Floats, values: Floats, period: float, noise: float) -> int:
-    """Return where a hold ends that is too short to be seen quiet; 0 if there is none."""
-    begin, after = (int(np.searchsorted(time, time[0] + k * period)) for k in (1, 3))
-    steps = np.abs(np.diff(values[:after]))
-    if begin >= steps.size:
+def let_go(time: Floats, values: Floats, noise: float) -> int:
+    """Return where a hold ends that is too short to be seen quiet; 0 if there is none.
+
+    Parameters
+    ----------
+    time, values : ndarray, shape (N,)
+        s; a motion, its middle taken off.
+    noise : float
+        Standard error of a reading.
+    """
+    crossing = swings(time, values, least=max(QUIET * noise, 1e-12)).crossing
+    if crossing.size < FEWEST + 3:
         return 0
+    # Carried from the rest the readings may pass the middle twice before it is let go.
+    begin, after = (int(np.searchsorted(time, crossing[k])) for k in (2, 5))
+    steps = np.abs(np.diff(values[:after]))
     at = int(np.argmax(steps[:begin]))
     fastest = float(np.max(np.delete(steps, slice(max(at - 1, 0), at + 2)), initial=0.0))
-    sure = steps[at] > max(STEP * fastest, STILL * noise) > 0
-    return at + 1 if sure else 0
+    return at + 1 if steps[at] > max(STEP * fastest, STILL * noise) else 0
 
 
 def _untouched(time: Floats, values: Floats, least: float, small: float, *, more: bool) -> int:
@@ -181,7 +208,8 @@ def _untouched(time: Floats, values: Floats, least: float, small: float, *, more
     found = swings(time, values, least=least)
     halves, tops = np.diff(found.crossing), np.abs(found.peak)
     last = tops.size - 1
-    while last >= 2 and not _alike(halves, tops, last, least):
+    # Two together: a hand may make one that is like those before it.
+    while last > 2 and not all(_alike(halves, tops, k, least) for k in (last, last - 1)):
         last -= 1
     if last < 2 or tops[last] < max(small, 3 * least):
         return time.size  # it decays to its rest
