@@ -124,3 +124,23 @@ def test_where_the_model_lacks_more_than_the_noise_readings_count_alike(fine: np
     assert used.law is None
     assert np.ptp(used.each) == 0
     assert fit.rms < 0.9 * by_law.rms
+
+
+def test_stamps_that_are_off_bias_nothing(fine: np.ndarray) -> None:
+    """The instants are regular and their stamps miss them: a weight must not know by how much."""
+    tau, sigma, decays = 2e-3, 1e-3, 12
+    exact = fine[200::20][: TIME.size]
+    away = []
+    for seed in range(decays):
+        rng = np.random.default_rng(seed)
+        stamps = TIME + tau * rng.standard_normal(TIME.size)
+        order = np.argsort(stamps)
+        theta = exact + sigma * rng.standard_normal(TIME.size)
+        fit = identify(stamps[order], theta[order])
+        assert fit.misfit == pytest.approx(1.0, abs=0.15)
+        away.append(
+            [(fit.estimates[n].value - TRUTH[t]) / fit.estimates[n].stderr for n, t in NAMES.items()]
+        )
+    mean = np.mean(away, axis=0)
+    assert np.all(np.abs(mean) < 3 / np.sqrt(decays)), mean
+    assert np.sqrt(np.mean(np.square(away))) < 1.35

@@ -106,3 +106,25 @@ def test_noise_of_a_rotation(tmp_path: Path) -> None:
     readings = theta + np.random.default_rng(4).normal(0, 0.003, theta.size)
     floor = pendmap.noise_floor(read(tmp_path, text((time, readings))))
     assert floor.sigma == pytest.approx(0.003, rel=0.12)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 5e-4, 1e-3, 2e-3])
+def test_stamps_that_scatter_are_no_gaps(tmp_path: Path, scatter: float) -> None:
+    rng = np.random.default_rng(3)
+    time, theta = clean()
+    stamps = time + scatter * rng.standard_normal(time.size)
+    run = read(tmp_path, text((stamps, theta)))
+    assert "time-gap" not in found(run)
+    assert run.rate_hz == pytest.approx(100, rel=1e-5 + 2 * scatter / 20)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 1e-3, 2e-3])
+def test_samples_that_are_missing_are_counted(tmp_path: Path, scatter: float) -> None:
+    rng = np.random.default_rng(4)
+    time, theta = clean()
+    stamps = time + scatter * rng.standard_normal(time.size)
+    lost = np.r_[300:302, 700:706, 1200:1350]
+    run = read(tmp_path, text((np.delete(stamps, lost), np.delete(theta, lost))))
+    said = found(run)["time-gap"].text
+    assert said.startswith(f"3 gaps, about {lost.size} samples missing")
+    assert run.rate_hz == pytest.approx(100, rel=1e-3)

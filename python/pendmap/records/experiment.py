@@ -148,10 +148,10 @@ class Run:
 
     @property
     def rate_hz(self) -> float:
-        """Samples a second, from the median interval."""
-        import numpy as np
+        """Samples a second, from the whole record without its gaps."""
+        from pendmap.records.intervals import intervals_of
 
-        return float(1 / np.median(np.diff(self.time))) if self.time.size > 1 else 0.0
+        return 1 / intervals_of(self.time).tick if self.time.size > 1 else 0.0
 
 
 @dataclasses.dataclass(frozen=True)

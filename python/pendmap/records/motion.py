@@ -95,7 +95,7 @@ def check(work: Work) -> None:
     parts = releases(work, parts, middle, limit, period, noise)
     if not parts:
         return
-    held = held_short(work, parts[0], period, noise)
+    held = held_short(work, parts[0], middle, period, noise)
     if held is not None:
         parts[0] = (held, parts[0][1])
     parts = trigger.begun(work, parts, period)
@@ -171,7 +171,8 @@ def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, sp
         _say_releases(work, parts, used)
     first, last = segments[0], segments[-1]
     if first.what == "held":
-        text = f"held until {first.to_s:.6g} s, not for fitting"
+        begin = segments[1].from_s
+        text = f"held at first: used from {begin:.6g} s, where the angle has clearly left the hold"
         work.say("held-start", text, span=(first.from_s, first.to_s))
     if last.what == "rest" and len(segments) > 1:
         text = f"at rest from {last.from_s:.6g} s, not for fitting"
@@ -188,7 +189,8 @@ def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
     taken = [part for part, use in zip(parts, used, strict=True) if use]
     short = [part for part, use in zip(parts, used, strict=True) if not use]
     each = "each taken as a run" if len(taken) > 1 else "one is used"
-    text = f"{counted(len(parts), 'release')}: {listed(taken)}, {each}"
+    # The end of a hold is late rather than early: what is said is what is used.
+    text = f"{counted(len(parts), 'release')}, used from {listed(taken)}: {each}"
     if short:
         text += f"; {len(short)} of fewer than three swings left out: {listed(short)}"
     span = float(work.time[taken[0][0]]), float(work.time[taken[-1][1] - 1])
