@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pendmap
+from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, read, text
 
 if TYPE_CHECKING:
@@ -128,3 +129,20 @@ def test_samples_that_are_missing_are_counted(tmp_path: Path, scatter: float) ->
     said = found(run)["time-gap"].text
     assert said.startswith(f"3 gaps, about {lost.size} samples missing")
     assert run.rate_hz == pytest.approx(100, rel=1e-3)
+
+
+def test_a_clock_that_counts_from_long_ago_is_told_by_the_millisecond(tmp_path: Path) -> None:
+    time, theta = clean()
+    path = tmp_path / "a.csv"
+    path.write_text(text((time + 1732209590.125, theta)), encoding="utf-8")
+    said = as_text(pendmap.read_experiment(path))
+    assert "1732209590.125 to 1732209610.125 s" in said
+
+
+def test_the_last_digit_of_a_file_is_no_counter(tmp_path: Path) -> None:
+    time, theta, _ = motion(start=0.002)
+    path = tmp_path / "a.csv"
+    path.write_text(text((time, np.round(theta, 6))), encoding="utf-8")
+    (run,) = pendmap.read_experiment(path).runs
+    assert run.count_rad == pytest.approx(1e-6)
+    assert "a turn" not in as_text(pendmap.read_experiment(path))

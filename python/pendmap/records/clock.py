@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.records.intervals import intervals_of
-from pendmap.words import counted
+from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,6 +33,9 @@ MOST_OUT: Final = 0.3
 
 COARSE: Final = 0.2
 """Share of repeated stamps from which the clock is coarser than the sampling."""
+
+SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))
+"""Findings about intervals."""
 
 WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
 """Seconds after which counters of 16 and 32 bits in us, ms (or s) begin again."""
@@ -218,8 +221,8 @@ def _spacing(work: Work) -> None:
     if gaps.size:
         worst = gaps[int(np.argmax(steps[gaps]))]
         text = (
-            f"{counted(gaps.size, 'gap')}, about {counted(found.missing, 'sample')} missing; the longest"
-            f" {steps[worst]:.3g} s at {work.time[worst]:.6g} s"
+            f"{counted(gaps.size, 'gap')}, about {counted(found.missing, 'sample')} missing; the"
+            f" longest {steps[worst]:.3g} s at {moment(work.time[worst])} s"
         )
         span = (float(work.time[worst]), float(work.time[worst + 1]))
         work.say("time-gap", text, at=gaps, span=span)

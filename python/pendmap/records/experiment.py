@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pendmap.errors import InputError
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 __all__ = ["Experiment", "Finding", "Run", "Segment"]
 
 Kind = Literal["free", "forced"]
+
+NOTHING: Final = frozenset(("no-motion", "peaks-undeclared"))
+"""Findings that leave nothing to fit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -195,7 +198,7 @@ class Experiment:
         """
         if any(run.moves for run in runs):
             return
-        why = next((f.text for f in self._said() if f.what == "no-motion"), "no sample is trusted")
+        why = next((f.text for f in self._said() if f.what in NOTHING), "no sample is trusted")
         raise InputError(f"{self.path}: nothing to fit: {why}: allowed is a record of a motion")
 
     def _said(self) -> Iterator[Finding]:

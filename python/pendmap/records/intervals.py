@@ -71,7 +71,7 @@ def intervals_of(time: Floats) -> Intervals:
         late[BESIDE - 1 : steps.size - BESIDE + 1] = _ahead(time) - BESIDE * tick
         gaps = gaps[late[gaps] > max(0.5 * tick, CERTAIN * normal_scale(late))]
         # Beside a gap the means show part of it.
-        gaps = np.asarray([k for k in gaps if late[k] >= _highest(late, gaps, k)], np.intp)
+        gaps = np.asarray([k for k in gaps if late[k] >= _highest(late, gaps, int(k))], np.intp)
         usual = tick
     whole = np.delete(steps, gaps)
     tick = float(np.mean(whole)) if gaps.size <= steps.size / 4 else usual

@@ -138,7 +138,7 @@ def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
     # such weights is biased. What its neighbours say of a stamp leaves out the stamp itself; next
     # to a gap they say nothing.
     off = np.clip(adapted(time, middle) / middle[reach] / slope, -1.0, 1.0)
-    return np.abs(speed + off * np.gradient(speed))
+    return np.asarray(np.abs(speed + off * np.gradient(speed)))
 
 
 def _calm(theta: Floats) -> Floats:

@@ -17,7 +17,7 @@ from pendmap.records.runs_of import true_runs
 from pendmap.records.scale import periods_of
 from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of
-from pendmap.words import counted
+from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -172,10 +172,12 @@ def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, sp
     first, last = segments[0], segments[-1]
     if first.what == "held":
         begin = segments[1].from_s
-        text = f"held at first: used from {begin:.6g} s, where the angle has clearly left the hold"
+        text = (
+            f"held at first: used from {moment(begin)} s, where the angle has clearly left the hold"
+        )
         work.say("held-start", text, span=(first.from_s, first.to_s))
     if last.what == "rest" and len(segments) > 1:
-        text = f"at rest from {last.from_s:.6g} s, not for fitting"
+        text = f"at rest from {moment(last.from_s)} s, not for fitting"
         work.say("rest-tail", text, span=(last.from_s, last.to_s))
 
 
@@ -183,7 +185,9 @@ def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
     """Say which releases are taken, and which are too short."""
 
     def listed(which: list[Places]) -> str:
-        spans = [f"{work.time[low]:.6g} to {work.time[high - 1]:.6g} s" for low, high in which]
+        spans = [
+            f"{moment(work.time[low])} to {moment(work.time[high - 1])} s" for low, high in which
+        ]
         return ", ".join(spans[:MOST_LISTED]) + (", ..." if len(spans) > MOST_LISTED else "")
 
     taken = [part for part, use in zip(parts, used, strict=True) if use]

@@ -177,9 +177,7 @@ def _grown(work: Work, part: Places, middle: float, limit: float) -> list[Places
     return [(a, b) for a, b in pieces if b - a > 5]
 
 
-def held_short(
-    work: Work, part: Places, middle: float, period: float, noise: float
-) -> int | None:
+def held_short(work: Work, part: Places, middle: float, period: float, noise: float) -> int | None:
     """Return where a motion has left a level that it was held at for less than a period before.
 
     Nothing is returned where it leaves as soon as a release from rest does.
