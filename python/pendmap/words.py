@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-__all__ = ["counted", "written"]
+__all__ = ["counted", "moment", "written"]
 
 DIGITS: Final = 5
 """Digits of a number whose uncertainty is not known."""
@@ -13,10 +13,18 @@ DIGITS: Final = 5
 PLACES: Final = 10
 """Places after the point up to which a number is written out."""
 
+LONG_AGO: Final = 1e3
+"""Seconds from which six digits are no longer milliseconds."""
+
 
 def counted(count: int, noun: str) -> str:
     """Return ``1 period``, ``2 periods``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def moment(time: float) -> str:
+    """Return a time in s to six digits, of a clock that counts from long ago to milliseconds."""
+    return f"{time:.6g}" if abs(time) < LONG_AGO else f"{round(time, 3):.15g}"
 
 
 def written(value: float, width: float) -> str:

@@ -16,6 +16,7 @@ from pendmap.identification.trajectory import identify
 from pendmap.identification.window_fit import smoothed_velocity
 from pendmap.model import Rig
 from pendmap.records.noise import noise_of
+from pendmap.records.summary import noise_said
 
 FINE = np.arange(-200, 60_200) / 2000
 TIME = np.arange(3000) * 0.01
@@ -124,3 +125,42 @@ def test_where_the_model_lacks_more_than_the_noise_readings_count_alike(fine: np
     assert used.law is None
     assert np.ptp(used.each) == 0
     assert fit.rms < 0.9 * by_law.rms
+
+
+def test_stamps_that_are_off_bias_nothing(fine: np.ndarray) -> None:
+    """The instants are regular and their stamps miss them: a weight must not know by how much."""
+    tau, sigma, decays = 2e-3, 1e-3, 12
+    exact = fine[200::20][: TIME.size]
+    away = []
+    for seed in range(decays):
+        rng = np.random.default_rng(seed)
+        stamps = TIME + tau * rng.standard_normal(TIME.size)
+        order = np.argsort(stamps)
+        theta = exact + sigma * rng.standard_normal(TIME.size)
+        fit = identify(stamps[order], theta[order])
+        assert fit.misfit == pytest.approx(1.0, abs=0.15)
+        away.append(
+            [
+                (fit.estimates[n].value - TRUTH[t]) / fit.estimates[n].stderr
+                for n, t in NAMES.items()
+            ]
+        )
+    mean = np.mean(away, axis=0)
+    assert np.all(np.abs(mean) < 3 / np.sqrt(decays)), mean
+    assert np.sqrt(np.mean(np.square(away))) < 1.35
+
+
+@pytest.mark.parametrize(("every", "few"), [(10, True), (12, True), (3, False), (1, False)])
+def test_of_few_samples_a_period_the_noise_is_a_bound(
+    fine: np.ndarray, every: int, *, few: bool
+) -> None:
+    """The stamps are exact: what grows with speed is motion that polynomials leave."""
+    for seed in range(10):
+        floor = noise_of(TIME[::every], late(fine, 0.0, 2.5e-3, seed)[::every])
+        assert floor.bound == few
+        assert floor.law is None
+        if few:
+            assert noise_said(floor).startswith("at most")
+            assert floor.sigma > 0.9 * 2.5e-3
+        else:
+            assert floor.sigma == pytest.approx(2.5e-3, rel=0.15)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pendmap
+from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, read, text
 
 if TYPE_CHECKING:
@@ -106,3 +107,42 @@ def test_noise_of_a_rotation(tmp_path: Path) -> None:
     readings = theta + np.random.default_rng(4).normal(0, 0.003, theta.size)
     floor = pendmap.noise_floor(read(tmp_path, text((time, readings))))
     assert floor.sigma == pytest.approx(0.003, rel=0.12)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 5e-4, 1e-3, 2e-3])
+def test_stamps_that_scatter_are_no_gaps(tmp_path: Path, scatter: float) -> None:
+    rng = np.random.default_rng(3)
+    time, theta = clean()
+    stamps = time + scatter * rng.standard_normal(time.size)
+    run = read(tmp_path, text((stamps, theta)))
+    assert "time-gap" not in found(run)
+    assert run.rate_hz == pytest.approx(100, rel=1e-5 + 2 * scatter / 20)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 1e-3, 2e-3])
+def test_samples_that_are_missing_are_counted(tmp_path: Path, scatter: float) -> None:
+    rng = np.random.default_rng(4)
+    time, theta = clean()
+    stamps = time + scatter * rng.standard_normal(time.size)
+    lost = np.r_[300:302, 700:706, 1200:1350]
+    run = read(tmp_path, text((np.delete(stamps, lost), np.delete(theta, lost))))
+    said = found(run)["time-gap"].text
+    assert said.startswith(f"3 gaps, about {lost.size} samples missing")
+    assert run.rate_hz == pytest.approx(100, rel=1e-3)
+
+
+def test_a_clock_that_counts_from_long_ago_is_told_by_the_millisecond(tmp_path: Path) -> None:
+    time, theta = clean()
+    path = tmp_path / "a.csv"
+    path.write_text(text((time + 1732209590.125, theta)), encoding="utf-8")
+    said = as_text(pendmap.read_experiment(path))
+    assert "1732209590.125 to 1732209610.125 s" in said
+
+
+def test_the_last_digit_of_a_file_is_no_counter(tmp_path: Path) -> None:
+    time, theta, _ = motion(start=0.002)
+    path = tmp_path / "a.csv"
+    path.write_text(text((time, np.round(theta, 6))), encoding="utf-8")
+    (run,) = pendmap.read_experiment(path).runs
+    assert run.count_rad == pytest.approx(1e-6)
+    assert "a turn" not in as_text(pendmap.read_experiment(path))

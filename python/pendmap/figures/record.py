@@ -17,6 +17,7 @@ from pendmap.records.local_fit import local_fit
 from pendmap.records.noise import noise_floor
 from pendmap.records.runs_of import true_runs
 from pendmap.records.summary import noise_said, noise_unit
+from pendmap.words import moment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -95,7 +96,7 @@ def _refuse_small(size: tuple[float, float] | None, across: float, down: float) 
 
 def _subtitle(run: Run) -> str:
     if run.peaks_only:
-        return f"{run.time.size} turning points, {run.time[0]:.6g} to {run.time[-1]:.6g} s"
+        return f"{run.time.size} turning points, {moment(run.time[0])} to {moment(run.time[-1])} s"
     said = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
     said = said.replace("+-", "\N{PLUS-MINUS SIGN}")
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"

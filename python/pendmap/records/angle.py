@@ -50,6 +50,7 @@ def make(work: Work) -> None:
     if "peaks" in work.extra and "no angle" in work.extra:
         work.theta = work.extra.pop("peaks")
         work.peaks_only = True
+        _one_sign(work)
     elif "no angle" in work.extra:
         _derived(work)
     work.extra.pop("no angle", None)
@@ -57,6 +58,17 @@ def make(work: Work) -> None:
     _sane(work)
     if not work.peaks_only:
         _unwrap(work)
+
+
+def _one_sign(work: Work) -> None:
+    """Say how turning points without signs are taken: those of one side would halve ``w0``."""
+    peaks = work.theta[np.isfinite(work.theta)]
+    if peaks.size and (np.all(peaks >= 0) or np.all(peaks <= 0)):
+        text = (
+            "the turning points have one sign: taken for those of both sides, one each half swing;"
+            " with those of one side alone w0 comes out half as large"
+        )
+        work.say("peaks-one-sign", text)
 
 
 def _finite(work: Work, what: str, *values: Floats) -> None:

@@ -89,8 +89,11 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
             continue  # unit, scale or zero of a column that is to be found by its usual names
         places[channel] = _place(name, table, f"{where}: [columns]: {channel}")
     for channel, kind in CHANNELS.items():
-        if channel not in places and kind.default in table.names:
-            places[channel] = table.names.index(kind.default)
+        if channel in places or kind.default not in table.names:
+            continue
+        place = table.names.index(kind.default)
+        if place not in places.values():  # [columns] may say that theta_rad holds peaks
+            places[channel] = place
     findings = _guess(table, places)
     _check(places, table, where)
     values, units = {}, {}

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.words import counted
+from pendmap.records.intervals import intervals_of
+from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 __all__ = ["mend"]
-
-GAP: Final = 1.6
-"""Intervals in units of the median from which samples are missing: one lost sample makes 2."""
 
 RESET: Final = 10
 """Intervals that a clock falls back by when it starts again, and the samples each part has."""
@@ -35,6 +33,9 @@ MOST_OUT: Final = 0.3
 
 COARSE: Final = 0.2
 """Share of repeated stamps from which the clock is coarser than the sampling."""
+
+SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))
+"""Findings about intervals."""
 
 WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
 """Seconds after which counters of 16 and 32 bits in us, ms (or s) begin again."""
@@ -211,18 +212,17 @@ def _longest_rising(time: Floats) -> NDArray[np.intp]:
 def _spacing(work: Work) -> None:
     """Say what the intervals show: gaps, jitter."""
     steps = np.diff(work.time)
-    usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > GAP * usual)
+    found = intervals_of(work.time)
+    usual, gaps = found.tick, found.gaps
     if gaps.size > steps.size / 4:
         text = f"the samples are uneven: intervals from {steps.min():.3g} to {steps.max():.3g} s"
         work.say("time-uneven", text)
         return
     if gaps.size:
-        lost = int(np.sum(np.round(steps[gaps] / usual) - 1))
         worst = gaps[int(np.argmax(steps[gaps]))]
         text = (
-            f"{counted(gaps.size, 'gap')}, about {counted(lost, 'sample')} missing; the longest"
-            f" {steps[worst]:.3g} s at {work.time[worst]:.6g} s"
+            f"{counted(gaps.size, 'gap')}, about {counted(found.missing, 'sample')} missing; the"
+            f" longest {steps[worst]:.3g} s at {moment(work.time[worst])} s"
         )
         span = (float(work.time[worst]), float(work.time[worst + 1]))
         work.say("time-gap", text, at=gaps, span=span)

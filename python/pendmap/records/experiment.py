@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["Experiment", "Finding", "Run", "Segment"]
 
 Kind = Literal["free", "forced"]
+
+NOTHING: Final = frozenset(("no-motion", "peaks-undeclared"))
+"""Findings that leave nothing to fit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,10 +167,10 @@ class Run:
 
     @property
     def rate_hz(self) -> float:
-        """Samples a second, from the median interval."""
-        import numpy as np
+        """Samples a second, from the whole record without its gaps."""
+        from pendmap.records.intervals import intervals_of
 
-        return float(1 / np.median(np.diff(self.time))) if self.time.size > 1 else 0.0
+        return 1 / intervals_of(self.time).tick if self.time.size > 1 else 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -216,7 +219,7 @@ class Experiment:
         """
         if any(run.moves for run in runs):
             return
-        why = next((f.text for f in self._said() if f.what == "no-motion"), "no sample is trusted")
+        why = next((f.text for f in self._said() if f.what in NOTHING), "no sample is trusted")
         raise InputError(f"{self.path}: nothing to fit: {why}: allowed is a record of a motion")
 
     def _said(self) -> Iterator[Finding]:

@@ -17,7 +17,7 @@ import numpy as np
 from pendmap.records.local_fit import POINTS, local_fit
 from pendmap.records.noise import DEGREES
 from pendmap.records.robust import broad_scale, normal_scale
-from pendmap.words import counted
+from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -272,8 +272,8 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
         or_else = ", or another recording begins"
     text = (
         f"{counted(len(jumps), 'jump')} of the reading ({said} rad) that stay{or_else}:"
-        f" {work.time[edges[longest]]:.6g} to {work.time[edges[longest + 1] - 1]:.6g} s is for"
-        " fitting"
+        f" {moment(work.time[edges[longest]])} to {moment(work.time[edges[longest + 1] - 1])} s is"
+        " for fitting"
     )
     work.say("missed-counts", text, at=places)
 

@@ -47,7 +47,7 @@ LONG: Final = 0.5
 """Periods that a hand holds for at least: knocks and magnets act for less."""
 
 
-def touched(work: Work, period: float) -> NDArray[np.bool_]:
+def touched(work: Work, period: float, parts: list[Places]) -> NDArray[np.bool_]:
     """Return which samples of a free record a hand moves, shape (N,).
 
     The remainder of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large there, with
@@ -59,6 +59,8 @@ def touched(work: Work, period: float) -> NDArray[np.bool_]:
         A free record; readings that are not trusted are passed over by straight lines.
     period : float
         Of small swings, s, roughly.
+    parts : list of (int, int)
+        Where it moves: first place and the one after the last. A long hold would outvote the rest.
     """
     from scipy.ndimage import binary_dilation, maximum_filter1d
     from scipy.signal import savgol_filter
@@ -75,7 +77,12 @@ def touched(work: Work, period: float) -> NDArray[np.bool_]:
     bend = savgol_filter(theta, window, 3, deriv=2, delta=interval)
     speed = savgol_filter(theta, window, 3, deriv=1, delta=interval)
     columns = np.column_stack([np.sin(theta), np.cos(theta), speed, np.sign(speed)])
-    fitted = _trimmed(columns, -bend, (2 * math.pi / period) ** 2)
+    moving = np.zeros(count, bool)
+    for low, high in parts:
+        moving[(even >= work.time[low]) & (even <= work.time[high - 1])] = True
+    if not moving.any():
+        return none
+    fitted = _trimmed(columns[moving], -bend[moving], (2 * math.pi / period) ** 2)
     gravity = float(np.hypot(fitted[0], fitted[1]))
     if not 0.3 < gravity / (2 * math.pi / period) ** 2 < 3:
         return none
@@ -90,7 +97,7 @@ def touched(work: Work, period: float) -> NDArray[np.bool_]:
     noise = normal_scale(local_fit(work.time[good], work.theta[good]).residual)
     # A second derivative by least squares over n samples: sigma sqrt(720 / n^5) / dt^2.
     error = max(noise, work.count / math.sqrt(12)) * math.sqrt(720 / window**5) / interval**2
-    usual = USUAL * float(np.median(rest))
+    usual = USUAL * float(np.median(rest[moving]))
     moved = rest > np.maximum(np.maximum(SHARE * restoring, CERTAIN * error), usual)
     # Within a gap there are no readings that could tell.
     places = np.flatnonzero(good)

@@ -112,7 +112,7 @@ class SpeedLaw:
 
 
 def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
-    """Return the size of the velocity at every sample, rad/s.
+    """Return the size of the velocity at every stamp, rad/s.
 
     Slopes of quartics, which are odd about their middle: noise in them is independent of what the
     middle is away from its neighbours. Single false samples are put on the median of these before.
@@ -127,14 +127,21 @@ def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
     reach = max(_lag(time, REACH / fastest), 3)
     if time.size <= 2 * reach:
         return np.zeros(time.size)
-    _, weights = even_weights(4, 2 * reach + 1)
+    middle, weights = even_weights(4, 2 * reach + 1)
 
-    def slope(values: Floats) -> Floats:
-        """The slope by the number of the sample."""
+    def adapted(values: Floats, by: Floats) -> Floats:
+        """Quartics by the number of the sample, as ``by`` weighs their values."""
         padded = np.pad(values, reach, mode="reflect", reflect_type="odd")
-        return np.correlate(padded, weights, "valid")
+        return np.correlate(padded, by, "valid")
 
-    return np.abs(slope(_calm(theta)) / slope(time))
+    slope = adapted(time, weights)
+    speed = adapted(_calm(theta), weights) / slope
+    # By number it is the speed where a stamp should be. A stamp that is off names another instant,
+    # whose speed a weight must follow: else it depends on how far the stamp is off, and a fit with
+    # such weights is biased. What its neighbours say of a stamp leaves out the stamp itself; next
+    # to a gap they say nothing.
+    off = np.clip(adapted(time, middle) / middle[reach] / slope, -1.0, 1.0)
+    return np.asarray(np.abs(speed + off * np.gradient(speed)))
 
 
 def _calm(theta: Floats) -> Floats:

@@ -21,7 +21,7 @@ from pendmap.records.scale import periods_of
 from pendmap.records.swinging import let_go, swinging
 from pendmap.records.swings import after_turns, swings
 from pendmap.records.zero import middle_of
-from pendmap.words import counted
+from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -103,7 +103,7 @@ def check(work: Work) -> None:
         parts = releases(work, parts, middle, limit, period, noise)
     if not parts:
         return
-    held = None if work.made_of else held_short(work, parts[0], period, noise)
+    held = None if work.made_of else held_short(work, parts[0], middle, period, noise)
     if held is not None:
         parts[0] = (held, parts[0][1])
     parts = trigger.begun(work, parts, period)
@@ -217,10 +217,13 @@ def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, sp
         _say_releases(work, parts, used)
     first, last = segments[0], segments[-1]
     if first.what == "held":
-        text = f"held until {first.to_s:.6g} s, not for fitting"
+        begin = segments[1].from_s
+        text = (
+            f"held at first: used from {moment(begin)} s, where the angle has clearly left the hold"
+        )
         work.say("held-start", text, span=(first.from_s, first.to_s))
     if last.what == "rest" and len(segments) > 1:
-        text = f"at rest from {last.from_s:.6g} s, not for fitting"
+        text = f"at rest from {moment(last.from_s)} s, not for fitting"
         work.say("rest-tail", text, span=(last.from_s, last.to_s))
 
 
@@ -228,13 +231,16 @@ def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
     """Say which releases are taken, and which are too short."""
 
     def listed(which: list[Places]) -> str:
-        spans = [f"{work.time[low]:.6g} to {work.time[high - 1]:.6g} s" for low, high in which]
+        spans = [
+            f"{moment(work.time[low])} to {moment(work.time[high - 1])} s" for low, high in which
+        ]
         return ", ".join(spans[:MOST_LISTED]) + (", ..." if len(spans) > MOST_LISTED else "")
 
     taken = [part for part, use in zip(parts, used, strict=True) if use]
     short = [part for part, use in zip(parts, used, strict=True) if not use]
     each = "each taken as a run" if len(taken) > 1 else "one is used"
-    text = f"{counted(len(parts), 'release')}: {listed(taken)}, {each}"
+    # The end of a hold is late rather than early: what is said is what is used.
+    text = f"{counted(len(parts), 'release')}, used from {listed(taken)}: {each}"
     if short:
         text += f"; {len(short)} of fewer than three swings left out: {listed(short)}"
     span = float(work.time[taken[0][0]]), float(work.time[taken[-1][1] - 1])

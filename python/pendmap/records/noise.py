@@ -77,6 +77,10 @@ FEWEST: Final = 40
 KINDS: Final = 16
 """Kinds of speed, with equally many samples, that have outliers of their own."""
 
+FEW: Final = 0.3
+"""Radians of its own phase between samples beyond which polynomials leave some of the motion: about
+20 samples a period. It is largest where the motion is quick, which looks like a clock's fault."""
+
 RANGES: Final = 4
 """Ranges of speed, with equally many samples."""
 
@@ -124,6 +128,8 @@ class NoiseFloor:
         How many residuals it comes from.
     law : SpeedLaw or None
         How the noise grows with speed, where the record shows that it does.
+    bound : bool
+        Whether ``sigma`` is an upper bound: of so few samples a period some motion is left in it.
     """
 
     sigma: float
@@ -133,6 +139,7 @@ class NoiseFloor:
     colour: float = 1.0
     samples: int = 0
     law: SpeedLaw | None = None
+    bound: bool = False
 
 
 def noise_floor(run: Run) -> NoiseFloor:
@@ -207,11 +214,13 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
             fit.residual, square, worth=fit.sum_of_squares, fastest=phase, count=count,
             interval=interval,
         )  # fmt: skip
+    few = phase * interval > FEW
     sigma, error = _rms(fit), _stderr(fit)
     limited = sigma < least
     sigma = max(sigma, least)
     ranges = tuple(_ranges(fit, least, slowest))
-    return NoiseFloor(sigma, error, ranges, limited, colour, fit.middle.size, law)
+    law = None if few else law
+    return NoiseFloor(sigma, error, ranges, limited, colour, fit.middle.size, law, few)
 
 
 def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from pendmap.records import (
     scale,
     signs,
     trigger,
+    unmarked_peaks,
 )
 from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
@@ -118,8 +119,11 @@ def _runs(
         work.say("drive-missing", text)
     clock.mend(work)
     work.cut(plan.from_s, plan.to_s)
+    unmarked_peaks.check(work, channels.columns)
     angle.make(work)
     if work.peaks_only:
+        # Their intervals are periods, no clock's.
+        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
         work.refuse_short()
         return [_run(work, name, channels, digest)], []
     resampled.check(work)

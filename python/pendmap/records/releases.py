@@ -25,8 +25,12 @@ RISE: Final = 0.1
 HELD: Final = 1.5
 """Times longer than a release from rest takes to be seen, from where it was held before."""
 
-UPRIGHT: Final = 2.7
-"""Angle in rad beyond which a pendulum leaves so slowly that a hold cannot be told."""
+UPRIGHT: Final = 0.05
+"""Sine of an angle below which a pendulum leaves so slowly that a hold cannot be told."""
+
+BEFORE: Final = ((0.5, 0.2), (0.7, 0.4))
+"""Periods before a motion between which a hold is looked for: from near the top it leaves slowly,
+and is seen to move later."""
 
 FEWEST_HELD: Final = 10
 """Samples of a hold that show whether it is quiet."""
@@ -61,31 +65,70 @@ def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motio
     noise : float
         Of a reading, rad.
     """
-    hand = touched(work, period)
+    hand = touched(work, period, parts)
     free = [
-        (_let_go(work, part, hand, period, noise), part[1])
+        (_let_go(work, part, hand, middle, period, noise), part[1])
         for part in without_hand(work.time, parts, hand, period)
     ]
     return [piece for part in free for piece in grown(work, part, middle, limit)]
 
 
-def _let_go(work: Work, part: Places, hand: NDArray[np.bool_], period: float, noise: float) -> int:
-    """Return where a motion begins after a quiet hold, closer than a hand is known to let go."""
+def _let_go(  # noqa: PLR0913, PLR0917 (a motion, and what is known of it)
+    work: Work,
+    part: Places,
+    hand: NDArray[np.bool_],
+    middle: float,
+    period: float,
+    noise: float,
+) -> int:
+    """Return where a motion that begins with a quiet hold has clearly left it."""
     low, high = part
-    before, sure = (
-        int(np.searchsorted(work.time, work.time[low] - share * period)) for share in (0.5, 0.2)
-    )
-    hold = work.theta[before:sure]
-    if hold.size < FEWEST_HELD or not hand[before:low].all():
-        return low
+    for shares in BEFORE:
+        before, sure = (
+            int(np.searchsorted(work.time, work.time[low] - share * period)) for share in shares
+        )
+        level = _quiet(work, before, sure, noise)
+        left = None if level is None else _left(work, (sure, high), level, noise)
+        if left is None:
+            continue
+        if hand[before:low].all():
+            # A hand is known to let go only later.
+            found = held_short(work, (before, high), middle, period, noise)
+            return low if found is None else min(low, found)
+        return max(low, left)
+    return low
+
+
+def _quiet(work: Work, low: int, high: int, noise: float) -> float | None:
+    """Return the level that readings keep; none if they do not."""
+    hold = work.theta[low:high][work.trusted[low:high]]
+    if hold.size < FEWEST_HELD:
+        return None
     # A hand that trembles drifts more than noise does.
     early, late = np.array_split(hold, 2)
     drift = abs(float(np.mean(early) - np.mean(late)))
-    span = max(6 * noise, 2 * work.count)
-    if np.ptp(hold) > span or drift > max(4 * noise / math.sqrt(hold.size), work.count / 4):
-        return low
-    found = held_short(work, (before, high), period, noise)
-    return low if found is None else min(low, found)
+    spread = float(np.diff(np.quantile(hold, [0.05, 0.95]))[0])
+    still = spread <= max(4 * noise, 2 * work.count)
+    calm = drift <= max(4 * noise / math.sqrt(hold.size), work.count / 4)
+    return float(np.median(hold)) if still and calm else None
+
+
+def _seen(work: Work, noise: float) -> float:
+    """Return how far from a hold no reading of it is, rad."""
+    return max(6 * noise, 1.5 * work.count, 1e-4)
+
+
+def _left(work: Work, part: Places, level: float, noise: float) -> int | None:
+    """Return from which place on the angle is clearly off a level, several readings in a row.
+
+    All before may be held; of a release some readings of the first tenth of a second are lost.
+    """
+    good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
+    off = work.theta[good] - level
+    seen = _seen(work, noise)
+    away = np.where(off > seen, 1, np.where(off < -seen, -1, 0))
+    runs = np.flatnonzero((away[:-2] != 0) & (away[:-2] == away[1:-1]) & (away[1:-1] == away[2:]))
+    return int(good[runs[0]]) if runs.size else None
 
 
 def enough(work: Work, part: Places, middle: float, limit: float) -> bool:
@@ -134,21 +177,27 @@ def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]
     return [(a, b) for a, b in pieces if b - a > 5]
 
 
-def held_short(work: Work, part: Places, period: float, noise: float) -> int | None:
-    """Return where a motion begins that was held for less than a period before."""
+def held_short(work: Work, part: Places, middle: float, period: float, noise: float) -> int | None:
+    """Return where a motion has left a level that it was held at for less than a period before.
+
+    Nothing is returned where it leaves as soon as a release from rest does.
+    """
     low = part[0]
     if not work.trusted[low : low + 5].all():
         return None
-    theta, time = work.theta[low : part[1]], work.time[low : part[1]]
-    start = float(np.median(theta[:5]))
-    seen = max(6 * noise, 1.5 * work.count, 1e-4)
-    left = np.flatnonzero(np.abs(theta - start) > seen)
+    # The first readings say where it is held, then all that are near them.
+    level = float(np.median(work.theta[low : low + 5]))
+    left = _left(work, part, level, noise)
+    if left is None:
+        return None
+    level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
+    left = _left(work, part, level, noise)
+    pull = abs(math.sin(level - middle))
+    if left is None or pull < UPRIGHT:
+        return None
     w0 = 2 * math.pi / period
-    if not left.size or abs(start) > UPRIGHT or abs(math.sin(start)) < 0.05:
-        return None
-    usual = math.sqrt(2 * seen / (w0**2 * abs(math.sin(start))))
+    usual = math.sqrt(2 * _seen(work, noise) / (w0**2 * pull))
     interval = float(np.median(np.diff(work.time)))
-    still = float(time[left[0]] - time[0])
-    if still <= HELD * usual + 4 * interval:
+    if work.time[left] - work.time[low] <= HELD * usual + 4 * interval:
         return None
-    return low + max(int(np.searchsorted(time, time[left[0]] - usual)), 0)
+    return left

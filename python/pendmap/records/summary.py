@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.records.noise import noise_floor
-from pendmap.words import counted
+from pendmap.records.samples import FINEST
+from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -95,7 +96,7 @@ def _lines(run: Run) -> Iterator[str]:
     yield f"{run.name} ({run.kind}{held})"
     channels = ", ".join(f"{channel} from {column!r}" for channel, column in run.channels.items())
     yield f"  channels  {channels}"
-    span = f"{run.time[0]:.6g} to {run.time[-1]:.6g} s"
+    span = f"{moment(run.time[0])} to {moment(run.time[-1])} s"
     what = "turning point" if run.peaks_only else "sample"
     rate = "" if run.peaks_only else f" at {run.rate_hz:.5g} Hz"
     yield f"  samples   {run.time.size} {what}s{rate}, {span}; {run.trusted.sum()} for fitting"
@@ -118,7 +119,7 @@ def _lines(run: Run) -> Iterator[str]:
         yield f"  bias      {said}; left to the fit"
     for segment in run.segments:
         used = "for fitting" if segment.used else "not for fitting"
-        yield f"  {segment.what:<9} {segment.from_s:.6g} to {segment.to_s:.6g} s, {used}"
+        yield f"  {segment.what:<9} {moment(segment.from_s)} to {moment(segment.to_s)} s, {used}"
     mended = sum(found.mended for found in run.findings)
     count = counted(len(run.findings), "finding")
     yield f"  {count}, {mended} of them mended" if run.findings else "  nothing odd was found"
@@ -147,7 +148,7 @@ def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
 
 
 def _steps(run: Run) -> str:
-    if not run.count_rad:
+    if run.count_rad <= FINEST:
         return ""
     return f", in steps of {run.count_rad:.4g} rad ({2 * math.pi / run.count_rad:.5g} a turn)"
 
@@ -167,6 +168,9 @@ def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
     if not math.isfinite(noise.sigma):
         return "too few samples to tell"
     degrees = f"{math.degrees(noise.sigma):.2g} degrees{unit.removeprefix('rad')}"
+    if noise.bound:
+        few = "motion is left in it at so few samples a period"
+        return f"at most {noise.sigma:.2g} {unit} ({degrees}), {few}"
     said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
     if noise.limited_by_count:
         return f"{said}, that of counting: the record shows no more"
