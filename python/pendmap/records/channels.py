@@ -92,7 +92,8 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         if channel in places or kind.default not in table.names:
             continue
         place = table.names.index(kind.default)
-        if place not in places.values():  # [columns] may say that theta_rad holds peaks
+        # [columns] may say that theta_rad holds turning points: then it holds no angles.
+        if channel != "angle" or place != places.get("peaks"):
             places[channel] = place
     findings = _guess(table, places)
     _check(places, table, where)

@@ -49,8 +49,8 @@ def check(work: Work, columns: Mapping[str, str]) -> None:
     work.trusted[:] = False
     named = f'peaks = "{columns["angle"]}"'
     text = (
-        f"{found}: these look like turning points alone, of which the methods of peaks take one"
-        f" each half swing; [columns] of experiment.toml declares them: {named}"
+        f"{found}: turning points alone? Then [columns] of experiment.toml says so, {named}, one"
+        " for each half swing"
     )
     work.say("peaks-undeclared", text)
 
@@ -67,8 +67,8 @@ def _pattern(time: Floats, theta: Floats) -> str | None:
         return None
     other_side = theta[1:] * theta[:-1] < 0
     if np.mean(other_side) >= MOST:
-        return "two readings a swing, on one side and the other, ever smaller"
+        return "readings on one side and the other, ever smaller"
     regular = float(np.ptp(steps)) < REGULAR * float(np.mean(steps))
     if np.any(other_side) or regular or np.mean(np.diff(theta) * np.sign(theta[0]) < 0) < MOST:
         return None
-    return "slow readings, all on one side and ever smaller"
+    return "slow readings on one side, ever smaller"
