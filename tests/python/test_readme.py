@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from pendmap.records.description import read_description
+
 if TYPE_CHECKING:
     from conftest import Run
 
@@ -64,10 +66,21 @@ def test_every_snippet_runs(code: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", blocks("toml"))
-def test_every_model_file_is_one(text: str, tmp_path: Path, pendmap_command: Run) -> None:
-    (tmp_path / "model.toml").write_text(text, encoding="utf-8")
+def test_every_toml_is_what_it_is_said_to_be(
+    text: str, tmp_path: Path, pendmap_command: Run
+) -> None:
+    if "[columns]" in text:
+        (tmp_path / "a.csv").write_text("t_s,volts,amplitude_rad\n0,1,1\n", encoding="utf-8")
+        text += '[[run]]\nfile = "a.csv"\nkind = "free"\n'
+        (tmp_path / "experiment.toml").write_text(text, encoding="utf-8")
+        described = read_description(tmp_path / "experiment.toml")
+        assert described.columns["angle"].name == "volts"
+        return
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
     drive = ("--stroke-mm", "20", "--frequency-hz", "1.9")
-    run = pendmap_command("simulate", "--model", "model.toml", *drive, "--until", "30", "--json")
+    model = ("simulate", "--model", "own.toml", *drive, "--until", "30", "--json")
+    formulas = ("effects", "--effects", "own.toml", "--json")
+    run = pendmap_command(*(model if "[pendulum]" in text else formulas))
     assert run.returncode == 0, run.stderr
 
 
