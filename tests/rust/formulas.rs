@@ -27,10 +27,15 @@ fn effect(spec: &Spec, values: &[f64]) -> Effect {
 
 /// Every effect that can be rewritten, and itself as a formula, in the same pendulum.
 fn twins(base: &Pendulum) -> Vec<(Kind, Pendulum, Pendulum)> {
-    let mut draws = Draws(8);
     let mut all = Vec::new();
     for kind in Kind::ALL {
-        let own = draws.effect(*kind);
+        // Each by itself: another effect in the library changes none of them.
+        let seed = kind.definition().name.bytes().map(u64::from).sum();
+        let own = match kind {
+            // Below the friction of the tests: together they brake everywhere.
+            Kind::LoadDependentFriction => Effect::new(*kind, &[0.02]).expect("in range"),
+            _ => Draws(seed).effect(*kind),
+        };
         if let Some(other) = rewritten(&own) {
             // What has a parameter of its own in the model is there but once.
             let bare = match kind {
@@ -106,7 +111,9 @@ fn a_formula_s_maps_are_the_library_s_cell_for_cell() {
         let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
         for (kind, library, own) in twins(&base) {
             if own.check_mappable().is_ok() {
-                let [a, b] = [&library, &own].map(|pendulum| basins_on_plane(pendulum, 24));
+                // Where a corner moves the end of each rest, that is looked for step by step.
+                let side = if library.has_corner() && theta_r > 0.0 { 6 } else { 24 };
+                let [a, b] = [&library, &own].map(|pendulum| basins_on_plane(pendulum, side));
                 let (a, b) = (cell_names(&a), cell_names(&b));
                 let apart = a.iter().zip(&b).filter(|(a, b)| a != b).count();
                 // What costs the library nothing goes through steps of its own: a cell within their
