@@ -98,7 +98,8 @@ fn a_formula_s_trajectories_are_the_library_s() {
                     [&library, &own].map(|p| advanced(&Strobe::new(p, 60, path()), &starts, 3));
                 for ((a, b), start) in a.iter().zip(&b).zip(&starts) {
                     let apart = distance(*a, *b);
-                    assert!(apart < 1e-12, "{kind:?} in lanes from {start:?}: {apart:e}");
+                    // Without fused operations the two round differently, at corners too.
+                    assert!(apart < 1e-11, "{kind:?} in lanes from {start:?}: {apart:e}");
                 }
             }
         }
