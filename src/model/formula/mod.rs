@@ -1,8 +1,8 @@
 //! An effect that its user writes as a formula: a torque per inertia as text.
 //!
-//! - [`parse`]: from text to a [`tree`]
-//! - [`probe`]: what the term does, by its values
-//! - [`program`]: the tree as operations over lanes, single numbers and numbers with derivatives
+//! - `parse`: from text to a `tree`
+//! - `probe`: what the term does, by its values
+//! - `program`: the tree as operations over lanes, single numbers and numbers with derivatives
 //!
 //! A term that jumps where the velocity passes zero is dry friction: of `T`, held at either sense of
 //! the motion, `-(T(+) - T(-))/2` is the friction and `(T(+) + T(-))/2` a torque. So it sticks and
