@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::counted::{Said, said};
 use super::problem::{Columns, MOST_READINGS, Problem, Shaped, Slot};
 use super::window::Window;
 use crate::integrate::State;
@@ -24,13 +25,21 @@ const READINGS: usize = MOST_READINGS + 2;
 pub struct Linear {
     /// Angle, not wrapped, and velocity at each sample.
     pub states: Vec<State>,
-    /// Reading less model over the standard error; 0 where a sample does not count.
+    /// Reading less model; 0 where a sample does not count.
+    pub apart: Vec<f64>,
+    /// The same over the standard error; of a reading rounded to counts, what stands for it there.
     pub residuals: Vec<f64>,
-    /// For each sample a row of derivatives of the model over the standard error: by the record's
+    /// One over the standard error, or what stands for it; 0 where a sample does not count.
+    pub weights: Vec<f64>,
+    /// For each sample a row of derivatives of the model times that weight: by the record's
     /// columns, then by the initial angle and velocity.
     pub rows: Vec<f64>,
     /// The length of a row.
     pub width: usize,
+    /// The sum of the squared residuals, or of the deviances; not a number where the motion was lost.
+    pub chi2: f64,
+    /// Whether readings are intervals.
+    counted: bool,
 }
 
 impl Linear {
@@ -40,10 +49,17 @@ impl Linear {
         &self.rows[sample * self.width..(sample + 1) * self.width]
     }
 
-    /// The sum of the squared residuals; not a number where the motion was lost.
+    /// Residuals whose noise is white and of unit variance. Of counts, what a reading says varies from
+    /// next to nothing to all: the slopes of the likelihood over the root of their mean square.
     #[must_use]
-    pub fn chi2(&self) -> f64 {
-        self.residuals.iter().map(|r| r * r).sum()
+    pub fn white(&self) -> Vec<f64> {
+        if !self.counted {
+            return self.residuals.clone();
+        }
+        let number = self.weights.iter().filter(|weight| **weight > 0.0).count().max(1);
+        let squares: f64 = self.weights.iter().map(|weight| weight * weight).sum();
+        let mean = (squares / number as f64).sqrt().max(f64::MIN_POSITIVE);
+        self.residuals.iter().zip(&self.weights).map(|(r, w)| r * w / mean).collect()
     }
 }
 
@@ -150,12 +166,17 @@ impl Follow<'_> {
         let (moving, reading) = (self.columns.motion.len(), self.columns.reading.len());
         let width = moving + reading + 2;
         let mut residuals = Vec::with_capacity(states.len());
+        let mut apart = Vec::with_capacity(states.len());
+        let mut weights = Vec::with_capacity(states.len());
+        let mut chi2 = 0.0;
         let mut rows = Vec::with_capacity(states.len() * width);
         for (k, given) in heard.iter().enumerate() {
             let sample = self.window.from + k;
             let weight = record.weights[sample];
             if weight == 0.0 {
                 residuals.push(0.0);
+                apart.push(0.0);
+                weights.push(0.0);
                 rows.extend(std::iter::repeat_n(0.0, width));
                 continue;
             }
@@ -163,14 +184,30 @@ impl Follow<'_> {
             let read = sensor
                 .as_ref()
                 .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given));
-            residuals.push(weight * (record.readings[sample] - read.value));
+            let away = record.readings[sample] - read.value;
+            let (weight, residual) = match &record.counts {
+                None => {
+                    let residual = weight * away;
+                    chi2 += residual * residual;
+                    (weight, residual)
+                }
+                Some(counts) => {
+                    let Said { deviance, residual, weight } = said(away, counts.step, weight);
+                    chi2 += deviance - counts.surplus[sample];
+                    (weight, residual)
+                }
+            };
+            apart.push(away);
+            residuals.push(residual);
+            weights.push(weight);
             let by_state = [0, 1].map(|of| weight * read.slope[of]);
             let through = |slope: &State| by_state[0] * slope[0] + by_state[1] * slope[1];
             rows.extend(slopes[..moving].iter().map(through));
             rows.extend(read.slope[2..2 + reading].iter().map(|slope| weight * slope));
             rows.extend(slopes[moving..].iter().map(through));
         }
-        Linear { states, residuals, rows, width }
+        let counted = record.counts.is_some();
+        Linear { states, apart, residuals, weights, rows, width, chi2, counted }
     }
 }
 

@@ -3,6 +3,7 @@
 //! - [`problem`]: records, and which parameters of their pendulums are free
 //! - [`rod_sensor`]: what a gyroscope or an accelerometer on the rod reads of a motion
 //! - [`window`]: a record cut into windows, each with an initial state of its own
+//! - [`counted`]: what readings rounded to counts say
 //! - [`linear`]: residuals of a window and their derivatives
 //! - [`normal`]: the equations of all windows, their initial states eliminated
 //! - [`descent`]: Gauss-Newton steps with Levenberg's and Marquardt's damping
@@ -13,6 +14,7 @@
 //! continuity between windows, so that each window stands for itself. Time is counted in `1 / w_ref`
 //! with a fixed `w_ref` near `w0`; `w0` itself is the parameter [`Slot::Gravity`](problem::Slot).
 
+pub mod counted;
 pub mod descent;
 pub mod linear;
 pub mod normal;
@@ -22,6 +24,6 @@ pub mod rod_sensor;
 pub mod stages;
 pub mod window;
 
-pub use problem::{Free, Problem, Record, Slot};
+pub use problem::{Counts, Free, Problem, Record, Slot};
 pub use rod_sensor::RodSensor;
 pub use stages::{Fit, Settings, fit};

@@ -42,7 +42,7 @@ fn over<T: Send>(
         let (shaped, columns) = &records[window.record];
         let linear = linearise(problem, shaped, columns, window);
         let sound = linear.rows.iter().all(|slope| slope.is_finite());
-        (sound && linear.chi2().is_finite()).then(|| make(linear, columns))
+        (sound && linear.chi2.is_finite()).then(|| make(linear, columns))
     };
     // A thread costs more than a window of a few samples.
     match windows {
@@ -106,12 +106,16 @@ impl Block {
 /// All windows at one point of the search.
 #[derive(Clone, Debug)]
 pub struct Normal {
-    /// The sum of the squared residuals.
+    /// The sum of the squared residuals, or of the deviances of readings rounded to counts.
     pub chi2: f64,
     /// For each window the states at its samples.
     pub states: Vec<Vec<State>>,
     /// For each window the residuals over the standard errors.
     pub residuals: Vec<Vec<f64>>,
+    /// For each window reading less model.
+    pub apart: Vec<Vec<f64>>,
+    /// For each window what [`Linear::white`] makes of the residuals.
+    pub white: Vec<Vec<f64>>,
     blocks: Vec<Block>,
     count: usize,
 }
@@ -133,8 +137,9 @@ impl Normal {
     #[must_use]
     pub fn at(problem: &Problem, values: &[f64], windows: &[Window]) -> Option<Self> {
         let each = |linear: Linear, columns: &Columns| {
-            let (chi2, block) = (linear.chi2(), Block::new(&linear, columns.places().collect()));
-            (chi2, linear.states, linear.residuals, block)
+            let block = Block::new(&linear, columns.places().collect());
+            let white = linear.white();
+            (linear.chi2, linear.states, [linear.residuals, linear.apart, white], block)
         };
         let all = over(problem, values, windows, each)?;
         let count = problem.free.len();
@@ -142,14 +147,18 @@ impl Normal {
             chi2: 0.0,
             states: Vec::with_capacity(all.len()),
             residuals: Vec::with_capacity(all.len()),
+            apart: Vec::with_capacity(all.len()),
+            white: Vec::with_capacity(all.len()),
             blocks: Vec::with_capacity(all.len()),
             count,
         };
         // In the order of the windows: a sum does not depend on threads.
-        for (chi2, states, residuals, block) in all {
+        for (chi2, states, [residuals, apart, white], block) in all {
             normal.chi2 += chi2;
             normal.states.push(states);
             normal.residuals.push(residuals);
+            normal.apart.push(apart);
+            normal.white.push(white);
             normal.blocks.push(block);
         }
         Some(normal)

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::counted::surplus;
 use super::rod_sensor::RodSensor;
 use crate::error::Error;
 use crate::model::effects::Action;
@@ -28,8 +29,41 @@ pub struct Record {
     pub angles: Option<Vec<f64>>,
     /// One over the standard error of each reading; 0 for readings that are not to be trusted.
     pub weights: Vec<f64>,
+    /// The counts that readings were rounded to; then their standard errors are those before. None
+    /// where these hold the rounding.
+    pub counts: Option<Counts>,
     /// The longest window, times `w_ref`; infinite where one may cover the whole record.
     pub longest: f64,
+}
+
+/// Counts of a sensor.
+#[derive(Clone, Debug)]
+pub struct Counts {
+    /// The step from one to the next, in the unit of the readings.
+    pub step: f64,
+    /// For each sample what its deviance has above that of a value, see [`surplus`].
+    pub surplus: Vec<f64>,
+}
+
+impl Counts {
+    /// Counts of `step` for readings with one over the standard errors `weights`.
+    ///
+    /// # Errors
+    /// [`Error::Range`] for a step that is not above 0.
+    pub fn new(step: f64, weights: &[f64]) -> Result<Self, Error> {
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(range("count", step, "a number above 0"));
+        }
+        let mut last = (0.0, 0.0);
+        let of = |weight: &f64| {
+            // Neighbours mostly have the same, and it takes an integral.
+            if *weight > 0.0 && *weight != last.0 {
+                last = (*weight, surplus(step, *weight));
+            }
+            last.1
+        };
+        Ok(Self { step, surplus: weights.iter().map(of).collect() })
+    }
 }
 
 /// A place for a number in a pendulum.

@@ -14,7 +14,7 @@ use crate::fit::descent::Point;
 use crate::fit::normal::linearised;
 use crate::fit::profile::intervals;
 use crate::fit::window::Window;
-use crate::fit::{Free, Problem, Record, RodSensor, Settings, Slot, fit};
+use crate::fit::{Counts, Free, Problem, Record, RodSensor, Settings, Slot, fit};
 use crate::model::Recorded;
 use crate::model::recorded::{Quantity, Samples};
 
@@ -73,6 +73,7 @@ pub struct Run<'py> {
     time: Floats<'py>,
     reading: Floats<'py>,
     weight: Floats<'py>,
+    count: Option<f64>,
     longest: f64,
     pivot: Option<Pivot<'py>>,
     rod_sensor: Option<Sensor<'py>>,
@@ -92,12 +93,15 @@ impl Run<'_> {
                 interval,
                 tilt: 0.0,
             });
+        let weights = self.weight.as_slice()?.to_vec();
+        let counts = self.count.map(|step| Counts::new(step, &weights)).transpose()?;
         Ok(Record {
             pendulum: pendulum(self.parameters)?,
             recorded: recorded.map(Arc::new),
             times: self.time.as_slice()?.to_vec(),
             readings: self.reading.as_slice()?.to_vec(),
-            weights: self.weight.as_slice()?.to_vec(),
+            weights,
+            counts,
             rod_sensor,
             angles,
             longest: self.longest,
@@ -185,9 +189,9 @@ pub fn fit_equations<'py>(
     point(py, &problem, &at)
 }
 
-/// The derivatives behind the equations, window by window: `(free parameters, rows, residuals)`, a
-/// row for each sample with the derivatives of the model over the standard error by these parameters
-/// and by the initial angle and velocity.
+/// The derivatives behind the equations, window by window: `(free parameters, rows, residuals,
+/// weights)`, a row for each sample with the derivatives of the model, times its weight, by these
+/// parameters and by the initial angle and velocity.
 #[pyfunction]
 pub fn fit_rows<'py>(
     py: Python<'py>,
@@ -205,7 +209,9 @@ pub fn fit_rows<'py>(
     for (linear, window) in all.into_iter().zip(&windows) {
         let places: Vec<usize> = problem.columns(window.record).places().collect();
         let rows = linear.rows.into_pyarray(py).reshape([linear.residuals.len(), linear.width])?;
-        list.append((places, rows, linear.residuals.into_pyarray(py)))?;
+        let arrays = [linear.residuals, linear.weights].map(|values| values.into_pyarray(py));
+        let [residuals, weights] = arrays;
+        list.append((places, rows, residuals, weights))?;
     }
     Ok(list)
 }
@@ -224,17 +230,18 @@ fn point<'py>(py: Python<'py>, problem: &Problem, at: &Point) -> PyResult<Bound<
     let runs = PyList::empty(py);
     for (index, record) in problem.records.iter().enumerate() {
         // Where no window is, nothing is known.
-        let mut curve = [(); 3].map(|()| vec![f64::NAN; record.times.len()]);
-        let windows = at.windows.iter().zip(&at.normal.states).zip(&at.normal.residuals);
-        for ((window, states), residuals) in windows.filter(|((w, _), _)| w.record == index) {
-            for (k, (state, residual)) in states.iter().zip(residuals).enumerate() {
-                for (column, value) in curve.iter_mut().zip([state[0], state[1], *residual]) {
+        let mut curve = [(); 4].map(|()| vec![f64::NAN; record.times.len()]);
+        for (place, window) in at.windows.iter().enumerate().filter(|(_, w)| w.record == index) {
+            let (apart, white) = (&at.normal.apart[place], &at.normal.white[place]);
+            for (k, state) in at.normal.states[place].iter().enumerate() {
+                let values = [state[0], state[1], apart[k], white[k]];
+                for (column, value) in curve.iter_mut().zip(values) {
                     column[window.from + k] = value;
                 }
             }
         }
         let run = PyDict::new(py);
-        for (name, column) in ["theta", "velocity", "residual"].into_iter().zip(curve) {
+        for (name, column) in ["theta", "velocity", "residual", "white"].into_iter().zip(curve) {
             run.set_item(name, column.into_pyarray(py))?;
         }
         runs.append(run)?;

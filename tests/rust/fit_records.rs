@@ -49,6 +49,7 @@ pub fn record(
         rod_sensor: None,
         angles: None,
         weights,
+        counts: None,
         longest: f64::INFINITY,
     }
 }

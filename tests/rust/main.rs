@@ -6,7 +6,7 @@
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`effects`]: the library, each effect in every respect
 //! - [`formulas`]: effects that users write; [`rewritten`]: the library's as such
-//! - [`fit`], [`fit_derivatives`]: parameters from records
+//! - [`fit`], [`fit_derivatives`], [`fit_counts`]: parameters from records
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
@@ -24,6 +24,7 @@ mod effects_in_lanes;
 mod elementary;
 mod exact;
 mod fit;
+mod fit_counts;
 mod fit_derivatives;
 mod fit_records;
 mod formulas;

@@ -150,8 +150,7 @@ def _spectrum(
 
     run, first, last = window[:3]
     record = runs[run]
-    sigma = np.broadcast_to(np.asarray(record.sigma, np.float64), record.time.shape)[first:last]
-    residual = fit.residuals[run][first:last] / sigma
+    residual = fit.white[run][first:last]
     good = np.isfinite(residual)
     if record.trusted is not None:
         good &= record.trusted[first:last]

@@ -222,10 +222,10 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
     """
     own = slice(window.first, window.first + len(window.residual))
     time = run.time[own]
-    sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)[own]
     if time.size < 3:  # noqa: PLR2004 (no slope)
         return np.zeros(torques.shape)
-    a, b = (window.states * sigma[:, None]).T
+    weight = window.weight
+    a, b = (window.states / np.where(weight > 0, weight, 1.0)[:, None]).T
     wronskian = a * np.gradient(b, time) - np.gradient(a, time) * b
     sound = np.abs(wronskian) > LOST * float(np.max(np.abs(wronskian)))
     inverse = np.where(sound, 1.0 / np.where(sound, wronskian, 1.0), 0.0)
@@ -236,9 +236,8 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
         summed = np.cumsum(steps * rate, axis=0)
         return np.asarray(summed - 0.5 * steps * rate, np.float64)
 
-    return np.asarray(
-        (b[:, None] * integral(a) - a[:, None] * integral(b)) / sigma[:, None], np.float64
-    )
+    response = b[:, None] * integral(a) - a[:, None] * integral(b)
+    return np.asarray(response * weight[:, None], np.float64)
 
 
 def _solved(

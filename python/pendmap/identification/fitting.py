@@ -48,7 +48,8 @@ class TrajectoryFit:
     covariance : ndarray of float, shape (k, k)
         In SI.
     chi2 : float
-        The sum of the squared residuals over the standard errors.
+        The sum of the squared residuals over the standard errors; of readings that are intervals
+        twice minus the logarithm of the likelihood, less what makes it one for each reading.
     samples, degrees : int
         How many samples count; the same less what was adapted to them.
     rms : float
@@ -62,6 +63,9 @@ class TrajectoryFit:
     residuals : tuple of ndarray of float, shape (n,)
         For each run what the sensor read less the model's reading, rad; 0 where a sample does not
         count.
+    white : tuple of ndarray of float, shape (n,)
+        The same over the standard errors, so that noise has unit variance; of readings that are
+        intervals the slope of the likelihood over its root mean square.
     windows : tuple of (int, int, int, float, float)
         Run, first sample, one after the last, angle (rad) and velocity (rad/s) at its first sample.
     steps : int
@@ -84,6 +88,7 @@ class TrajectoryFit:
     model: Rig
     curves: tuple[NDArray[np.float64], ...]
     residuals: tuple[NDArray[np.float64], ...]
+    white: tuple[NDArray[np.float64], ...]
     windows: tuple[tuple[int, int, int, float, float], ...]
     steps: int
     converged: bool
@@ -111,7 +116,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     """Return the pendulum that fits records best, by weighted least squares.
 
     The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free
-    parameters and over an initial state for each window. Windows begin with about one swing and
+    parameters and over an initial state for each window; where readings are intervals, by counts
+    coarser than the noise, ``-2 log P`` of them stands for the square. Windows begin with about one swing and
     grow fourfold from stage to stage, to the whole record of a free decay.
 
     Parameters
@@ -275,9 +281,9 @@ def _result(  # noqa: PLR0913, PLR0917 (all that the fit had, and what came of i
             (low, high) if math.isfinite(low) and math.isfinite(high) else None,
         )
     curves, residuals, squares = [], [], 0.0
-    for run, curve in zip(runs, found["runs"], strict=True):
+    for curve in found["runs"]:
         curves.append(np.stack([curve["theta"], units.given(curve["velocity"], 1)]))
-        residuals.append(curve["residual"] * run.sigma)
+        residuals.append(curve["residual"])
         squares += float(np.nansum(residuals[-1] ** 2))
     return TrajectoryFit(
         estimates=estimates,
@@ -290,6 +296,7 @@ def _result(  # noqa: PLR0913, PLR0917 (all that the fit had, and what came of i
         model=_found_model(model, estimates),
         curves=tuple(curves),
         residuals=tuple(residuals),
+        white=tuple(curve["white"] for curve in found["runs"]),
         windows=tuple(
             (r, a, b, theta, float(units.given(v, 1))) for r, a, b, theta, v in found["windows"]
         ),

@@ -68,6 +68,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         lab_time_s=run.lab_time_s + first,
         name=run.name,
         rod_sensor=_rod_sensor(run),
+        count=reading.interval,
     )
 
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["Reading", "reading_of"]
 
 DITHERED: Final = 0.45
-"""Noise below this part of a count no longer makes the errors of successive readings different."""
+"""Noise below this part of a count, the rounding included, no longer makes the errors of successive
+readings different: a fit takes them for intervals."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,8 +35,7 @@ class Reading:
     count : float
         The step of the sensor, rad; 0 where none is seen.
     each : ndarray of float, shape (n,)
-        For a fit, by the noise at their speed: readings that stay on one count, undisturbed by
-        noise, all have the same error, so that together they say what one of them says.
+        For a fit, by the noise at their speed.
     doubt : float
         Relative standard error of ``sigma``.
     coarse : bool
@@ -62,6 +62,11 @@ class Reading:
     shift: NDArray[np.float64] | float = 0.0
     gain: float = 1.0
     unit: str = "rad"
+
+    @property
+    def interval(self) -> float | None:
+        """The count, rad, where a fit takes readings for intervals."""
+        return self.count if self.coarse else None
 
 
 def reading_of(
@@ -107,20 +112,9 @@ def reading_of(
     least = max(count / math.sqrt(12), 1e-15)
     sigma = max(sigma, least)
     coarse = sigma < DITHERED * count
-    each = alike = _on_one_count(np.full(theta.shape, sigma), theta, count)
+    each = alike = np.full(theta.shape, sigma)
     if law is None:
         return Reading(sigma, count, each, doubt, coarse, alike)
-    each = _on_one_count(np.maximum(law.sigma(time, theta), least), theta, count)
+    each = np.maximum(law.sigma(time, theta), least)
     return Reading(sigma, count, each, doubt, coarse, alike, law, law.shift(time, theta))
 
-
-def _on_one_count(
-    errors: NDArray[np.float64], theta: NDArray[np.float64], count: float
-) -> NDArray[np.float64]:
-    """Return errors with those of readings that stay on one count taken for one reading's."""
-    stuck = errors < DITHERED * count
-    if not stuck.any():
-        return errors
-    change = np.flatnonzero(np.diff(theta) != 0) + 1
-    lengths = np.diff(np.concatenate([[0], change, [len(theta)]]))
-    return errors * np.where(stuck, np.sqrt(np.repeat(lengths, lengths)), 1.0)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pendmap.model.units import Units
 
 __all__ = [
+    "SHARPEST",
     "FitRun",
     "Pivot",
     "RodSensor",
@@ -35,6 +36,10 @@ and what is not known of a state grows in them."""
 
 EXACTNESS: Final = 1e-6
 """The integrator's error allowed to a step, over the smallest standard error of a reading."""
+
+SHARPEST: Final = 0.1
+"""The least noise before the rounding, over a count: the edges of real counts are not perfect, and
+readings that may not err at all would be walls to a search."""
 
 TOLERANCES: Final = (1e-13, 1e-8)
 """Its least and its greatest value."""
@@ -106,7 +111,7 @@ class FitRun:
     theta : ndarray of float, shape (n,)
         What the sensor read, rad, unwrapped; of a sensor on the rod in the unit of its factors.
     sigma : float or ndarray of float, shape (n,)
-        Standard error of the readings, rad; above 0.
+        Standard error of the readings, rad; above 0; the rounding to counts included.
     trusted : ndarray of bool, shape (n,), or None
         Which samples count; all if none.
     drive : mapping of str to float or None
@@ -121,6 +126,9 @@ class FitRun:
         What to call it.
     rod_sensor : RodSensor or None
         What read, if it was no sensor of the angle; effects on the reading do not act on it.
+    count : float or None
+        The step of the sensor, rad, where readings are intervals: the angle with the noise lay
+        within half a count of what was read. None where ``sigma`` says all.
     """
 
     time: NDArray[np.float64]
@@ -133,6 +141,7 @@ class FitRun:
     longest_s: float | None = None
     name: str = ""
     rod_sensor: RodSensor | None = None
+    count: float | None = None
 
     @property
     def angle(self) -> NDArray[np.float64]:
@@ -161,7 +170,7 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
     sigma = np.broadcast_to(np.asarray(run.sigma, dtype=np.float64), time.shape)
     if not (np.all(np.isfinite(sigma)) and np.all(sigma > 0)):
         raise InputError("sigma is not above 0 everywhere: allowed are finite numbers above 0")
-    weight = 1.0 / sigma
+    weight = 1.0 / (sigma if run.count is None else _before_rounding(sigma, run.count))
     if run.trusted is not None:
         weight = np.where(np.asarray(run.trusted, dtype=bool), weight, 0.0)
     longest = run.longest_s
@@ -172,10 +181,17 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
         "time": units.bare(time, -1),
         "reading": theta,
         "weight": np.ascontiguousarray(weight),
+        "count": run.count,
         "longest": float(units.bare(longest, -1)),
         "pivot": None if run.pivot is None else _bare_pivot(run.pivot, rig, units),
         "rod_sensor": _bare_sensor(run, units),
     }
+
+
+def _before_rounding(sigma: NDArray[np.float64], count: float) -> NDArray[np.float64]:
+    """Return the noise before readings were rounded, ``sqrt(sigma^2 - count^2 / 12)``."""
+    least = (SHARPEST * count) ** 2
+    return np.asarray(np.sqrt(np.maximum(sigma**2 - count**2 / 12, least)), np.float64)
 
 
 def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:

@@ -71,7 +71,9 @@ class WindowSlopes:
     states : ndarray of float, shape (n, 2)
         By the initial angle, and by the initial velocity in rad per ``1 / w0``.
     residual : ndarray of float, shape (n,)
-        Reading less model.
+        Reading less model; of readings that are intervals the residual that stands for it.
+    weight : ndarray of float, shape (n,)
+        One over the standard errors, or what stands for it.
     """
 
     run: int
@@ -79,6 +81,7 @@ class WindowSlopes:
     columns: NDArray[np.float64]
     states: NDArray[np.float64]
     residual: NDArray[np.float64]
+    weight: NDArray[np.float64]
 
     def freed(
         self, further: NDArray[np.float64]
@@ -120,10 +123,11 @@ def window_slopes(
         raise InputError(str(error)) from None
     slopes = np.array([q.slope(b, units) for q, (_, b) in zip(quantities, bare, strict=True)])
     all_slopes = []
-    for (places, rows, residual), window in zip(found, fit.windows, strict=True):
+    for (places, rows, residual, weight), window in zip(found, fit.windows, strict=True):
         columns = np.zeros((len(rows), len(quantities)))
         columns[:, places] = rows[:, :-STATE] / slopes[places]
-        all_slopes.append(WindowSlopes(window[0], window[1], columns, rows[:, -STATE:], residual))
+        states = rows[:, -STATE:]
+        all_slopes.append(WindowSlopes(*window[:2], columns, states, residual, weight))
     return tuple(q.name for q in quantities), all_slopes
 
 

@@ -185,7 +185,14 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
         raise InputError("trusted and time differ in length: they must be as many")
     elapsed, first = from_first(time)
     reading = reading_of(elapsed, theta, sigma, trusted=good)
-    run = FitRun(elapsed, theta - reading.shift, reading.each, trusted=good, lab_time_s=first)
+    run = FitRun(
+        elapsed,
+        theta - reading.shift,
+        reading.each,
+        trusted=good,
+        lab_time_s=first,
+        count=reading.interval,
+    )
     found, (reading,) = fit_from_start(
         [run],
         [reading],
@@ -234,6 +241,6 @@ def _warnings(
     if coarse:
         found.append(
             f"the sensor's count ({', '.join(dict.fromkeys(coarse))}) is coarser than its noise: "
-            "readings on one count are taken for one"
+            "readings are taken for intervals"
         )
     return found

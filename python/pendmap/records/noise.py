@@ -9,7 +9,8 @@ gain, is noise. Three things spoil that, and each has its remedy here:
   are then alike and the residual does not see them. Samples further apart are taken, where the
   pendulum passes at least a count from one to the next; slower than that nothing can be said but
   that an even error within a count has the standard deviation count/sqrt(12), and that is the
-  least that is reported.
+  least that is reported. Where nothing moves, how often each count is shown says more
+  (:mod:`pendmap.records.still`).
 - Outliers: what is beyond eight standard deviations (robust, from quantiles, among samples of
   similar speed) is left out with all windows that it is part of, then a plain root mean square is
   taken. The median alone would be wrong by a tenth for the even errors of a counter.
@@ -31,6 +32,7 @@ from pendmap.records.jitter import SpeedLaw, law_of, speed_of
 from pendmap.records.local_fit import LocalFit, local_fit
 from pendmap.records.robust import broad_scale
 from pendmap.records.steps import step_of
+from pendmap.records.still import still_noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -204,6 +206,9 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
         nearest = fit if swing * interval > EVERY else None
         apart = _apart(time, theta, bad, speed, count, interval, swing, nearest)
         if apart is None:
+            still = still_noise(theta if bad.all() else theta[~bad], count)
+            if still is not None:
+                return NoiseFloor(*still, colour=colour, samples=int(theta.size))
             return NoiseFloor(max(least, _rms(fit)), least / 10, (), True, colour)  # noqa: FBT003
         fit, slowest = apart
         law = None
