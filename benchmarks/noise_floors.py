@@ -1,17 +1,17 @@
 """Noise floors of records, seen without a model, over the errors that such readings have.
 
 Free decays into rest, rotations kept up by a torque, and rest, 60 s each, read by sensors of 128 to
-8192 counts at 30 to 1000 Hz with Gaussian noise before the rounding. Motions are scipy's (DOP853,
-rtol 1e-10). "over" is the median over the seeds of what `noise_of` says over what such a reading errs by,
-sqrt(noise^2 + count^2 / 12); "farthest" is that of single records. At rest a sensor whose noise does
-not reach the next count shows one alone: what it says is then the count's.
+8192 counts at 30 to 1000 Hz with Gaussian noise (degrees) before the rounding. Motions are scipy's
+(DOP853, rtol 1e-10). "over" is the median over the seeds of what `noise_of` says over what such a
+reading errs by, sqrt(noise^2 + count^2 / 12); "farthest" is that of the single record farthest off.
+At rest a sensor whose noise does not reach the next count shows one alone, and its noise is not seen.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from scipy.integrate import solve_ivp
 
 from peers.report import machine, note, say, table
 from pendmap.records.noise import noise_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 COUNTS = (128, 256, 512, 1024, 2048, 4096, 8192)
 RATES = (30.0, 100.0, 300.0, 1000.0)

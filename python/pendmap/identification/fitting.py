@@ -117,8 +117,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
 
     The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free
     parameters and over an initial state for each window; where readings are intervals, by counts
-    coarser than the noise, ``-2 log P`` of them stands for the square. Windows begin with about one swing and
-    grow fourfold from stage to stage, to the whole record of a free decay.
+    coarser than the noise, ``-2 log P`` of them stands for the square. Windows begin with about one
+    swing and grow fourfold from stage to stage, to the whole record of a free decay.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         )
     except ValueError as error:
         raise InputError(str(error)) from None
-    return _result(found, runs, model, quantities, chosen, units)
+    return _result(found, model, quantities, chosen, units)
 
 
 def score(
@@ -257,9 +257,8 @@ def prepared(
     return free_quantities(runs, rigs, free, start), given
 
 
-def _result(  # noqa: PLR0913, PLR0917 (all that the fit had, and what came of it)
+def _result(
     found: Mapping[str, Any],
-    runs: Sequence[FitRun],
     model: Rig,
     quantities: Sequence[Quantity],
     chosen: Sequence[int],

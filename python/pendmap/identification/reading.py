@@ -117,4 +117,3 @@ def reading_of(
         return Reading(sigma, count, each, doubt, coarse, alike)
     each = np.maximum(law.sigma(time, theta), least)
     return Reading(sigma, count, each, doubt, coarse, alike, law, law.shift(time, theta))
-

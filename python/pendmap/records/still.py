@@ -2,9 +2,9 @@
 
 At rest a sensor whose noise is less than a count goes to and fro between two or three. How often it
 shows each depends on where between two edges the angle is, ``x``, and on the noise ``s`` before the
-rounding: ``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. The root mean square of
-such readings is anything from 0 to half a count. Three counts tell ``x`` and ``s``; two leave a range
-of both, over which is averaged, all ``x`` and all ``log s`` being as likely before.
+rounding: ``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. The root mean square
+of such readings is anything from 0 to half a count. Three counts tell ``x`` and ``s``; two leave a
+range of both, over which is averaged, all ``x`` and all ``log s`` being as likely before.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def still_noise(theta: NDArray[np.float64], count: float) -> tuple[float, float]
         Both in rad: mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. None where one
         count alone is shown, or something moves.
     """
-    from scipy.special import log_ndtr, logsumexp, ndtr  # noqa: PLC0415 (where it is needed)
+    from scipy.special import log_ndtr, logsumexp, ndtr
 
     steps = np.rint((theta - np.median(theta)) / count).astype(int)
     low, high = int(steps.min()), int(steps.max())
