@@ -28,6 +28,7 @@ os.environ.update(
 
 import numpy as np
 
+import blind_answer
 import blind_cases
 import blind_report
 from peers.report import machine, note, say, table
@@ -83,7 +84,7 @@ def main() -> None:
             ProcessPoolExecutor(given.workers) as pool,
             given.out.open("a", encoding="utf-8") as out,
         ):
-            for done, row in enumerate(pool.map(blind_cases.run, left), 1):
+            for done, row in enumerate(pool.map(blind_answer.run, left), 1):
                 out.write(json.dumps({"run": seed} | row, default=float) + "\n")
                 out.flush()
                 rows.append(row)

@@ -78,3 +78,17 @@ def test_what_no_library_has_is_unknown(tmp_path: Path) -> None:
     assert found.judgement.left > 5
     # The model that is given out is the baseline: nothing is added that is not claimed.
     assert found.best.trial.chosen == ()
+
+
+def test_what_a_first_step_would_lose_is_found(tmp_path: Path) -> None:
+    # Through runs that amplify each step a thousandfold, from where nothing is added yet.
+    found, _ = diagnosed(
+        tmp_path,
+        *("asymmetric_viscous", "drive_frequency"),
+        seed=2136559900,
+        size=0.12462361682953052,
+        noise=0.12285742100008451,
+    )
+    assert found.verdict != "unknown"
+    assert "asymmetric_viscous" in _names(found)
+    assert found.best.held.chi2 < found.base.held.chi2

@@ -49,7 +49,7 @@ class Form:
         return min(min(others) * len(others), 1.0)
 
 
-def form_of(scores: Scores, level: float, *, torque: float, left: float, runs: float) -> Form:
+def form_of(scores: Scores, level: float, *, torque: float, slow: float, runs: float) -> Form:
     """Return what is left.
 
     Parameters
@@ -60,12 +60,12 @@ def form_of(scores: Scores, level: float, *, torque: float, left: float, runs: f
         Of the noise.
     torque : float
         Chance that noise leaves as much torque in bins.
-    left : float
-        The slow part of the residuals over its standard error.
+    slow : float
+        Chance that noise leaves as much in the slow part of the residuals.
     runs : float
         Chance that noise makes the runs' parameters differ so much.
     """
-    from scipy.stats import chi2, norm  # noqa: PLC0415 (where it is needed)
+    from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
 
     shapes = Counter(score.candidate.name for score in scores.scores)
     best = scores.best()
@@ -79,7 +79,7 @@ def form_of(scores: Scores, level: float, *, torque: float, left: float, runs: f
     chances = {
         "effects": 1.0 if further is None else min(tails[further] * len(tails), 1.0),
         "torque": torque,
-        "slow": float(norm.sf(left)),
+        "slow": slow,
         "runs": runs,
     }
     return Form(chances, further)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -65,6 +65,9 @@ class Remainder:
         Its standard error from the noise alone.
     by_run : tuple of float
         The same for each run, over its own standard error.
+    chance : float
+        That noise alone leaves so much, in all runs together or in any of them: Fisher's F of the
+        slow part over the rest, times how often was looked (Bonferroni).
     """
 
     level: float
@@ -72,6 +75,7 @@ class Remainder:
     excess: float
     stderr: float
     by_run: tuple[float, ...]
+    chance: float
 
     @property
     def z(self) -> float:
@@ -101,9 +105,11 @@ def remainder_of(fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int) -> Re
     adapted : int
         How many parameters were adapted to them.
     """
+    from scipy.stats import f  # noqa: PLC0415 (where it is needed)
+
     spectra = [s for s in (_spectrum(fit, runs, w) for w in fit.windows) if s is not None]
     if not spectra:
-        return Remainder(1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs))
+        return Remainder(1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs), 1.0)
     quick = np.concatenate([s.quick for s in spectra])
     cosines = np.concatenate([s.cosines for s in spectra])
     colour = _colour(quick, cosines)
@@ -115,6 +121,7 @@ def remainder_of(fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int) -> Re
     excess = float(np.sum(slow / at_slow)) - degrees
     stderr = math.sqrt(2 * slow.size + 2 * slow.size**2 / max(quick.size, 1))
     by_run = []
+    chances = [_beyond(excess + degrees, degrees, quick.size, f)]
     for k in range(len(runs)):
         own = [s for s in spectra if s.run == k]
         size = sum(s.slow.size for s in own)
@@ -124,7 +131,16 @@ def remainder_of(fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int) -> Re
         share = adapted * size / max(slow.size, 1)
         free = size - sum(s.states for s in own) - share
         by_run.append((total - free) / math.sqrt(2 * max(size, 1)))
-    return Remainder(level, colour, excess, stderr, tuple(by_run))
+        # By its own noise: a run's standard error is not known better than to a few per cent.
+        rest = np.concatenate([s.quick * _shape(colour, s.cosines) for s in own] or [quick])
+        chances.append(_beyond(total * innovation / float(np.mean(rest)), free, rest.size, f))
+    chance = min(min(chances) * len(chances), 1.0)
+    return Remainder(level, colour, excess, stderr, tuple(by_run), chance)
+
+
+def _beyond(total: float, degrees: float, others: int, law: Any) -> float:  # noqa: ANN401 (scipy's)
+    """Return the chance of so great a sum of squares, over the mean square of the rest."""
+    return float(law.sf(total / degrees, degrees, others)) if degrees > 0 else 1.0
 
 
 def _shape(colour: float, cosines: Floats) -> Floats:

@@ -35,8 +35,10 @@ BENDS: Final = 2
 SLIGHT: Final = 1.0
 """Of a sum of squares: a shape that promises less is where it should be."""
 
-KICK: Final = 0.1
-"""Part of the score's step from which a candidate is fitted a second time."""
+KICK: Final = 1e-3
+"""Part of the score's step from which a candidate is fitted. The step belongs to one of all other
+parameters and initial states; by itself it may lead far astray, and from nearly nothing the first
+step of the fit is the whole of it. A phase needs some size to be anything."""
 
 SHORT: Final = 0.8
 """A first fit that gains less than this part of what the score promised is tried again."""
@@ -81,17 +83,20 @@ class Refits:
         added: Sequence[Candidate],
     ) -> Found | None:
         start = {n: v for k in places for n, v in scores.scores[k].start.items()}
-        found = self._fit(trial, added, start)
-        if len(added) == 1 and added[0].adapted:
+        sizes = {candidate.free[0] for candidate in added}
+        kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
+        adapted = len(added) == 1 and bool(added[0].adapted)
+        # A shape that is adapted too needs its effect's size from the start.
+        first, second = (start, kick) if adapted else (kick, start)
+        found = self._fit(trial, added, first)
+        if adapted:
             for k in self._other_shapes(scores, places[0]):
                 bent = scores.scores[k]
                 again = self._fit(trial, [bent.candidate], bent.start)
                 found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
         promised = scores.together(places)
         if found is None or trial.chi2 - found.chi2 < SHORT * promised:
-            sizes = {candidate.free[0] for candidate in added}
-            kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
-            other = self._fit(trial, added, kick)
+            other = self._fit(trial, added, second)
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
         if found is None:
             return None

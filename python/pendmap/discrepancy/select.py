@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.baseline import taken_by
@@ -27,12 +28,20 @@ where nothing is missing."""
 GAIN: Final = 12.0
 """The least fall of the BIC for which an effect is accepted."""
 
+CHANCE: Final = 5e-4
+"""Or the chance of what it gains, times how many were looked at: for several parameters at once the
+BIC asks for more than that."""
+
 REFITTED: Final = 4
 """So many candidates are refitted, those with the greatest scores."""
 
 LOSS: Final = 4.0
 """By so much a model may be worse on what was held back and still be accepted: two standard
 errors of what a parameter that is right, but not exact, does there."""
+
+SCATTER: Final = 3.0
+"""And by so many standard errors less than is expected: an effect that gains ``G`` where it was
+fitted gains ``f G``, give or take ``2 sqrt(f G)``, of ``f`` times as many samples held back."""
 
 PAIRED: Final = 8
 """Pairs are looked for among so many candidates."""
@@ -254,9 +263,22 @@ class Search:
     def accepts(self, current: Found, found: Found) -> bool:
         """Whether a model is better than one with fewer effects, by more than chance."""
         level = self.level()
-        fall = current.trial.bic(level) - found.trial.bic(level)
         held = (current.held.chi2 - found.held.chi2) / level
-        return fall >= GAIN and held >= -LOSS
+        share = current.held.degrees / max(current.trial.fit.degrees, 1)
+        expected = max(current.trial.chi2 - found.trial.chi2, 0.0) / level * share
+        least = min(expected - SCATTER * 2 * math.sqrt(expected), 0.0) - LOSS
+        return self._gains(current.trial, found.trial) and held >= least
+
+    def _gains(self, rest: Trial, full: Trial) -> bool:
+        """Whether further effects gain more than chance."""
+        from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
+
+        level = self.level()
+        if rest.bic(level) - full.bic(level) >= GAIN:
+            return True
+        looked = len(self.scores(rest).scores)
+        more = full.adapted - rest.adapted
+        return bool(looked * chi2.sf((rest.chi2 - full.chi2) / level, more) < CHANCE)
 
     def _note(
         self, current: Found, found: Found, scores: Scores, places: Sequence[int], *, good: bool
@@ -308,7 +330,7 @@ class Search:
                 rest = self.less(best.trial, candidate)
             except InputError:
                 continue  # without it there is no motion to speak of: it is not idle
-            if rest.bic(level) - best.trial.bic(level) < GAIN:
+            if not self._gains(rest, best.trial):
                 shorter = Found(rest, tried(self.evidence, rest))
                 return self._without_idle(shorter) if len(rest.chosen) > 1 else shorter
             scores = self.scores(rest)
@@ -318,7 +340,9 @@ class Search:
                 if scores.scores[k].gain < rest_gain:
                     break
                 other = self.refit(rest, scores, [k])
-                if other is not None and other.trial.bic(level) < best.trial.bic(level) - 1:
+                if other is None or other.held.chi2 > best.held.chi2 + LOSS * level:
+                    continue  # better where it was fitted alone
+                if other.trial.bic(level) < best.trial.bic(level) - 1:
                     self._note(Found(rest, best.held), other, scores, [k], good=True)
                     return self._without_idle(other)
         return best

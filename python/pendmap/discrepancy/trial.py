@@ -107,10 +107,13 @@ class Trial:
             By which sums of squares are divided, so that noise that is coloured or stronger than
             stated counts as noise.
         """
-        count = len(self.fit.names) + sum(
-            c.count - len(c.free) - len(c.adapted) for c in self.chosen
-        )
-        return self.chi2 / level + count * math.log(max(self.fit.samples / level, 2.0))
+        return self.chi2 / level + self.adapted * math.log(max(self.fit.samples / level, 2.0))
+
+    @property
+    def adapted(self) -> int:
+        """How many numbers were adapted to the records, shapes that were scanned among them."""
+        scanned = sum(c.count - len(c.free) - len(c.adapted) for c in self.chosen)
+        return len(self.fit.names) + scanned
 
 
 def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)

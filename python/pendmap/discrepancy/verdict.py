@@ -32,6 +32,13 @@ CLOSED: Final = 0.75
 CHANCE: Final = 1e-3
 """Chance of what is left below which it is no chance: a tenth of the false alarms allowed."""
 
+FAINT: Final = 60.0
+"""Gain of effects that close no gap to speak of: of these nothing is asked but that what is left
+shows in no torque, no residual and no run."""
+
+DOUBTFUL: Final = 0.5
+"""Probability below which names are more likely wrong than right: none is claimed."""
+
 SURE: Final = 0.9
 """Probability that names are right below which they are given with reserve."""
 
@@ -119,7 +126,13 @@ def judge(
     ratio = trial.chi2 / degrees
     # The greatest of several runs is greater by chance.
     left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
-    form = form_of(search.scores(trial), search.level(), torque=chance, left=left, runs=runs.chance)
+    form = form_of(
+        search.scores(trial),
+        search.level(),
+        torque=chance,
+        slow=trial.remainder.chance,
+        runs=runs.chance,
+    )
     # What an effect would take up that was too weak to be accepted is not unknown.
     rest = (form.chance if trial.chosen else form.unnamed) < CHANCE
     closed = _closed(search, best)
@@ -127,10 +140,14 @@ def judge(
     standings = tuple(standing_of(search, best, candidate) for candidate in trial.chosen)
     sure = complete(form.chance, [s.gain for s in standings]) if standings else 1.0
     verdict: Verdict
+    faint = sum(standing.gain for standing in standings) < FAINT and form.unnamed >= CHANCE
     if not trial.chosen:
         verdict = "unknown" if rest else "none"
-    elif rest:
-        verdict = "partial" if closed >= CLOSED and spread <= SPREAD else "unknown"
+    elif rest and not faint:
+        most = closed >= CLOSED and spread <= SPREAD and sure >= DOUBTFUL
+        verdict = "partial" if most else "unknown"
+    elif sure < DOUBTFUL and not faint:
+        verdict = "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
     else:

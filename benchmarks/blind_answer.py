@@ -1,0 +1,113 @@
+"""One blind experiment: diagnosed, and put beside its truth."""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+import time
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from blind_cases import SOUND, Case, record
+from blind_difficulty import difficulty
+from pendmap import virtual_rig
+from pendmap.discrepancy import diagnose
+from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.evidence import evidence_of
+from pendmap.errors import InputError
+from pendmap.model.effects import library
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy import Discrepancy
+
+FAMILIES = {
+    "damping": "damping",
+    "friction": "dry friction",
+    "load": "dry friction",
+    "torque": "position torque",
+    "inertia": "position torque",
+    "stand": "position torque",
+    "drive": "drive",
+    "reading": "reading",
+}
+"""Of effects that only the rig has, by the rig's groups; those of the library it says itself."""
+
+
+def family(effect: str) -> str:
+    """Return the family of an effect, with or without a variant."""
+    name = effect.partition(":")[0]
+    if name in library():
+        return str(library()[name]["family"])
+    groups = {e["name"].split(":")[0]: e["group"] for e in virtual_rig.describe()}
+    return FAMILIES[groups[name]]
+
+
+def run(case: Case) -> dict[str, Any]:
+    """Make, diagnose and judge one case."""
+    result: dict[str, Any] = dataclasses.asdict(case)
+    result["families"] = [family(effect) for effect in case.effects if effect != "none"]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        # How hard it is does not count what spoils the records.
+        plain = dataclasses.replace(case, **SOUND)
+        try:
+            asked = folder / "asked"
+            asked.mkdir()
+            experiment, _ = record(case, asked)
+            hard: dict[str, Any] = {"G": [], "s": 1.0, "equals": [], "beyond": 0.0}
+            without: list[str] = []
+            if case.effects != ("none",):
+                base = baseline(
+                    evidence_of(record(plain, folder)[0] if plain != case else experiment)
+                )
+                hard, alike = difficulty(plain, folder, base)
+                if case.what == "withheld":
+                    own = [effect.split(":")[0] for effect in case.effects]
+                    without = [n for n in (*own, *alike) if n in library()]
+            begin = time.process_time()
+            found = diagnose(experiment, without=without)
+            seconds = time.process_time() - begin
+            truth = _parameters(asked / "noisy.truth.toml")
+        except InputError as error:
+            return result | {"error": str(error)}
+    samples = sum(r.time.size for r in experiment.runs)
+    said = {"without": without, "truth": truth, "seconds": seconds, "samples": samples}
+    return result | hard | said | answer(found)
+
+
+def answer(found: Discrepancy) -> dict[str, Any]:
+    """Return what a diagnosis says, and what it rests on."""
+    judgement, held = found.judgement, found.best.held
+    return {
+        "verdict": found.verdict,
+        "named": [effect.name for effect in found.effects],
+        "approximate": [effect.approximate for effect in found.effects],
+        "probability": [effect.probability for effect in found.effects],
+        "named_families": [family(effect.name) for effect in found.effects],
+        "classes": found.equivalent,
+        "nearest": list(found.nearest.trial.names),
+        "parameters": {e.name: [dict(e.parameters), dict(e.ci95)] for e in found.effects},
+        "held": held.chi2 / held.degrees,
+        "closed": judgement.closed,
+        "spread": judgement.spread,
+        "ratio": [judgement.ratio, judgement.ratio_allowed],
+        "left": [judgement.left, judgement.uneven, judgement.chance],
+        "form": [judgement.form.chance, dict(judgement.form.chances), judgement.form.further],
+        "standings": [
+            {
+                "name": s.candidate.name,
+                "gain": s.gain,
+                "share": s.share,
+                "equivalent": s.equivalent,
+                "rivals": [[r.candidate.name, r.behind, r.contains] for r in s.rivals[:4]],
+            }
+            for s in judgement.standings
+        ],
+        "attempts": [[a.names, a.score, a.gain, a.held_gain, a.accepted] for a in found.attempts],
+    }
+
+
+def _parameters(path: Path) -> dict[str, Any]:
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    return {e["name"]: e["parameters"] for e in table.get("effect", [])}

@@ -1,0 +1,119 @@
+"""How hard a blind experiment is: measured, not assumed.
+
+The same motion without noise and counts is scored with the noise that the record has. ``G`` is what
+the best possible model would gain there, ``s = 1 - G_impostor / G`` how far the nearest other name
+falls short. Names with ``s G < 25`` are not told apart by these records, whoever looks.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+from blind_cases import record
+from pendmap.discrepancy.candidates import candidates
+from pendmap.discrepancy.evidence import Evidence, evidence_of
+from pendmap.discrepancy.refit import Refits
+from pendmap.discrepancy.scores import scores_of
+from pendmap.discrepancy.trial import ASTRAY, fitted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from blind_cases import Case
+    from pendmap.discrepancy.trial import Trial
+
+CLEAR = 25.0
+"""Separation times score from which names are told apart nearly always."""
+
+REFITTED, WORTH = 3, 0.5
+"""So many impostors are fitted, of those whose score is this part of what is to be explained."""
+
+CONTAINED = 1e-3
+"""A special case leaves no more than this of what is to be explained: rounding and steps."""
+
+
+def difficulty(
+    case: Case, folder: Path, base: Trial, without: Sequence[str] = ()
+) -> tuple[dict[str, Any], list[str]]:
+    """Return ``G``, ``s`` and equals of a case on noise-free records, and who is not told apart.
+
+    Of a pair ``G`` of each alone. No impostors are names in ``without``, exact equals (a cosine of
+    1 between what both do to the readings) and effects of more parameters that have the true one as
+    a special case: whoever looks cannot tell them apart, at whatever noise. Where an effect is
+    withheld neither are those that reach its ``G`` but for 25: they are withheld with it.
+    """
+    gains, separation, alike, equals, left = [], 1.0, set(), set(), 0.0
+    for effect in case.effects:
+        alone = dataclasses.replace(case, effects=(effect,))
+        experiment, sigma = record(alone, folder, clean=True)
+        evidence = _with_noise(evidence_of(experiment), sigma)
+        # From the noisy fit: what is measured is the effect, not how well a start is found.
+        begin = fitted(
+            evidence, base.fit.model, base.free, start=base.start, windows=base.fit.windows
+        )
+        if begin.chi2 > ASTRAY * begin.fit.degrees and len(case.effects) > 1:
+            # What the other effect of a pair did to the windows may lead astray.
+            again = fitted(evidence, base.fit.model, base.free, start=base.start)
+            begin = min((begin, again), key=lambda trial: trial.chi2)
+        gains.append(begin.chi2)
+        own = effect.split(":")[0]
+        reached, own_equals = _impostors(evidence, begin, own, without)
+        if case.what == "form":
+            left = _left(evidence, begin, own)
+        near = {name for name, gain in reached.items() if begin.chi2 - gain < CLEAR}
+        alike |= near | own_equals
+        equals |= own_equals
+        others = (
+            reached if case.what != "withheld" else {n: reached[n] for n in reached.keys() - near}
+        )
+        nearest = max(others.values(), default=0.0)
+        separation = min(separation, 1 - nearest / begin.chi2)
+    hard = {"G": gains, "s": separation, "equals": sorted(equals), "beyond": left}
+    return hard, sorted(alike)
+
+
+def _left(evidence: Evidence, begin: Trial, own: str) -> float:
+    """Return what the library's effect of a name leaves of a form that differs from its own."""
+    scores = scores_of(
+        evidence, begin, [c for c in candidates({"Tr"}, driven=True) if c[0].name == own]
+    )
+    found = Refits(evidence).refit(begin, scores, [scores.best()[0]])
+    return begin.chi2 if found is None else found.trial.chi2
+
+
+def _impostors(
+    evidence: Evidence, begin: Trial, own: str, without: Sequence[str]
+) -> tuple[dict[str, float], set[str]]:
+    """Return what each other effect gains of what one alone leaves, and the one's equals."""
+    scores = scores_of(evidence, begin, candidates({"Tr", *without}, driven=evidence.forced))
+    gains, equals = {}, set()
+    places = scores.best()
+    at = next((k for k in places if scores.scores[k].candidate.name == own), None)
+    refits = Refits(evidence)
+    for k in places:
+        score = scores.scores[k]
+        name, gain = score.candidate.name, score.gain
+        if k == at:
+            continue
+        if at is not None and scores.same(at, k):
+            equals.add(name)
+            continue
+        more = at is not None and score.candidate.count > scores.scores[at].candidate.count
+        near = begin.chi2 - gain < CLEAR and not more
+        if len(gains) < REFITTED and gain > WORTH * begin.chi2 and not near:
+            # To first order an effect gains less than it may: its shape was only scanned.
+            found = refits.refit(begin, scores, [k])
+            gain = max(gain, begin.chi2 - found.trial.chi2) if found else gain
+            if more and begin.chi2 - gain < max(CONTAINED * begin.chi2, 1.0):
+                equals.add(name)
+                continue
+        gains[name] = gain
+    return gains, equals
+
+
+def _with_noise(evidence: Evidence, sigma: float) -> Evidence:
+    fitted = tuple(dataclasses.replace(run, sigma=sigma) for run in evidence.fitted)
+    held = tuple(dataclasses.replace(run, sigma=sigma) for run in evidence.held)
+    return dataclasses.replace(evidence, fitted=fitted, held=held)
