@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.limits import detection_limits
 from pendmap.discrepancy.power import seen, separated, tightened
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.limits import Limit
     from pendmap.discrepancy.power import Outlook, Prospect
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Advice", "advice_of", "chance_said"]
 
-MARGIN = 1e-6
+MARGIN: Final = 1e-6
 """A chance below this is not told: no model is known so well."""
 
 
@@ -29,17 +30,16 @@ class Advice:
     ----------
     next_experiment : str
         In a sentence or two.
-    limits : mapping of str to float
-        For each effect that was not found the smallest size (SI, of the shape that shows it least)
-        that would have been found with 95 % probability; infinite where the records do not show it
-        at all.
+    limits : mapping of str to Limit
+        For each effect that was not found the smallest size that would have been found with 95 %
+        probability.
     outlook : Outlook or None
         What is wanted, and what each proposal would do for it; none where no proposal can be run
         through by the model.
     """
 
     next_experiment: str
-    limits: dict[str, float]
+    limits: dict[str, Limit]
     outlook: Outlook | None
 
     @property
@@ -75,7 +75,9 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
         Of the noise.
     """
     samples = best.trial.fit.samples
-    limits = detection_limits(scores, level, samples, best.trial.names)
+    limits = detection_limits(
+        scores, level, samples, best.trial.names, best.trial.fit.model.units
+    )
     if judgement.verdict == "ambiguous":
         outlook: Outlook | None = separated(evidence, nearest, judgement.standings, level)
     elif judgement.verdict == "named":
@@ -103,9 +105,9 @@ def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> l
     if best is not None:
         say = {"separation": _separation, "interval": _interval, "limits": _limits}
         said.append(say[outlook.aim](outlook, best))
-    kinds = "free decay or run under this drive" if driven else "free decay"
+    kinds = "free decay or run under the drive" if driven else "free decay"
     said += [
-        f"No {kinds} of this rig tells {one} from {other}: {one} is shown by "
+        f"No {kinds} tells {one} from {other}: {one} is shown by "
         f"{_revealed(judgement, one)}; {other} by {_revealed(judgement, other)}."
         for one, other in outlook.equals
     ]
@@ -121,10 +123,14 @@ def _separation(outlook: Outlook, best: Prospect) -> str:
     names = ", ".join(outlook.about[:-1]) + f" and {outlook.about[-1]}"
     enough = "" if outlook.reaches(best) else f"; {outlook.wanted:g} are wanted"
     return (
-        f"To tell {names} apart, record {best.proposal.what}: predicted s G = {best.value:.2g} "
-        f"(now {outlook.now:.2g}{enough}), chance of a wrong name "
+        f"To tell {names} apart, record {best.proposal.what}: predicted s G = "
+        f"{_power(best.value)} (now {_power(outlook.now)}{enough}), chance of a wrong name "
         f"{chance_said(best.wrong or 0.0)}."
     )
+
+
+def _power(value: float) -> str:
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"  # noqa: PLR2004 (two digits)
 
 
 def _interval(outlook: Outlook, best: Prospect) -> str:

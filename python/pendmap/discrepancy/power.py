@@ -23,7 +23,7 @@ from pendmap.discrepancy.named import Z95
 from pendmap.discrepancy.rivals import ALIKE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.menu import Proposal
@@ -276,18 +276,17 @@ def seen(evidence: Evidence, found: Found, scores: Scores) -> Outlook | None:
     least: dict[str, float] = {}
     for score in scores.scores:
         name = score.candidate.name
-        if score.information < least.get(name, math.inf):
-            faintest[name], least[name] = score.candidate, score.information
+        shown = score.information or math.inf  # a shape that does not show at all says little
+        if name not in least or shown < least[name]:
+            faintest[name], least[name] = score.candidate, shown
     if not faintest:
         return None
     w0 = found.trial.fit.model.w0
     ahead = Prospects(evidence, found, menu_of(evidence, w0), list(faintest.values()))
-    base = range(len(ahead.now.shared))
-    now = {n: _least(ahead, ahead.old, c, base) for n, c in faintest.items()}
+    now = _shown(ahead, ahead.old, faintest)
     ratios = []
-    for proposal in ahead.menu:
-        total = ahead.after(proposal)
-        then = {n: _least(ahead, total, c, base) for n, c in faintest.items()}
+    for total in map(ahead.after, ahead.menu):
+        then = _shown(ahead, total, faintest)
         # What was not to be seen at any size may be then.
         ratios.append({n: math.sqrt(now[n] / then[n]) for n in now if then[n] > 0})
     prospects = tuple(
@@ -303,14 +302,20 @@ def seen(evidence: Evidence, found: Found, scores: Scores) -> Outlook | None:
     return dataclasses.replace(outlook, about=about)
 
 
-def _least(
-    ahead: Prospects, total: Information, candidate: Candidate, base: Sequence[int]
-) -> float:
-    """Return the information about a candidate's size; with a phase at that where it is least."""
-    own = total.own(ahead.now.places[candidate.title], base)
-    if candidate.phase is not None:
-        faint = candidate.effect(ahead.units).parameters[candidate.size]
-        # The derivative by the phase is the size times that of the same effect a quarter on.
-        scale = np.array([1.0, 1 / faint])
-        own = own * np.outer(scale, scale)
-    return max(float(np.linalg.eigvalsh(own)[0]), 0.0)
+def _shown(
+    ahead: Prospects, total: Information, candidates: Mapping[str, Candidate]
+) -> dict[str, float]:
+    """Return the information about each size; of an effect with a phase where that is least."""
+    base = len(ahead.now.shared)
+    rest = total.own(range(base, ahead.now.count), range(base))
+    shown = {}
+    for name, candidate in candidates.items():
+        places = np.array(ahead.now.places[candidate.title]) - base
+        own = rest[np.ix_(places, places)]
+        if candidate.phase is not None:
+            faint = candidate.effect(ahead.units).parameters[candidate.size]
+            # The derivative by the phase is the size times that of the same effect a quarter on.
+            scale = np.array([1.0, 1 / faint])
+            own = own * np.outer(scale, scale)
+        shown[name] = max(float(np.linalg.eigvalsh(own)[0]), 0.0)
+    return shown
