@@ -1,4 +1,4 @@
-"""Does the next experiment decide as much as ``pendmap diagnose`` predicts?
+"""What the next experiment decides, against what ``pendmap diagnose`` predicts of it.
 
     python benchmarks/next_experiment.py --cases 60 --seed 1 --out next.jsonl
 

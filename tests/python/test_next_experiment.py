@@ -179,7 +179,7 @@ def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
     for size in (limit, -limit):
         _, _, seen = hidden(11, f"encoder_gain,e={size:.6g}", free=2, noise=0.2)
         found += seen.verdict != "none"
-    assert found == 2  # noqa: PLR2004 (both)
+    assert found == 2
     _, _, faint = hidden(11, f"encoder_gain,e={limit / 4:.6g}", free=2, noise=0.2)
     assert faint.verdict == "none"
 
@@ -201,7 +201,7 @@ def test_chances_of_names() -> None:
     rng = np.random.default_rng(3)
     draws = 16 + 2 * 4 * rng.standard_normal(400_000)
     assert wrong_name(16) == pytest.approx(np.mean(draws < 0), rel=0.03)
-    assert one_left(16) == pytest.approx(np.mean(draws > 10), rel=0.01)  # noqa: PLR2004
+    assert one_left(16) == pytest.approx(np.mean(draws > 10), rel=0.01)
 
 
 def test_the_rig_does_runs_that_are_planned() -> None:

@@ -75,9 +75,7 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
         Of the noise.
     """
     samples = best.trial.fit.samples
-    limits = detection_limits(
-        scores, level, samples, best.trial.names, best.trial.fit.model.units
-    )
+    limits = detection_limits(scores, level, samples, best.trial.names, best.trial.fit.model.units)
     if judgement.verdict == "ambiguous":
         outlook: Outlook | None = separated(evidence, nearest, judgement.standings, level)
     elif judgement.verdict == "named":
@@ -115,7 +113,9 @@ def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> l
 
 
 def _revealed(judgement: Judgement, name: str) -> str:
-    every = (c for s in judgement.standings for c in (s.candidate, *(r.candidate for r in s.rivals)))
+    every = (
+        c for s in judgement.standings for c in (s.candidate, *(r.candidate for r in s.rivals))
+    )
     return str(next(c for c in every if c.name == name).definition["revealed_by"])
 
 

@@ -309,7 +309,9 @@ def _simulated(
     late = float(np.median([0.0 if r.law is None else r.law.tau for r in readings]))
     # Those that are computed take the part of those that are not.
     scale = math.sqrt(_reading_step(evidence) / step)
-    starts, runs, windows = [], [], []
+    starts: list[Start] = []
+    runs: list[FitRun] = []
+    windows: list[tuple[int, int, int, float, float]] = []
     for start, curve in _curves(motion, longest, step, floor).items():
         speed = np.abs(curve[1])
         moves = np.flatnonzero(speed > MOVING * w0)
@@ -353,6 +355,6 @@ def _curves(
 
 
 def _run(start: Start, samples: int, step: float, sigma: float | Floats) -> FitRun:
-    time = step * np.arange(samples)
+    time = step * np.arange(samples, dtype=np.float64)
     drive = None if start.drive is None else dict(start.drive)
     return FitRun(time, np.zeros(samples), sigma, drive=drive, lab_time_s=start.lab_time_s)

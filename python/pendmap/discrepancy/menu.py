@@ -27,8 +27,9 @@ __all__ = ["Planned", "Proposal", "Start", "menu_of"]
 RELEASES: Final = (0.5, 1.2, 2.0, 2.8)
 """Angles of release, rad: small swings down to rest, and up to nearly inverted."""
 
-FLINGS: Final = (3.0, 5.0)
-"""Velocities at the bottom over ``w0``: with more than 2 the pendulum goes round."""
+FLINGS: Final = (2.5, 3.5)
+"""Velocities at the bottom over ``w0``: with more than 2 the pendulum goes round. Much quicker, a
+record no longer shows where the hand has let go."""
 
 WAITS: Final = (600.0, 3600.0)
 """Pauses in the laboratory, s, after which slow changes show."""

@@ -23,6 +23,16 @@ if TYPE_CHECKING:
 __all__ = ["following", "set_aside"]
 
 
+LIMITS: Final = (
+    "effect",
+    "parameter",
+    "found from",
+    "shape",
+    "over Tr",
+    "over w0\N{SUPERSCRIPT TWO}",
+)
+"""Heads of the table of what would have shown."""
+
 FIGURES: Final = {
     "separation": "s G",
     "interval": "half an interval of 95 %, over the value",
@@ -58,9 +68,9 @@ def _meaning(outlook: Outlook) -> Text:
             Name(outlook.about[0]),
             f" over its value is now {outlook.now:.2g}; half of that is wanted.",
         )
+    median = "The last column is the median over all effects that were not found; half is wanted."
     return (
-        f"{start}The last column is the median over all effects that were not found; half is "
-        "wanted. Most would be gained for ",
+        f"{start}{median} Most would be gained for ",
         *joined(outlook.about),
         ".",
     )
@@ -131,7 +141,7 @@ def set_aside(found: Discrepancy) -> Section:
                 "torque also over Tr and over w0\N{SUPERSCRIPT TWO}:"
             ),
             Table(
-                ("effect", "parameter", "found from", "shape", "over Tr", "over w0\N{SUPERSCRIPT TWO}"),
+                LIMITS,
                 tuple(
                     (
                         Name(name),
