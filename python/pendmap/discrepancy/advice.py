@@ -136,7 +136,7 @@ def _power(value: float) -> str:
 def _interval(outlook: Outlook, best: Prospect) -> str:
     return (
         f"The least sure is {outlook.about[0]}, known to +- {outlook.now:.2g} of its value (95 %): "
-        f"record {best.proposal.what} for a predicted +- {best.value:.2g}."
+        f"record {best.proposal.what}, for a predicted +- {best.value:.2g}."
     )
 
 

@@ -134,7 +134,7 @@ class Proposal:
             ends = " and one ".join(start.what for start in (first, *others))
             return f"one {first.noun} {ends}, {each} each"
         if len(self.runs) > 1:
-            return f"{counted(len(self.runs), first.noun)} {first.what}, {each} each"
+            return f"{counted(len(self.runs), first.noun)} {first.what.rstrip(',')}, {each} each"
         return f"one {first.noun} {first.what} for {each}"
 
 

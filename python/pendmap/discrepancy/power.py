@@ -113,13 +113,14 @@ class Outlook:
 
     @property
     def by_start(self) -> tuple[Prospect, ...]:
-        """The best of each kind of run, the least effort first."""
+        """The best of each kind of run: of those that do enough the least effort first."""
         kinds: dict[object, list[Prospect]] = {}
         for prospect in self.prospects:
             kinds.setdefault(prospect.proposal.starts, []).append(prospect)
         each = [dataclasses.replace(self, prospects=tuple(own)).best for own in kinds.values()]
         chosen = [p for p in each if p is not None]
-        return tuple(sorted(chosen, key=lambda p: (not self.reaches(p), *_effort(p))))
+        enough = sorted(filter(self.reaches, chosen), key=lambda p: (*_effort(p), self._rank(p)))
+        return (*enough, *sorted((p for p in chosen if p not in enough), key=self._rank))
 
     def _rank(self, prospect: Prospect) -> float:
         return -prospect.value if self.aim == "separation" else prospect.value

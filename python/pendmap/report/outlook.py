@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["following", "set_aside"]
 
 
+ROWS: Final = 8
+"""Kinds of run that the table of proposals shows."""
+
 LIMITS: Final = (
     "effect",
     "parameter",
@@ -54,8 +57,8 @@ def following(found: Discrepancy) -> Section:
 def _meaning(outlook: Outlook) -> Text:
     """Return what the table of proposals shows."""
     start = (
-        "Each line is the best of a kind of run that this rig could do, run through by the model "
-        "found, read as often and as well as these records, and added to them. "
+        "Each line is the best of a kind of run that this rig could do: run through by the model, "
+        "read as often and as well as these records, and added to them. "
     )
     if outlook.aim == "separation":
         return (
@@ -82,7 +85,7 @@ def _proposals(outlook: Outlook) -> Table:
     head += ["wrong name", "one name left"] if separates else []
     best = outlook.best
     rows = []
-    for prospect in outlook.by_start:
+    for prospect in outlook.by_start[:ROWS]:
         proposal = prospect.proposal
         row: list[Text] = [
             Strong(proposal.what) if prospect is best else proposal.what,
