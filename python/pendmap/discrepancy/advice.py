@@ -1,21 +1,25 @@
-"""What to record next, and what these records would have shown."""
+"""What to record next, how much that would decide, and what these records would have shown."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.select import GATE
+from pendmap.discrepancy.limits import detection_limits
+from pendmap.discrepancy.power import seen, separated, tightened
 
 if TYPE_CHECKING:
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.limits import Limit
+    from pendmap.discrepancy.power import Outlook, Prospect
+    from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
     from pendmap.discrepancy.verdict import Judgement
 
-__all__ = ["Advice", "advice_of"]
+__all__ = ["Advice", "advice_of", "chance_said"]
 
-DETECTED: Final = 60.0
-"""Score from which an effect is found nearly always: the gate lies four standard errors below."""
+MARGIN: Final = 1e-6
+"""A chance below this is not told: no model is known so well."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,62 +29,120 @@ class Advice:
     Parameters
     ----------
     next_experiment : str
-        In a sentence.
-    limits : mapping of str to float
-        For each effect that was not found the smallest size (SI, of the shape that shows it least)
-        that would have been scored 12; infinite where the records do not show it at all.
+        In a sentence or two.
+    limits : mapping of str to Limit
+        For each effect that was not found the smallest size that would have been found with 95 %
+        probability.
+    outlook : Outlook or None
+        What is wanted, and what each proposal would do for it; none where no proposal can be run
+        through by the model.
     """
 
     next_experiment: str
-    limits: dict[str, float]
+    limits: dict[str, Limit]
+    outlook: Outlook | None
+
+    @property
+    def best(self) -> Prospect | None:
+        """The proposal of the sentence."""
+        return None if self.outlook is None else self.outlook.best
 
 
-def advice_of(judgement: Judgement, scores: Scores, level: float) -> Advice:
+def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
+    evidence: Evidence,
+    best: Found,
+    nearest: Found,
+    judgement: Judgement,
+    scores: Scores,
+    level: float,
+) -> Advice:
     """Return what to record next.
+
+    Names that are alike are to be told apart (``s G`` of 25); of effects that are told apart the
+    widest interval is to be halved; where nothing is named, more is to be seen.
 
     Parameters
     ----------
+    evidence : Evidence
+        The records.
+    best, nearest : Found
+        The model that is claimed, and the best that candidates can do.
     judgement : Judgement
         The verdict.
     scores : Scores
-        At the baseline.
+        Of all others at the best model.
     level : float
         Of the noise.
     """
-    found = {standing.candidate.name for standing in judgement.standings}
-    limits: dict[str, float] = {}
-    for score in scores.scores:
-        name = score.candidate.name
-        if name in found and judgement.verdict != "unknown":
-            continue
-        limit = math.sqrt(GATE * level / score.information) if score.information > 0 else math.inf
-        limits[name] = max(limits.get(name, 0.0), limit)
-    return Advice(_sentence(judgement), limits)
+    samples = best.trial.fit.samples
+    limits = detection_limits(scores, level, samples, best.trial.names, best.trial.fit.model.units)
+    if judgement.verdict == "ambiguous":
+        outlook: Outlook | None = separated(evidence, nearest, judgement.standings, level)
+    elif judgement.verdict == "named":
+        outlook = tightened(evidence, best, level)
+    else:
+        outlook = seen(evidence, best, scores)
+    return Advice(" ".join(_sentences(judgement, outlook, evidence.forced)), limits, outlook)
 
 
-def _sentence(judgement: Judgement) -> str:
-    if judgement.verdict == "none":
-        return (
-            "Nothing is missing at this noise; to look deeper, record longer, from larger "
-            "amplitudes, or through whole turns."
-        )
+def chance_said(chance: float) -> str:
+    """Return a chance, none of them impossible."""
+    return f"{chance:.1g}" if chance >= MARGIN else f"below {MARGIN:g}"
+
+
+def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> list[str]:  # noqa: FBT001 (private)
+    said = []
     if judgement.verdict in {"unknown", "partial"}:
-        return (
+        said.append(
             "Repeat one free decay several times over an hour, and record one that begins in "
             "rotation: whether the rest repeats, and over what it changes, says what it is."
         )
-    wanted = []
-    for standing in judgement.standings:
-        for rival in [rival for rival in standing.rivals if rival.alike][:1]:
-            power = rival.separation * standing.gain
-            wanted.append(
-                f"{standing.candidate.name} and {rival.candidate.name} differ by s G = "
-                f"{power:.2g} here, 25 are needed: record "
-                f"{standing.candidate.definition['revealed_by']}, "
-                f"and {rival.candidate.definition['revealed_by']}"
-            )
-    if wanted:
-        return "; ".join(wanted) + "."
+    if outlook is None:
+        return said or ["No free decay or run under the drive adds to these records."]
+    best = outlook.best
+    if best is not None:
+        say = {"separation": _separation, "interval": _interval, "limits": _limits}
+        said.append(say[outlook.aim](outlook, best))
+    kinds = "free decay or run under the drive" if driven else "free decay"
+    said += [
+        f"No {kinds} tells {one} from {other}: {one} is shown by "
+        f"{_revealed(judgement, one)}; {other} by {_revealed(judgement, other)}."
+        for one, other in outlook.equals
+    ]
+    return said
+
+
+def _revealed(judgement: Judgement, name: str) -> str:
+    every = (
+        c for s in judgement.standings for c in (s.candidate, *(r.candidate for r in s.rivals))
+    )
+    return str(next(c for c in every if c.name == name).definition["revealed_by"])
+
+
+def _separation(outlook: Outlook, best: Prospect) -> str:
+    names = ", ".join(outlook.about[:-1]) + f" and {outlook.about[-1]}"
+    enough = "" if outlook.reaches(best) else f"; {outlook.wanted:g} are wanted"
     return (
-        "The effects are told apart; runs held back or repeated on another day would confirm them."
+        f"To tell {names} apart, record {best.proposal.what}: predicted s G = "
+        f"{_power(best.value)} (now {_power(outlook.now)}{enough}), chance of a wrong name "
+        f"{chance_said(best.wrong or 0.0)}."
+    )
+
+
+def _power(value: float) -> str:
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"  # noqa: PLR2004 (two digits)
+
+
+def _interval(outlook: Outlook, best: Prospect) -> str:
+    return (
+        f"The least sure is {outlook.about[0]}, known to +- {outlook.now:.2g} of its value (95 %): "
+        f"record {best.proposal.what}, for a predicted +- {best.value:.2g}."
+    )
+
+
+def _limits(outlook: Outlook, best: Prospect) -> str:
+    names = ", ".join(outlook.about)
+    return (
+        f"To see more, record {best.proposal.what}: half of all effects not found would then show "
+        f"at {best.value:.2g} of the size that shows now, or less; most gain {names}."
     )

@@ -66,8 +66,10 @@ class Discrepancy(Readable):
         Of all candidates at the baseline.
     attempts : tuple of Attempt
         Candidates that were refitted.
-    advice : Advice
-        What to record next, and what these records would have shown.
+    beside : Scores
+        Of all others at the best model.
+    level : float
+        Of the noise: by what sums of squares are divided.
     own : tuple of Formula
         Candidates of the user's own beside the library's.
     functions : tuple of FunctionScore
@@ -87,7 +89,8 @@ class Discrepancy(Readable):
     runs: RunByRun
     scores: Scores
     attempts: tuple[Attempt, ...]
-    advice: Advice
+    beside: Scores
+    level: float
     own: tuple[Formula, ...] = ()
     functions: tuple[FunctionScore, ...] = ()
 
@@ -130,6 +133,13 @@ class Discrepancy(Readable):
     def forecasts(self) -> tuple[Forecast, ...]:
         """How the error of both models grows with the horizon, on what was held back."""
         return forecasts_of(self.evidence, self.base, self.best)
+
+    @functools.cached_property
+    def advice(self) -> Advice:
+        """What to record next, and what these records would have shown."""
+        return advice_of(
+            self.evidence, self.best, self.nearest, self.judgement, self.beside, self.level
+        )
 
     @functools.cached_property
     def cycles(self) -> tuple[Cycles, ...]:
@@ -212,7 +222,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         runs,
         scores,
         tuple(search.attempts),
-        advice_of(judgement, scores, search.level()),
+        search.scores(best.trial),
+        search.level(),
         own,
         function_scores(evidence, search.base.trial, best.trial, functions),
     )

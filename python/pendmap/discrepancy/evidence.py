@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
 
-__all__ = ["Evidence", "evidence_of"]
+__all__ = ["Evidence", "evidence_of", "held_parts"]
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Parts of a run that are held back where no whole run is: a fifth, at large and small swings."""
@@ -162,8 +162,8 @@ def _stretched(
         # Parts of the samples that count, not of the time at rest after them.
         counted = np.flatnonzero(good)
         back = np.zeros(good.shape, bool)
-        for low, high in HELD:
-            a, b = (int(counted[int(part * (counted.size - 1))]) for part in (low, high))
+        for first, last in held_parts(counted.size):
+            a, b = int(counted[first]), int(counted[last])
             if b - a < FEWEST:
                 continue
             back[a:b] = good[a:b]
@@ -184,6 +184,11 @@ def _stretched(
         tuple(held_of),
         inside=inside,
     )
+
+
+def held_parts(samples: int) -> list[tuple[int, int]]:
+    """Return first and one after the last of each stretch of samples that is held back."""
+    return [(int(low * (samples - 1)), int(high * (samples - 1))) for low, high in HELD]
 
 
 def _part(run: FitRun, good: NDArray[np.bool_], a: int, b: int) -> FitRun:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.verdict import Judgement
     from pendmap.model import Formula, Rig
 
-__all__ = ["NamedEffect", "diagnosed_model", "named_effects"]
+__all__ = ["Z95", "NamedEffect", "diagnosed_model", "named_effects"]
 
 Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""

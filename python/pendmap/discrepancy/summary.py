@@ -84,7 +84,8 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         ],
         "where": found.where,
         "next_experiment": found.advice.next_experiment,
-        "detection_limits": found.advice.limits,
+        "proposals": _proposals(found),
+        "detection_limits": {name: limit.size for name, limit in found.advice.limits.items()},
         "nearest": list(found.nearest.trial.names),
         "left": {
             "z": judgement.left,
@@ -125,6 +126,43 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 *found.evidence.experiment.findings,
                 *(finding for run in found.evidence.runs for finding in run.findings),
             )
+        ],
+    }
+
+
+def _proposals(found: Discrepancy) -> dict[str, Any] | None:
+    """Return what is wanted, and of each kind of run that could be recorded the best."""
+    outlook = found.advice.outlook
+    if outlook is None:
+        return None
+    return {
+        "aim": outlook.aim,
+        "about": list(outlook.about),
+        "now": outlook.now,
+        "wanted": outlook.wanted,
+        "not_told_apart": [list(pair) for pair in outlook.equals],
+        "experiments": [
+            {
+                "what": prospect.proposal.what,
+                "seconds": prospect.proposal.seconds,
+                "wait_s": prospect.proposal.wait_s,
+                "predicted": prospect.value,
+                "chance_of_wrong_name": prospect.wrong,
+                "chance_of_one_name": prospect.resolved,
+                "recommended": prospect is outlook.best,
+                "runs": [
+                    {
+                        "kind": "free" if run.start.drive is None else "forced",
+                        "theta_rad": run.start.theta,
+                        "velocity_rad_s": run.start.velocity,
+                        "seconds": run.seconds,
+                        "lab_time_s": run.start.lab_time_s,
+                        "drive": None if run.start.drive is None else dict(run.start.drive),
+                    }
+                    for run in prospect.proposal.runs
+                ],
+            }
+            for prospect in outlook.by_start
         ],
     }
 

@@ -3,25 +3,100 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.select import GATE
+from pendmap.discrepancy.advice import chance_said
+from pendmap.discrepancy.limits import SURELY
 from pendmap.identification.left_out import left_out
 from pendmap.pictures.names import unit_of
-from pendmap.report.document import Items, Name, Paragraph, Section, Table
-from pendmap.report.wording import gained, joined
+from pendmap.report.document import Items, Name, Paragraph, Section, Strong, Table
+from pendmap.report.wording import chance, gained, joined
 from pendmap.words import counted
 
 if TYPE_CHECKING:
     from pendmap.discrepancy import Discrepancy
+    from pendmap.discrepancy.candidates import Candidate
+    from pendmap.discrepancy.limits import Limit
+    from pendmap.discrepancy.power import Outlook
     from pendmap.report.document import Block, Text
 
 __all__ = ["following", "set_aside"]
 
 
+ROWS: Final = 8
+"""Kinds of run that the table of proposals shows."""
+
+LIMITS: Final = (
+    "effect",
+    "parameter",
+    "found from",
+    "shape",
+    "over Tr",
+    "over w0\N{SUPERSCRIPT TWO}",
+)
+"""Heads of the table of what would have shown."""
+
+FIGURES: Final = {
+    "separation": "s G",
+    "interval": "half an interval of 95 %, over the value",
+    "limits": "smallest size seen, over that now",
+}
+"""What is predicted of each proposal, by what it is for."""
+
+
 def following(found: Discrepancy) -> Section:
-    """Return what to record next."""
-    return Section("The next experiment", (Paragraph(found.advice.next_experiment),))
+    """Return what to record next, and what each kind of run would do."""
+    advice = found.advice
+    blocks: list[Block] = [Paragraph(advice.next_experiment)]
+    outlook = advice.outlook
+    if outlook is not None and outlook.prospects:
+        blocks += [Paragraph(_meaning(outlook)), _proposals(outlook)]
+    return Section("The next experiment", tuple(blocks))
+
+
+def _meaning(outlook: Outlook) -> Text:
+    """Return what the table of proposals shows."""
+    start = (
+        "Each line is the best of a kind of run that this rig could do: run through by the model, "
+        "read as often and as well as these records, and added to them. "
+    )
+    if outlook.aim == "separation":
+        return (
+            f"{start}s G is the part of the gain of one name that the other cannot follow; from "
+            f"{outlook.wanted:g} on a wrong name is improbable. Now it is {gained(outlook.now)}."
+        )
+    if outlook.aim == "interval":
+        return (
+            f"{start}Half the interval of ",
+            Name(outlook.about[0]),
+            f" over its value is now {outlook.now:.2g}; half of that is wanted.",
+        )
+    median = "The last column is the median over all effects that were not found; half is wanted."
+    return (
+        f"{start}{median} Most would be gained for ",
+        *joined(outlook.about),
+        ".",
+    )
+
+
+def _proposals(outlook: Outlook) -> Table:
+    separates = outlook.aim == "separation"
+    head = ["record", "recorded (s)", "wait (s)", FIGURES[outlook.aim]]
+    head += ["wrong name", "one name left"] if separates else []
+    best = outlook.best
+    rows = []
+    for prospect in outlook.by_start[:ROWS]:
+        proposal = prospect.proposal
+        row: list[Text] = [
+            Strong(proposal.what) if prospect is best else proposal.what,
+            f"{proposal.seconds:g}",
+            f"{proposal.wait_s:g}",
+            gained(prospect.value) if separates else f"{prospect.value:.2g}",
+        ]
+        if separates:
+            row += [chance_said(prospect.wrong or 0.0), chance(prospect.resolved or 0.0)]
+        rows.append(tuple(row))
+    return Table(tuple(head), tuple(rows))
 
 
 def set_aside(found: Discrepancy) -> Section:
@@ -64,16 +139,23 @@ def set_aside(found: Discrepancy) -> Section:
     if limits:
         blocks += [
             Paragraph(
-                f"Of each effect that was not found, the smallest size that these records would "
-                f"have scored {GATE:g}, in the shape that shows it least:"
+                f"Of each effect that was not found, the smallest size that would have been found "
+                f"with {100 * SURELY:g} % probability, in the shape that shows it least; of a "
+                "torque also over Tr and over w0\N{SUPERSCRIPT TWO}:"
             ),
             Table(
-                ("effect", "parameter", "would have shown from"),
+                LIMITS,
                 tuple(
-                    (Name(name), Name(_size(found, name)), _limit(found, name, limit))
+                    (
+                        Name(name),
+                        Name(_size(found, name)),
+                        _limit(found, name, limit.size),
+                        _shape(limit),
+                        *_relative(found, name, limit.size),
+                    )
                     for name, limit in limits.items()
                 ),
-                words=("parameter",),
+                words=("parameter", "shape"),
             ),
         ]
     return Section("What was left out, and what would have shown", tuple(blocks))
@@ -85,6 +167,31 @@ def _size(found: Discrepancy, effect: str) -> str:
 
 def _limit(found: Discrepancy, effect: str, limit: float) -> str:
     if not math.isfinite(limit):
-        return "not at any size"
+        return "not visible in these records"
     unit = unit_of(f"{effect}.{_size(found, effect)}", found.definition)
     return f"{limit:.2g} {unit}".rstrip()
+
+
+def _shape(limit: Limit) -> str:
+    """Return the shape that shows least, and those that are not visible."""
+
+    def said(candidate: Candidate) -> str:
+        return ", ".join(f"{name} = {value:.3g}" for name, value in candidate.shape.items())
+
+    if not math.isfinite(limit.size):
+        return ""
+    unseen = " or ".join(map(said, limit.unseen))
+    return said(limit.candidate) + (f"; not visible with {unseen}" if unseen else "")
+
+
+def _relative(found: Discrepancy, effect: str, limit: float) -> tuple[str, str]:
+    """Return a torque's limit over friction and over gravity; nothing of what is no torque."""
+    torque = unit_of("Tr")
+    acts = found.definition(effect)["group"] not in {"drive", "reading"}
+    unit = unit_of(f"{effect}.{_size(found, effect)}", found.definition)
+    if not (acts and unit == torque and math.isfinite(limit)):
+        return "", ""
+    fit = found.best.trial.fit
+    friction = fit.estimates.get("Tr")
+    against = f"{limit / friction.value:.2g}" if friction and friction.value > 0 else ""
+    return against, f"{limit / fit['w0'] ** 2:.1e}"

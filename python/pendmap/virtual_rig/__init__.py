@@ -10,7 +10,7 @@ from __future__ import annotations
 from pendmap.virtual_rig.catalogue import EFFECTS, describe
 from pendmap.virtual_rig.experiment import Experiment, Request, Run, make
 from pendmap.virtual_rig.paper_rig import paper_decay
-from pendmap.virtual_rig.presets import PRESETS
+from pendmap.virtual_rig.presets import PRESETS, RunPlan
 from pendmap.virtual_rig.writer import Places, held_out, places, write
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "Places",
     "Request",
     "Run",
+    "RunPlan",
     "describe",
     "held_out",
     "make",

@@ -60,6 +60,9 @@ class Request:
         Noise of the sensor, degrees.
     rate, counts, correlation, dropouts, outliers, jitter
         As in :class:`Sensor`.
+    plans : tuple of RunPlan
+        The runs, instead of those that the preset draws; then neither their number nor their
+        duration is asked for. Runs that come first are the same whatever follows them.
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Request:
     dropouts: float = 0.0
     outliers: float = 0.0
     jitter: float = 0.0
+    plans: tuple[RunPlan, ...] = ()
 
     def __post_init__(self) -> None:
         self._refuse_rig()
@@ -97,10 +101,12 @@ class Request:
         if self.duration is not None and not 1 <= self.duration <= 3600:  # noqa: PLR2004
             raise InputError(f"duration is {self.duration:g}: allowed is 1 to 3600 s")
         self._refuse_idle()
+        self._refuse_plans()
         free, forced = self.runs
         if min(free, forced) < 0 or not 1 <= free + forced <= 99:  # noqa: PLR2004
             raise InputError(f"{free} free and {forced} forced runs: allowed are 1 to 99 together")
         seconds = self.duration or PRESETS[self.preset].duration[1]
+        seconds = max((plan.duration for plan in self.plans), default=seconds)
         if self.rate * seconds * (free + forced) > _MOST_SAMPLES:
             raise InputError(
                 f"rate is {self.rate:g}: with {free + forced} runs of {seconds:g} s allowed is up"
@@ -129,9 +135,26 @@ class Request:
                 "correlate: allowed with noise above 0"
             )
 
+    def _refuse_plans(self) -> None:
+        asked = [n for n in ("free", "forced", "duration") if getattr(self, n) is not None]
+        if self.plans and asked:
+            raise InputError(f"{asked[0]} is given beside plans: allowed is one of them")
+        for k, plan in enumerate(self.plans):
+            numbers = (plan.theta, plan.velocity, plan.p, plan.frequency, plan.phase, plan.lab_time)
+            if plan.kind not in {"free", "forced"}:
+                raise InputError(f"plan {k}: kind is {plan.kind!r}: allowed are free, forced")
+            if not (1 <= plan.duration <= 3600 and all(map(math.isfinite, numbers))):  # noqa: PLR2004
+                raise InputError(
+                    f"plan {k}: a duration of {plan.duration:g} s from {plan.theta:g} rad: allowed "
+                    "are 1 to 3600 s, and finite numbers"
+                )
+
     @property
     def runs(self) -> tuple[int, int]:
         """How many free and forced runs."""
+        if self.plans:
+            free = sum(plan.kind == "free" for plan in self.plans)
+            return free, len(self.plans) - free
         preset = PRESETS[self.preset]
         free = preset.free if self.free is None else self.free
         return free, preset.forced if self.forced is None else self.forced
@@ -200,7 +223,9 @@ def make(request: Request) -> Experiment:
     given = {"w0": request.w0, "c_over_m": request.c_over_m, "friction": request.friction}
     parameters = dataclasses.replace(drawn, **{k: v for k, v in given.items() if v is not None})
     sensor = _sensor(request, rng)
-    plans = preset.plan(request.stream(_RUNS), parameters.w0, request.runs)
+    plans = list(request.plans)
+    if not plans:
+        plans = preset.plan(request.stream(_RUNS), parameters.w0, request.runs)
     if request.duration is not None:
         plans = _lasting(plans, request.duration)
     kinds = {plan.kind for plan in plans}
@@ -216,7 +241,7 @@ def make(request: Request) -> Experiment:
     )
     equation = Equation(parameters, drive, lab, others)
     paths = _integrate(equation, plans, readings)
-    if preset.until_rest and request.duration is None:
+    if preset.until_rest and request.duration is None and not request.plans:
         plans = [_until_rest(*pair) for pair in zip(plans, paths, strict=True)]
     instants = [
         sensor.instants(sensor.times(plan.duration), request.stream(_SENSOR, k, 1))

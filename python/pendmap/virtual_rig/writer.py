@@ -167,7 +167,7 @@ def _drive(run: Run) -> dict[str, float]:
 def _truth(experiment: Experiment) -> dict[str, Any]:
     """Everything that was drawn and hidden."""
     request, parameters, sensor = experiment.request, experiment.parameters, experiment.sensor
-    asked = {k: v for k, v in dataclasses.asdict(request).items() if v is not None}
+    asked = {k: v for k, v in dataclasses.asdict(request).items() if v not in (None, ())}
     return {
         "format_version": FORMAT_VERSION,
         "equation": "th'' + c_over_m th' + w0^2 (1 + p cos(Omega t + phi)) sin th = "

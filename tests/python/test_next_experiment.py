@@ -1,0 +1,220 @@
+"""What is recommended to be recorded next decides as much as is predicted, once it is recorded."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from pendmap import virtual_rig
+from pendmap.discrepancy import Discrepancy, diagnose
+from pendmap.discrepancy.information import Columns, Information, Prospects
+from pendmap.discrepancy.limits import needed
+from pendmap.discrepancy.menu import menu_of
+from pendmap.discrepancy.power import one_left, wrong_name
+from pendmap.discrepancy.summary import as_json
+from pendmap.discrepancy.trial import fitted
+from pendmap.errors import InputError
+from pendmap.identification.joint import as_fit_run
+from pendmap.identification.reading import reading_of
+from pendmap.records import read_experiment
+from pendmap.virtual_rig import Request, RunPlan
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy.menu import Proposal
+    from pendmap.records import Experiment, Run
+
+
+def recorded(request: Request) -> Experiment:
+    """Write and read an experiment; nobody opens its truth."""
+    with tempfile.TemporaryDirectory() as folder:
+        where = virtual_rig.places(Path(folder) / "records", replace=True)
+        virtual_rig.write(virtual_rig.make(request), where)
+        return read_experiment(where.experiment)
+
+
+def done(request: Request, proposal: Proposal) -> tuple[Run, ...]:
+    """Let the rig of a request do what is proposed."""
+    begun = [run.plan for run in virtual_rig.make(request).runs]
+    plans = [
+        RunPlan(
+            "free",
+            run.start.theta,
+            run.start.velocity,
+            run.seconds,
+            lab_time=round(run.start.lab_time_s, 1),
+        )
+        for run in proposal.runs
+    ]
+    asked: dict[str, Any] = {"free": None, "forced": None, "plans": (*begun, *plans)}
+    every = recorded(dataclasses.replace(request, **asked)).runs[len(begun) :]
+    return tuple(dataclasses.replace(run, hold_out=False) for run in every)
+
+
+def hidden(seed: int, *effects: str, **given: Any) -> tuple[Request, Experiment, Discrepancy]:  # noqa: ANN401 (what the rig is asked for)
+    request = Request("hidden", seed=seed, effects=effects or ("none",), forced=0, **given)
+    records = recorded(request)
+    return request, records, diagnose(records)
+
+
+def test_what_is_recommended_leaves_one_name() -> None:
+    """A drift of either friction, alike within minutes: the rig does what was recommended."""
+    request, records, before = hidden(1000018, "viscous_drift", size=0.08, free=3)
+    assert before.verdict == "ambiguous"
+    assert before.equivalent == [["viscous_drift", "coulomb_drift"]]
+    outlook, best = before.advice.outlook, before.advice.best
+    assert outlook is not None
+    assert best is not None
+    assert best.value > outlook.wanted > outlook.now
+    assert best.proposal.wait_s > 0
+    assert best.proposal.what in before.advice.next_experiment
+    runs = (*records.runs, *done(request, best.proposal))
+    after = diagnose(dataclasses.replace(records, runs=runs))
+    assert [effect.name for effect in after.effects] == ["viscous_drift"]
+    assert after.verdict == "named"
+    rivals = after.judgement.standings[0].rivals
+    power = next(r.behind for r in rivals if r.candidate.name == "coulomb_drift")
+    # Its scatter, and that of the size from which it was predicted.
+    doubt = 2 / math.sqrt(best.value) + 2 / math.sqrt(before.judgement.standings[0].gain)
+    assert power == pytest.approx(best.value, rel=3 * doubt)
+
+
+def test_an_interval_becomes_as_narrow_as_predicted() -> None:
+    request, records, before = hidden(3, "quadratic_drag", free=3)
+    assert before.verdict == "named"
+    outlook, best = before.advice.outlook, before.advice.best
+    assert outlook is not None
+    assert best is not None
+    assert outlook.about == ("quadratic_drag.q",)
+    q = before.best.trial.fit.estimates["quadratic_drag.q"]
+    assert q.stderr is not None
+    level = before.level
+    assert outlook.now == pytest.approx(1.96 * q.stderr * math.sqrt(level) / q.value, rel=0.01)
+    runs = (*records.runs, *done(request, best.proposal))
+    after = diagnose(dataclasses.replace(records, runs=runs))
+    r = after.best.trial.fit.estimates["quadratic_drag.q"]
+    assert r.stderr is not None
+    reached = 1.96 * r.stderr * math.sqrt(after.level) / r.value
+    assert reached == pytest.approx(best.value, rel=0.15)
+    assert reached < 0.6 * outlook.now
+
+
+@pytest.mark.parametrize("what", ["from 0.5 rad", "from 2.8 rad", "flung through 0"])
+def test_a_proposal_says_what_its_record_says(what: str) -> None:
+    """The information predicted, from thinned samples, is that of the record once it is there."""
+    request, _, found = hidden(8, free=2, noise=0.2, counts=8192)
+    evidence = found.evidence
+    menu = menu_of(evidence, found.base.trial.fit.model.w0)
+    proposal = next(p for p in menu if len(p.runs) == 1 and what in p.what)
+    ahead = Prospects(evidence, found.base, [proposal], [])
+    predicted = ahead.after(proposal).matrix - ahead.old.matrix
+    (run,) = done(request, proposal)
+    reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
+    alone = dataclasses.replace(evidence, fitted=(as_fit_run(run, reading),))
+    trial = found.base.trial
+    fit = fitted(alone, trial.fit.model, trial.free, start=trial.start).fit
+    recorded_ = Columns.of(fit, alone.fitted, []).information(0, len(run.time), hold=True)
+    errors = [np.sqrt(np.diag(np.linalg.inv(m))) for m in (predicted, recorded_.matrix)]
+    # What no angle that large tells of the last swings is another matter.
+    assert errors[0] == pytest.approx(errors[1], rel=0.3)
+
+
+def test_exact_equals_are_told_apart_by_nothing() -> None:
+    _, _, found = hidden(6, "bias_torque", size=0.3, free=2)
+    outlook = found.advice.outlook
+    assert outlook is not None
+    assert {frozenset(pair) for pair in outlook.equals} == {
+        frozenset(("bias_torque", "asymmetric_coulomb"))
+    }
+    assert "No free decay tells" in found.advice.next_experiment
+    assert "bias_torque" not in outlook.about or "asymmetric_coulomb" not in outlook.about
+
+
+def test_every_verdict_has_a_table_and_json_without_gaps() -> None:
+    _, _, found = hidden(5, free=1)
+    assert found.verdict == "none"
+    fields = as_json(found)
+    table = fields["proposals"]
+    assert table["aim"] == "limits"
+    json.dumps(table, allow_nan=False)
+    (chosen,) = [row for row in table["experiments"] if row["recommended"]]
+    assert chosen["what"] in fields["next_experiment"]
+    assert chosen["predicted"] <= table["wanted"] < table["now"]
+    # The least recording time of all that do enough.
+    enough = [r["seconds"] for r in table["experiments"] if r["predicted"] <= table["wanted"]]
+    assert chosen["seconds"] == min(enough)
+    assert all(run["drive"] is None for row in table["experiments"] for run in row["runs"])
+
+
+def test_what_a_free_decay_does_not_show_has_no_limit() -> None:
+    _, _, found = hidden(5, free=1)
+    limits = found.advice.limits
+    assert limits["added_mass"].size == math.inf
+    # One period a turn is gravity itself.
+    assert [c.shape["n"] for c in limits["bearing_harmonic"].unseen] == [1.0]
+    assert limits["encoder_offset"].size == pytest.approx(limits["rig_tilt"].size, rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
+    """Against sums of squares of normal draws about the expected gain."""
+    rng = np.random.default_rng(1)
+    mean = np.zeros(count)
+    mean[0] = math.sqrt(needed(22.0, count))
+    gains = np.sum((mean + rng.standard_normal((200_000, count))) ** 2, axis=1)
+    assert np.mean(gains > 22.0) == pytest.approx(0.95, abs=0.002)
+
+
+def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
+    """The limit of clean records; the same rig then hides it, with other noise."""
+    _, _, clean = hidden(11, free=2, noise=0.2)
+    limit = clean.advice.limits["encoder_gain"].size
+    found = 0
+    for size in (limit, -limit):
+        _, _, seen = hidden(11, f"encoder_gain,e={size:.6g}", free=2, noise=0.2)
+        found += seen.verdict != "none"
+    assert found == 2
+    _, _, faint = hidden(11, f"encoder_gain,e={limit / 4:.6g}", free=2, noise=0.2)
+    assert faint.verdict == "none"
+
+
+def test_what_columns_others_follow_is_the_schur_complement() -> None:
+    """Against least squares on the columns themselves."""
+    rng = np.random.default_rng(2)
+    x = rng.standard_normal((300, 5)) * [1, 1e3, 1e-4, 7, 1]
+    x[:, 4] = x[:, 0] + 2e-3 * x[:, 1]
+    f = Information(x.T @ x)
+    rest = x[:, 2] - x[:, [0, 1]] @ np.linalg.lstsq(x[:, [0, 1]], x[:, 2])[0]
+    assert f.own([2], [0, 1])[0, 0] == pytest.approx(rest @ rest)
+    assert f.own([4], [0, 1, 3])[0, 0] == 0
+    assert f.followed([4], [0, 1], [3])[:, 0] == pytest.approx([1, 2e-3])
+
+
+def test_chances_of_names() -> None:
+    """Twice the difference of log-likelihoods has the mean s G and the variance 4 s G."""
+    rng = np.random.default_rng(3)
+    draws = 16 + 2 * 4 * rng.standard_normal(400_000)
+    assert wrong_name(16) == pytest.approx(np.mean(draws < 0), rel=0.03)
+    assert one_left(16) == pytest.approx(np.mean(draws > 10), rel=0.01)
+
+
+def test_the_rig_does_runs_that_are_planned() -> None:
+    """The first runs are the same whatever follows; what contradicts itself is refused."""
+    request = Request("hidden", seed=4, effects=("none",), free=1, forced=0)
+    first = virtual_rig.make(request).runs[0]
+    plan = RunPlan("free", 0.3, 1.0, 5.0, lab_time=900.0)
+    asked = Request("hidden", seed=4, effects=("none",), plans=(first.plan, plan))
+    again, new = virtual_rig.make(asked).runs
+    assert np.array_equal(again.angle, first.angle)
+    assert new.time[-1] == pytest.approx(5.0, abs=0.02)
+    assert new.path.angle(np.zeros(1))[0] == pytest.approx(0.3)
+    with pytest.raises(InputError, match="free is given beside plans"):
+        Request("hidden", free=1, plans=(plan,))
+    with pytest.raises(InputError, match="plan 0: a duration of 0 s"):
+        Request("hidden", plans=(dataclasses.replace(plan, duration=0.0),))
