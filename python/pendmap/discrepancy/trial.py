@@ -7,7 +7,7 @@ import functools
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.candidates import place
+from pendmap.discrepancy.candidates import placed
 from pendmap.discrepancy.noise import Remainder, remainder_of
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 
@@ -171,11 +171,8 @@ def with_candidates(
     start : mapping of str to float
         Sizes and phases to begin with.
     """
-    model = trial.fit.model
-    free = list(trial.free)
-    for candidate in added:
-        model = place(model, candidate)
-        free += [*candidate.free, *candidate.adapted]
+    model = placed(trial.fit.model, added)
+    free = [*trial.free, *(name for c in added for name in (*c.free, *c.adapted))]
     begin = trial.start | dict(start)
     chosen = (*trial.chosen, *added)
     found = fitted(
