@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.discrepancy.trial import Held, Trial, tried, with_candidates
+from pendmap.discrepancy.trial import (
+    Held,
+    Trial,
+    from_short_windows,
+    tried,
+    with_candidates,
+)
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -95,6 +101,7 @@ class Refits:
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
         if found is None:
             return None
+        found = self._unslipped(found)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -142,6 +149,12 @@ class Refits:
             return Found(best_trial, tried(self.evidence, best_trial))
         except InputError:
             return found
+
+    def _unslipped(self, found: Trial) -> Trial:
+        try:
+            return from_short_windows(self.evidence, found)
+        except InputError:
+            return found  # from short windows on the motion is lost
 
     def _fit(
         self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]

@@ -19,7 +19,15 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
-__all__ = ["ASTRAY", "Held", "Trial", "fitted", "tried", "with_candidates"]
+__all__ = [
+    "ASTRAY",
+    "Held",
+    "Trial",
+    "fitted",
+    "from_short_windows",
+    "tried",
+    "with_candidates",
+]
 
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
@@ -185,10 +193,31 @@ def with_candidates(
         steps=FEW_STEPS,
         least_gain=LITTLE,
     )
-    if trial.chi2 > ASTRAY * max(trial.fit.degrees, 1):
-        again = fitted(evidence, found.fit.model, free, chosen, start=found.start)
-        return min((found, again), key=lambda t: t.chi2)
     return found
+
+
+def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:
+    """Fit a trial's model again from short windows on, if it may have slipped; return the better.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    trial : Trial
+        The fit.
+    """
+    if trial.chi2 <= ASTRAY * max(trial.fit.degrees, 1):
+        return trial
+    again = fitted(
+        evidence,
+        trial.fit.model,
+        trial.free,
+        trial.chosen,
+        start=trial.start,
+        steps=FEW_STEPS,
+        least_gain=LITTLE,
+    )
+    return min((trial, again), key=lambda t: t.chi2)
 
 
 def tried(evidence: Evidence, trial: Trial) -> Held:
