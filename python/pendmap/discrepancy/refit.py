@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.discrepancy.trial import (
+    CLEAN,
     Held,
     Trial,
     from_short_windows,
@@ -90,6 +91,8 @@ class Refits:
         found = self._fit(trial, added, start)
         if len(added) == 1 and added[0].adapted:
             for k in self._other_shapes(scores, places[0]):
+                if found is not None and found.remainder.z < CLEAN:
+                    break  # where nothing is left no shape gains anything
                 bent = scores.scores[k]
                 again = self._fit(trial, [bent.candidate], bent.start)
                 found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)

@@ -9,7 +9,7 @@ from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import Trial, fitted, tried
+from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,11 +43,11 @@ BENT: Final = 2
 ALIKE: Final = 1.5
 """Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
 
-CLEAN: Final = 1.0
-"""Standard errors of the slow part of the residuals below which nothing to speak of is left."""
-
 BEGUN: Final = 2
 """So often a search begins again from a better baseline."""
+
+LESS_STEPS: Final = 16
+"""Steps of a fit without one of the effects: beyond them a model that is wrong only creeps."""
 
 ZERO: Final = "encoder_offset"
 """Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
@@ -293,7 +293,14 @@ class Search:
         start = {name: value for name, value in trial.start.items() if name not in gone}
         try:
             return fitted(
-                self.evidence, model, free, chosen, start=start, windows=trial.fit.windows
+                self.evidence,
+                model,
+                free,
+                chosen,
+                start=start,
+                windows=trial.fit.windows,
+                steps=LESS_STEPS,
+                least_gain=LITTLE,
             )
         except InputError:
             # Without it the motion is lost from here: from short windows on, as the baseline began.

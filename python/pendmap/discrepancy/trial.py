@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ASTRAY",
+    "CLEAN",
+    "LITTLE",
     "Held",
     "Trial",
     "fitted",
@@ -41,6 +43,9 @@ MOST_STEPS: Final = 40
 
 LITTLE: Final = 0.05
 """Of a sum of squares: far below what decides between candidates."""
+
+CLEAN: Final = 1.0
+"""Standard errors of the slow part of the residuals below which nothing to speak of is left."""
 
 FEW_STEPS: Final = 12
 """Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
@@ -183,7 +188,7 @@ def with_candidates(
     free = [*trial.free, *(name for c in added for name in (*c.free, *c.adapted))]
     begin = trial.start | dict(start)
     chosen = (*trial.chosen, *added)
-    found = fitted(
+    return fitted(
         evidence,
         model,
         free,
@@ -193,7 +198,6 @@ def with_candidates(
         steps=FEW_STEPS,
         least_gain=LITTLE,
     )
-    return found
 
 
 def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:
