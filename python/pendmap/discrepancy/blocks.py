@@ -4,7 +4,7 @@ The mean of readings over a block is a reading at the mean of their times, with 
 over their squared errors: ``sum(w x)/sum(w)`` has the error ``sum(w)^(-1/2)``, and nothing that the
 readings say about a slow motion is lost. It exceeds the angle there by the curvature,
 ``var(t) th''/2``, which is taken off with ``th''`` of the parabola through five blocks; what
-is left, ``T^4 th''''/1920`` of a block of length ``T``, is ``1e-7`` of a swing.
+is left, of the order of ``T^4 th''''/60`` of a block of length ``T``, is ``1e-6`` of a swing.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def in_blocks(run: FitRun) -> FitRun:
         return run
     time, theta, weight, variance = found
     counted = weight > 0
-    theta = theta - 0.5 * variance * _curvature(time, theta)
+    # What does not count may be anything, and bends no parabola of its neighbours.
+    known = np.where(counted, theta, np.interp(time, time[counted], theta[counted]))
+    theta = theta - 0.5 * variance * _curvature(time, known)
     # One that does not count has any error.
     sigma = np.where(counted, weight, np.median(weight[counted])) ** -0.5
     return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=counted)
