@@ -31,6 +31,9 @@ motion in their spectrum, and a window has enough of them."""
 FEWEST: Final = 1000
 """Blocks that a record has at least: below, the integrator's own steps are what takes time."""
 
+LEAST: Final = 3
+"""Readings of a block at least: pairs save little."""
+
 NEIGHBOURS: Final = 2
 """Blocks on either side through which a parabola is laid."""
 
@@ -46,7 +49,7 @@ def in_blocks(run: FitRun) -> FitRun:
     weights = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape) ** -2.0
     if run.trusted is not None:
         weights = np.where(run.trusted, weights, 0.0)
-    for size in range(run.time.size // FEWEST, 1, -1):
+    for size in range(run.time.size // FEWEST, LEAST - 1, -1):
         found = _divided(run.time, run.theta, weights, size)
         if _dense(*found[:3]):
             break
