@@ -80,6 +80,11 @@ class Refits:
             self._known[key] = self._refitted(trial, scores, places, added)
         return self._known[key]
 
+    def known(self, trial: Trial, added: Sequence[Candidate]) -> Trial | None:
+        """Return the fit of a trial's model with candidates, if it was made."""
+        found = self._known.get((key_of(trial.chosen), key_of(added)))
+        return None if found is None else found.trial
+
     def _refitted(
         self,
         trial: Trial,
@@ -104,7 +109,7 @@ class Refits:
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
         if found is None:
             return None
-        found = self._unslipped(found)
+        found = self.unslipped(found)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -153,7 +158,8 @@ class Refits:
         except InputError:
             return found
 
-    def _unslipped(self, found: Trial) -> Trial:
+    def unslipped(self, found: Trial) -> Trial:
+        """Return a fit from short windows on, where one is astray and that is better."""
         try:
             return from_short_windows(self.evidence, found)
         except InputError:

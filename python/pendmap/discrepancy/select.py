@@ -280,8 +280,21 @@ class Search:
         chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
         key = key_of(chosen)
         if key not in self._rests:
-            self._rests[key] = self._less(trial, dropped, chosen)
+            self._rests[key] = self._rest(trial, dropped, chosen)
         return self._rests[key]
+
+    def _rest(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
+        """Return the best fit of the effects that stay: from with the other one, or without it.
+
+        Where much is missing a fit that begins at a good model's windows may be lost.
+        """
+        known = self._refits.known(self.base.trial, chosen)
+        if known is not None and known.fit.converged:
+            return known
+        rest = self._less(trial, dropped, chosen)
+        if known is not None:
+            return min((rest, known), key=lambda t: t.chi2)
+        return rest if rest.fit.converged else self._refits.unslipped(rest)
 
     def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
         gone = {*dropped.free, *dropped.adapted}

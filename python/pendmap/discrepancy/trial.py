@@ -240,7 +240,16 @@ def tried(evidence: Evidence, trial: Trial) -> Held:
     model, free = trial.fit.model, trial.free
     if not evidence.inside:
         known = {name: value for name, value in trial.start.items() if "[" not in name}
-        fit = fit_runs(evidence.held, model, free, start=known, profiled=(), hold=True)
+        fit = fit_runs(
+            evidence.held,
+            model,
+            free,
+            start=known,
+            profiled=(),
+            hold=True,
+            steps=FEW_STEPS,
+            least_gain=LITTLE,
+        )
         adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
         return Held(fit.chi2, max(fit.samples - adapted, 1), fit)
     places = {of: k for k, of in enumerate(evidence.held_of)}
