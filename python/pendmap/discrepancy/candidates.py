@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
     from pendmap.model.units import Units
 
-__all__ = ["Candidate", "candidates", "checked_own", "own_name", "place"]
+__all__ = ["Candidate", "candidates", "checked_own", "own_name", "placed"]
 
 SCANNED: Final = 6
 """Values of a shape parameter at which a candidate is scored, from the least typical one to the
@@ -127,15 +127,17 @@ def own_name(effect: str) -> str | None:
     return known[0] if len(entries) == 1 and known is not None else None
 
 
-def place(model: Rig, candidate: Candidate) -> Rig:
-    """Return a model with a candidate in it, at size 0, to be scored or fitted."""
-    if own_name(candidate.name) is not None:
+def placed(model: Rig, added: Sequence[Candidate]) -> Rig:
+    """Return a model with candidates in it, at size 0, to be scored or fitted."""
+    units = model.units
+    effects = [c.effect(units) for c in added if own_name(c.name) is None]
+    if not effects:
         return model
-    kept = tuple(effect for effect in model.effects if effect.name != candidate.name)
-    driven = candidate.effect(model.units)
+    names = {effect.name for effect in effects}
+    kept = [effect for effect in model.effects if effect.name not in names]
     # What a drive effect changes stands in each run; the model only needs some frequency.
-    omega = model.Omega or (1.0 if driven.drives else 0.0)
-    return dataclasses.replace(model, effects=(*kept, driven), Omega=omega)
+    omega = model.Omega or float(any(effect.drives for effect in effects))
+    return dataclasses.replace(model, effects=(*kept, *effects), Omega=omega)
 
 
 def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.discrepancy.blocks import in_blocks
 from pendmap.errors import InputError
 from pendmap.identification.joint import as_fit_run
 from pendmap.identification.reading import Reading, reading_of
@@ -47,7 +48,8 @@ class Evidence:
     readings : tuple of Reading
         What the readings of each are worth.
     fitted, held : tuple of FitRun
-        What models are fitted to, and what they are tried on.
+        What models are fitted to, and what they are tried on; readings far denser than the motion
+        are means over blocks, :func:`pendmap.discrepancy.blocks.in_blocks`.
     fitted_of, held_of : tuple of int
         Which of ``runs`` each belongs to.
     inside : bool
@@ -114,7 +116,9 @@ def evidence_of(experiment: Experiment) -> Evidence:
     readings = tuple(
         reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
     )
-    every = [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)]
+    every = [
+        in_blocks(as_fit_run(run, reading)) for run, reading in zip(runs, readings, strict=True)
+    ]
     marked = [k for k, run in enumerate(runs) if run.hold_out] or _middle_runs(every)
     if marked:
         others = [k for k in range(len(runs)) if k not in marked]

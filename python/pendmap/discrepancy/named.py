@@ -18,9 +18,20 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.verdict import Judgement
+    from pendmap.identification.fitting import TrajectoryFit
     from pendmap.model import Formula, Rig
 
-__all__ = ["Z95", "NamedEffect", "diagnosed_model", "named_effects"]
+__all__ = ["Z95", "NamedEffect", "diagnosed_model", "named_effects", "unphysical"]
+
+OPPOSING: Final = (
+    "c_over_m",
+    "Tr",
+    "quadratic_drag.q",
+    "cubic_damping.k3",
+    "power_law_drag.q",
+    "load_dependent_friction.k",
+)
+"""Coefficients of laws that oppose the motion wherever the pendulum is."""
 
 Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""
@@ -160,11 +171,9 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         "provenance": provenance(files, command)
         | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
     }
-    unphysical = {
-        name: fit[name] for name in ("c_over_m", "Tr") if name in fit.estimates and fit[name] < 0
-    }
-    if unphysical:
-        notes["provenance"]["unphysical"] = unphysical
+    negative = unphysical(fit)
+    if negative:
+        notes["provenance"]["unphysical"] = negative
     return dataclasses.replace(
         model,
         **{name: 0.0 for name in own if name is not None},
@@ -174,6 +183,15 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         else (model.Omega or 1.0),
         notes=notes,
     )
+
+
+def unphysical(fit: TrajectoryFit) -> dict[str, float]:
+    """Return the coefficients of damping and friction that a fit made negative, with their values.
+
+    No pendulum has them: they make up for what the model lacks. Their law opposes the motion
+    everywhere, so that a negative one feeds it.
+    """
+    return {n: fit[n] for n in OPPOSING if n in fit.estimates and fit[n] < 0}
 
 
 def _called(name: str, named: dict[str, Effect]) -> str:

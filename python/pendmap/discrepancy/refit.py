@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.discrepancy.trial import Held, Trial, tried, with_candidates
+from pendmap.discrepancy.trial import (
+    CLEAN,
+    Held,
+    Trial,
+    from_short_windows,
+    tried,
+    with_candidates,
+)
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -75,6 +82,11 @@ class Refits:
             self._known[key] = self._refitted(trial, scores, places, added)
         return self._known[key]
 
+    def known(self, trial: Trial, added: Sequence[Candidate]) -> Trial | None:
+        """Return the fit of a trial's model with candidates, if it was made."""
+        found = self._known.get((key_of(trial.chosen), key_of(added)))
+        return None if found is None else found.trial
+
     def _refitted(
         self,
         trial: Trial,
@@ -91,6 +103,8 @@ class Refits:
         found = self._fit(trial, added, first)
         if adapted:
             for k in self._other_shapes(scores, places[0]):
+                if found is not None and found.remainder.z < CLEAN:
+                    break  # where nothing is left no shape gains anything
                 bent = scores.scores[k]
                 again = self._fit(trial, [bent.candidate], bent.start)
                 found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
@@ -100,6 +114,7 @@ class Refits:
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
         if found is None:
             return None
+        found = self.unslipped(found)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -147,6 +162,13 @@ class Refits:
             return Found(best_trial, tried(self.evidence, best_trial))
         except InputError:
             return found
+
+    def unslipped(self, found: Trial) -> Trial:
+        """Return a fit from short windows on, where one is astray and that is better."""
+        try:
+            return from_short_windows(self.evidence, found)
+        except InputError:
+            return found  # from short windows on the motion is lost
 
     def _fit(
         self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]

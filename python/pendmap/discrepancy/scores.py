@@ -23,8 +23,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.discrepancy.candidates import place
-from pendmap.identification.sensitivity import sensitivities
+from pendmap.discrepancy.candidates import placed
+from pendmap.identification.sensitivity import (
+    STATE,
+    WindowSlopes,
+    freed_together,
+    window_slopes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,6 +43,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 __all__ = ["Score", "Scores", "scores_of"]
+
+PASS: Final = 16
+"""So many directions the integrator carries at once: effects beyond them cost another pass, and
+each pass evaluates all effects that the model has."""
 
 SAME: Final = 1e-6
 """A cosine that falls short of 1 by less is that of two names for one thing."""
@@ -138,27 +147,36 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
     trial : Trial
         The fit.
     pool : sequence of sequence of Candidate
-        By effect, each in its shapes; shapes of different effects are derived together.
+        By effect, each in its shapes; as many are derived together as one pass of the integrator
+        carries, one shape of an effect each.
     """
-    every: list[Candidate] = []
-    parts: list[Floats] = []
-    base, residual = np.zeros((0, 0)), np.zeros(0)
-    for batch in itertools.zip_longest(*pool):
-        present = [candidate for candidate in batch if candidate is not None]
-        model = trial.fit.model
-        for candidate in present:
-            model = place(model, candidate)
-        names = [name for candidate in present for name in candidate.free]
-        found = sensitivities(trial.fit, evidence.fitted, names, model)
+    fit = trial.fit
+    carried = len({name.partition("[")[0] for name in fit.names}) + STATE
+    every, names, windows = [], list[str](), list[WindowSlopes]()
+    for present in _passes(pool, max(PASS - carried, 1)):
+        own = [name for candidate in present for name in candidate.free]
+        model = placed(fit.model, present)
+        found, slopes = window_slopes(fit, evidence.fitted, own, model)
+        wanted = [found.index(name) for name in own]
         if not every:
-            old = [k for k, name in enumerate(found.names) if name in trial.fit.estimates]
-            base, residual = _orthonormal(found.columns[:, old]), found.residual
+            names = [name for name in found if name in fit.estimates]
+            wanted = [found.index(name) for name in names] + wanted
+        each = [dataclasses.replace(w, columns=w.columns[:, wanted]) for w in slopes]
+        windows = (
+            [
+                dataclasses.replace(one, columns=np.hstack([one.columns, further.columns]))
+                for one, further in zip(windows or each, each, strict=True)
+            ]
+            if every
+            else each
+        )
         every += present
-        parts.append(found.columns[:, [found.names.index(name) for name in names]])
     if not every:
         return Scores((), (), np.zeros((0, 0)), np.zeros(0))
+    together = freed_together((), windows)
+    base, residual = _orthonormal(together.columns[:, : len(names)]), together.residual
+    columns = together.columns[:, len(names) :]
     residual = residual - base @ (base.T @ residual)
-    columns = np.hstack(parts)
     sizes = np.linalg.norm(columns, axis=0)
     columns /= np.where(sizes > 0, sizes, 1.0)
     # Twice is enough: what rounding left of the base the first time is gone.
@@ -177,6 +195,22 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
         units = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
         scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], units))
     return Scores(tuple(scores), tuple(where), gram, pull)
+
+
+def _passes(pool: Sequence[Sequence[Candidate]], room: int) -> list[list[Candidate]]:
+    """Divide candidates, one shape of an effect each, among passes of so many parameters."""
+    passes: list[list[Candidate]] = []
+    for batch in itertools.zip_longest(*pool):
+        left = 0
+        for candidate in batch:
+            if candidate is None:
+                continue
+            if left < len(candidate.free):
+                passes.append([])
+                left = room
+            passes[-1].append(candidate)
+            left -= len(candidate.free)
+    return passes
 
 
 def _scored(candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, faint: float) -> Score:

@@ -10,7 +10,7 @@ from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import Trial, fitted, tried
+from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,11 +52,11 @@ BENT: Final = 2
 ALIKE: Final = 1.5
 """Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
 
-CLEAN: Final = 1.0
-"""Standard errors of the slow part of the residuals below which nothing to speak of is left."""
-
 BEGUN: Final = 2
 """So often a search begins again from a better baseline."""
+
+LESS_STEPS: Final = 16
+"""Steps of a fit without one of the effects: beyond them a model that is wrong only creeps."""
 
 ZERO: Final = "encoder_offset"
 """Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
@@ -302,8 +302,21 @@ class Search:
         chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
         key = key_of(chosen)
         if key not in self._rests:
-            self._rests[key] = self._less(trial, dropped, chosen)
+            self._rests[key] = self._rest(trial, dropped, chosen)
         return self._rests[key]
+
+    def _rest(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
+        """Return the best fit of the effects that stay: from with the other one, or without it.
+
+        Where much is missing a fit that begins at a good model's windows may be lost.
+        """
+        known = self._refits.known(self.base.trial, chosen)
+        if known is not None and known.fit.converged:
+            return known
+        rest = self._less(trial, dropped, chosen)
+        if known is not None:
+            return min((rest, known), key=lambda t: t.chi2)
+        return rest if rest.fit.converged else self._refits.unslipped(rest)
 
     def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
         gone = {*dropped.free, *dropped.adapted}
@@ -315,7 +328,14 @@ class Search:
         start = {name: value for name, value in trial.start.items() if name not in gone}
         try:
             return fitted(
-                self.evidence, model, free, chosen, start=start, windows=trial.fit.windows
+                self.evidence,
+                model,
+                free,
+                chosen,
+                start=start,
+                windows=trial.fit.windows,
+                steps=LESS_STEPS,
+                least_gain=LITTLE,
             )
         except InputError:
             # Without it the motion is lost from here: from short windows on, as the baseline began.

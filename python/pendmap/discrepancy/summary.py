@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.discrepancy.named import unphysical
 from pendmap.records.summary import findings_said
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             "allowed": judgement.ratio_allowed,
         },
         "baseline": {name: e.value for name, e in base.estimates.items()},
+        "unphysical": unphysical(fit),
         "parameters": {
             name: {"value": e.value, "stderr": e.stderr} for name, e in fit.estimates.items()
         },
@@ -225,10 +227,8 @@ def as_text(found: Discrepancy) -> Iterator[str]:
     )
     if judgement.standings:
         yield f"Share of the held-out gap closed by what is nearest: {judgement.closed:.0%}"
-    for name in ("c_over_m", "Tr"):
-        estimates = found.best.trial.fit.estimates
-        if name in estimates and estimates[name].value < 0:
-            yield f"{name} is {estimates[name].value:.3g}, which no pendulum has"
+    for name, value in unphysical(found.best.trial.fit).items():
+        yield f"{name} is {value:.3g}, unphysical: no pendulum feeds its own motion"
     for row in found.where[:3]:
         what = "torque along the motion" if row["along_motion"] else "torque"
         yield (

@@ -7,7 +7,7 @@ import functools
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.candidates import place
+from pendmap.discrepancy.candidates import placed
 from pendmap.discrepancy.noise import Remainder, remainder_of
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 
@@ -19,7 +19,17 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
-__all__ = ["ASTRAY", "Held", "Trial", "fitted", "tried", "with_candidates"]
+__all__ = [
+    "ASTRAY",
+    "CLEAN",
+    "LITTLE",
+    "Held",
+    "Trial",
+    "fitted",
+    "from_short_windows",
+    "tried",
+    "with_candidates",
+]
 
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
@@ -33,6 +43,9 @@ MOST_STEPS: Final = 40
 
 LITTLE: Final = 0.05
 """Of a sum of squares: far below what decides between candidates."""
+
+CLEAN: Final = 1.0
+"""Standard errors of the slow part of the residuals below which nothing to speak of is left."""
 
 FEW_STEPS: Final = 12
 """Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
@@ -174,14 +187,11 @@ def with_candidates(
     start : mapping of str to float
         Sizes and phases to begin with.
     """
-    model = trial.fit.model
-    free = list(trial.free)
-    for candidate in added:
-        model = place(model, candidate)
-        free += [*candidate.free, *candidate.adapted]
+    model = placed(trial.fit.model, added)
+    free = [*trial.free, *(name for c in added for name in (*c.free, *c.adapted))]
     begin = trial.start | dict(start)
     chosen = (*trial.chosen, *added)
-    found = fitted(
+    return fitted(
         evidence,
         model,
         free,
@@ -191,10 +201,30 @@ def with_candidates(
         steps=FEW_STEPS,
         least_gain=LITTLE,
     )
-    if trial.chi2 > ASTRAY * max(trial.fit.degrees, 1):
-        again = fitted(evidence, found.fit.model, free, chosen, start=found.start)
-        return min((found, again), key=lambda t: t.chi2)
-    return found
+
+
+def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:
+    """Fit a trial's model again from short windows on, if it may have slipped; return the better.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    trial : Trial
+        The fit.
+    """
+    if trial.chi2 <= ASTRAY * max(trial.fit.degrees, 1):
+        return trial
+    again = fitted(
+        evidence,
+        trial.fit.model,
+        trial.free,
+        trial.chosen,
+        start=trial.start,
+        steps=FEW_STEPS,
+        least_gain=LITTLE,
+    )
+    return min((trial, again), key=lambda t: t.chi2)
 
 
 def tried(evidence: Evidence, trial: Trial) -> Held:
@@ -213,7 +243,16 @@ def tried(evidence: Evidence, trial: Trial) -> Held:
     model, free = trial.fit.model, trial.free
     if not evidence.inside:
         known = {name: value for name, value in trial.start.items() if "[" not in name}
-        fit = fit_runs(evidence.held, model, free, start=known, profiled=(), hold=True)
+        fit = fit_runs(
+            evidence.held,
+            model,
+            free,
+            start=known,
+            profiled=(),
+            hold=True,
+            steps=FEW_STEPS,
+            least_gain=LITTLE,
+        )
         adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
         return Held(fit.chi2, max(fit.samples - adapted, 1), fit)
     places = {of: k for k, of in enumerate(evidence.held_of)}

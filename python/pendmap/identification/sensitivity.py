@@ -21,7 +21,14 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
-__all__ = ["Sensitivities", "WindowSlopes", "sensitivities", "window_slopes"]
+__all__ = [
+    "STATE",
+    "Sensitivities",
+    "WindowSlopes",
+    "freed_together",
+    "sensitivities",
+    "window_slopes",
+]
 
 STATE: Final = 2
 """Columns of an initial state."""
@@ -152,7 +159,11 @@ def sensitivities(
     InputError
         If a name is not known, or the motion is lost.
     """
-    names, windows = window_slopes(fit, runs, candidates, model)
+    return freed_together(*window_slopes(fit, runs, candidates, model))
+
+
+def freed_together(names: tuple[str, ...], windows: Sequence[WindowSlopes]) -> Sensitivities:
+    """Return the derivatives of all windows, what each initial state can follow taken off."""
     columns, residuals, labels = [], [], []
     for index, window in enumerate(windows):
         own, _, residual, counted = window.freed(np.zeros((len(window.residual), 0)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.discrepancy.named import unphysical
 from pendmap.discrepancy.rivals import ALIKE
 from pendmap.discrepancy.select import GATE
 from pendmap.discrepancy.strength import strength_of
@@ -135,17 +136,12 @@ def _said(estimate: Estimate) -> str:
 
 def _unphysical(found: Discrepancy) -> Iterator[Block]:
     for fit, which in ((found.base.trial.fit, "baseline"), (found.best.trial.fit, "model found")):
-        for name in ("c_over_m", "Tr"):
-            if name in fit.estimates and fit[name] < 0:
-                yield Paragraph(
-                    (
-                        Name(name),
-                        (
-                            f" of the {which} is negative, which no pendulum has: it makes up for "
-                            "what is missing."
-                        ),
-                    )
-                )
+        for name in unphysical(fit):
+            said = (
+                f" of the {which} is negative: that is unphysical, no pendulum has it. It makes up"
+                " for what is missing."
+            )
+            yield Paragraph((Name(name), said))
 
 
 def ranked(found: Discrepancy) -> Section:
