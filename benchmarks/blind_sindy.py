@@ -1,0 +1,178 @@
+"""``pendmap diagnose`` beside SINDy on the same experiments, by bins of G.
+
+    python benchmarks/blind.py --experiments 1000 --out blind.jsonl
+    python benchmarks/blind_sindy.py blind.jsonl --workers 2 --out sindy.jsonl
+
+Each experiment that ``blind.py`` wrote down with one effect hidden, two or none is recorded again,
+the same to the last bit. SINDy regresses ``th''`` sparsely on the candidates of ``diagnose`` in the
+same shapes (:mod:`sindy_features`); torques have the very form that the rig hides. Angle and
+velocity come from a filter of Savitzky and Golay whose width goes by the noise.
+
+- Strong form (Brunton, Proctor & Kutz 2016): the second derivative of the smoothed angle, its
+  features through the same smoothing.
+- Weak form (Messenger & Bortz 2021): integrals against test functions, derivatives by parts, rows
+  whitened by the noise that overlapping test functions share (Bortz, Messenger & Dukic 2023).
+
+Sparse models come from pysindy (Kaptanoglu et al. 2022). Which of its optimizers, the widths and
+the penalty on a coefficient were chosen for the most right answers on experiments of another seed
+(901), for each form. As in ``diagnose`` gravity, viscous damping and Coulomb friction are in every
+model, and at most three effects besides; SINDy is told so. "Right" is what ``blind_report.right``
+says for both. SINDy is given the classes of equals that its own features cannot tell apart, and
+those that pendmap found.
+
+References
+----------
+Brunton, Proctor & Kutz (2016), PNAS 113, 3932. Messenger & Bortz (2021), J. Comput. Phys. 443,
+110525. Bortz, Messenger & Dukic (2023), Bull. Math. Biol. 85, 110. Kaptanoglu et al. (2022), J.
+Open Source Softw. 7, 3994.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import itertools
+import json
+import os
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+# One thread a process, before numpy is imported: the processes share the processor.
+os.environ.update(
+    dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
+)
+
+import numpy as np
+
+import blind_cases
+from blind_report import right, strength, true_names, wilson
+from peers.report import machine, note, say, table
+from pendmap.discrepancy.evidence import evidence_of
+from pendmap.identification.joint import as_fit_run
+from sindy_choice import choose
+from sindy_forms import Setting, prepared, regression
+
+WIDTH = 2.0
+SETTINGS = {
+    "strong": Setting("strong", "frols", support=2.5, penalty=1.5),
+    "weak": Setting("weak", "frols", support=2.0, penalty=4.0),
+}
+"""As they did best on seed 901."""
+
+EDGES = (0.0, 12.0, 30.0, 100.0, 300.0, 1000.0, np.inf)
+"""Of the bins of G, of a pair the lesser one's."""
+
+KINDS = ("one", "two", "none")
+
+
+def case_of(row: dict[str, Any]) -> blind_cases.Case:
+    """Return the case of a row, from which the same experiment can be made."""
+    names = [field.name for field in dataclasses.fields(blind_cases.Case)]
+    return blind_cases.Case(**{n: row[n] for n in names} | {"effects": tuple(row["effects"])})
+
+
+def run(row: dict[str, Any]) -> dict[str, Any]:
+    """Make a row's experiment again and let SINDy answer."""
+    result: dict[str, Any] = {"what": row["what"], "seed": row["seed"]}
+    with tempfile.TemporaryDirectory() as name:
+        experiment, _ = blind_cases.record(case_of(row), Path(name))
+        evidence = evidence_of(experiment)
+    runs = [as_fit_run(*pair) for pair in zip(evidence.runs, evidence.readings, strict=True)]
+    begin = time.process_time()
+    data = prepared(runs, WIDTH)
+    shared = time.process_time() - begin
+    for form, setting in SETTINGS.items():
+        begin = time.process_time()
+        model = choose(regression(data, setting), setting)
+        seconds = time.process_time() - begin + shared
+        result[form] = dataclasses.asdict(model) | {"seconds": seconds}
+    return result
+
+
+def judged(row: dict[str, Any], answer: dict[str, Any] | None) -> bool:
+    """Whether an answer is right: pendmap's own, or SINDy's by the same rule.
+
+    Each effect that SINDy chose stands for all that its features, or pendmap, do not tell from it.
+    """
+    if answer is None:
+        names, said = row["named"], row
+        claimed = row["verdict"] != "none"
+    else:
+        names = answer["names"]
+        own = [
+            sorted({*same, *(n for c in row["classes"] if name in c for n in c)})
+            for name, same in zip(names, answer["classes"], strict=True)
+        ]
+        said = row | {"named": names, "classes": own}
+        claimed = bool(names)
+    return right(said) if true_names(row) else not claimed
+
+
+def lines(rows: list[dict[str, Any]], answers: dict[int, dict[str, Any]]) -> list[list[str]]:
+    """Return by kind and bin of G the share that is right: pendmap, SINDy strong and weak."""
+    found = []
+    for what in KINDS:
+        edges = list(itertools.pairwise(EDGES)) if what != "none" else [(0.0, np.inf)]
+        for low, high in edges:
+            own = [r for r in rows if r["what"] == what and low <= strength(r) < high]
+            if not own:
+                continue
+            label = "nothing hidden: silent" if what == "none" else f"{what}, G {low:g} to {high:g}"
+            cells = [wilson(sum(judged(r, None) for r in own), len(own))]
+            for form in SETTINGS:
+                hits = sum(judged(r, answers[r["seed"]][form]) for r in own)
+                cells.append(wilson(hits, len(own)))
+            found.append([label, *cells])
+    return found
+
+
+def main() -> None:
+    """Let SINDy answer what is not answered yet, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("blind", type=Path, help="what blind.py wrote")
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--limit", type=int, default=None, help="only the first so many")
+    parser.add_argument("--out", type=Path, default=Path("sindy.jsonl"), help="SINDy's answers")
+    given = parser.parse_args()
+    if not given.blind.exists():
+        parser.error(f"{given.blind}: there is no such file: allowed is one that blind.py wrote")
+    rows = [row for row in _read(given.blind) if row["what"] in KINDS and "error" not in row]
+    rows = rows[: given.limit]
+    answers = {row["seed"]: row for row in _read(given.out)}
+    left = [row for row in rows if row["seed"] not in answers]
+    with (
+        ProcessPoolExecutor(given.workers) as pool,
+        given.out.open("a", encoding="utf-8") as out,
+    ):
+        for done, answer in enumerate(pool.map(run, left), 1):
+            out.write(json.dumps(answer, default=float) + "\n")
+            out.flush()
+            answers[answer["seed"]] = answer
+            if done % 20 == 0:
+                note(f"{done} of {len(left)}")
+    say(machine(("numpy", "scipy", "pysindy")))
+    say(f"{len(rows)} experiments of {given.blind}; SINDy's answers in {given.out}\n")
+    say(table(["hidden", "pendmap", *(f"SINDy {f}" for f in SETTINGS)], lines(rows, answers)))
+    say("")
+    for form in SETTINGS:
+        spent = [answers[row["seed"]][form]["seconds"] for row in rows]
+        if spent:
+            say(
+                f"SINDy {form}: {np.median(spent):.2f} s of one thread, median; pendmap "
+                f"{np.median([row['seconds'] for row in rows]):.2f} s"
+            )
+
+
+def _read(path: Path) -> list[dict[str, Any]]:
+    """Return a file's rows, but for a last one that is still being written."""
+    if not path.exists():
+        return []
+    whole = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    return [json.loads(line) for line in whole if line.endswith("\n")]
+
+
+if __name__ == "__main__":
+    main()
