@@ -85,7 +85,7 @@ class Trial:
 
     @property
     def chi2(self) -> float:
-        """The sum of squared residuals over standard errors."""
+        """The sum of squared residuals over standard errors, or of deviances of counts."""
         return self.fit.chi2
 
     @property
