@@ -16,10 +16,11 @@ import pytest
 from hidden import once
 from pendmap import virtual_rig
 from pendmap.discrepancy import Discrepancy, diagnose
-from pendmap.discrepancy.information import Columns, Information, Prospects
+from pendmap.discrepancy.ahead import Prospects
+from pendmap.discrepancy.information import Columns, Information
 from pendmap.discrepancy.limits import needed
 from pendmap.discrepancy.menu import menu_of
-from pendmap.discrepancy.power import one_left, wrong_name
+from pendmap.discrepancy.outlook import one_left, wrong_name
 from pendmap.discrepancy.summary import as_json
 from pendmap.discrepancy.trial import fitted
 from pendmap.errors import InputError

@@ -12,7 +12,7 @@ from pendmap.discrepancy.power import seen, separated, tightened
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.limits import Limit
-    from pendmap.discrepancy.power import Outlook, Prospect
+    from pendmap.discrepancy.outlook import Outlook, Prospect
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
     from pendmap.discrepancy.verdict import Judgement
