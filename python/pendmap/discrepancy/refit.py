@@ -107,9 +107,14 @@ class Refits:
             kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
             other = self._fit(trial, added, kick)
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
-        if found is None:
-            return None
-        found = self.unslipped(found)
+        if found is None or found.chi2 > trial.chi2:
+            # More can do all that less did: the motion was lost on the way.
+            other = self._fit(trial, added, start, short=True)
+            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+            if found is None:
+                return None
+        else:
+            found = self.unslipped(found)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -166,10 +171,15 @@ class Refits:
             return found  # from short windows on the motion is lost
 
     def _fit(
-        self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]
+        self,
+        trial: Trial,
+        added: Sequence[Candidate],
+        start: dict[str, float],
+        *,
+        short: bool = False,
     ) -> Trial | None:
         try:
-            return with_candidates(self.evidence, trial, added, start)
+            return with_candidates(self.evidence, trial, added, start, short=short)
         except InputError:
             return None  # the start leads out of the range of numbers
 
