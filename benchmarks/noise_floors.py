@@ -3,8 +3,8 @@
 Free decays into rest, rotations kept up by a torque, and rest, 60 s each, read by sensors of 128 to
 8192 counts at 30 to 1000 Hz with Gaussian noise (degrees) before the rounding. Motions are scipy's
 (DOP853, rtol 1e-10). "over" is the median over the seeds of what `noise_of` says over what such a
-reading errs by, sqrt(noise^2 + count^2 / 12); "farthest" is that of the single record farthest off.
-At rest a sensor whose noise does not reach the next count shows one alone, and its noise is not seen.
+reading errs by, sqrt(noise^2 + count^2 / 12); "farthest" is that of the record farthest off.
+At rest a sensor whose noise does not reach the next count shows one alone: its noise is not seen.
 """
 
 from __future__ import annotations

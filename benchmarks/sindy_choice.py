@@ -41,9 +41,14 @@ def choose(data: Regression, setting: Setting) -> Model:
     scores = [gain - setting.penalty * count for _, gain, count in found]
     k = int(np.argmax(scores))
     support = found[k][0]
-    names = list(dict.fromkeys(data.features[i].effect for i in support))
-    own = [[i for i in support if data.features[i].effect == name] for name in names]
-    return Model(names, [_same(data, part) for part in own], scores[k])
+    names: list[str] = []
+    classes: list[list[str]] = []
+    for name in dict.fromkeys(data.features[i].effect for i in support):
+        if any(name in same for same in classes):
+            continue  # the same feature once more, for what is not linear in it
+        names.append(name)
+        classes.append(_same(data, [i for i in support if data.features[i].effect == name]))
+    return Model(names, classes, scores[k])
 
 
 def models(
@@ -117,7 +122,7 @@ def _path(x: Floats, y: Floats, optimizer: str) -> Iterator[tuple[int, ...]]:
             found.fit(x, y)
             yield from (_support(c) for c in found.history_)
         else:
-            for threshold in scale * np.geomspace(0.01, 1.0, 40):
+            for threshold in scale * np.geomspace(0.01, 30.0, 70):
                 if optimizer == "sr3":
                     found = pysindy.SR3(reg_weight_lam=threshold**2 / 2, max_iter=300)
                 else:

@@ -18,7 +18,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.model import Rig
@@ -78,6 +78,12 @@ class States:
         """Which samples count."""
         trusted = self.run.trusted
         return np.ones(self.theta.shape, bool) if trusted is None else trusted
+
+    @property
+    def velocity_noise(self) -> float:
+        """Standard error of the velocity, rad/s."""
+        filtered = savgol_coeffs(2 * self.half + 1, ORDER, deriv=1, delta=self.interval)
+        return float(np.median(self.run.sigma) * np.linalg.norm(filtered))
 
     @property
     def vertical(self) -> Floats:

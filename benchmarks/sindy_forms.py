@@ -49,7 +49,7 @@ class Setting:
     form : str
         ``strong`` or ``weak``.
     optimizer : str
-        ``stlsq``, ``sr3``, ``frols``, ``ssr`` or ``ensemble``.
+        ``stlsq``, ``sr3``, ``frols`` or ``ssr``.
     support : float
         Half the support of a test function, or of the strong form's filter, times w0.
     penalty : float
@@ -150,6 +150,7 @@ def _weak(
 
     The angle of target and of ``sin th`` is the reading itself: its noise enters both, by
     ``phi'' + phi w0^2 (1 + a) cos th`` to first order; the velocity's integral is by parts too.
+    Where noise of the velocity moves a turn, dry friction has the wrong sign for that long.
     """
     theta, dt = states.run.theta, states.interval
     half = max(round(setting.support / rig.w0 / dt), 8)
@@ -185,6 +186,10 @@ def _weak(
     noise = twice + smooth.multiply(stiff[None, :])
     sigma = float(np.median(states.run.sigma))
     spread = (noise @ noise.T).toarray() * sigma**2
+    turns = np.flatnonzero(np.diff(np.sign(states.velocity)) != 0)
+    late = states.velocity_noise / np.maximum(np.abs(states.acceleration[turns]), rig.friction)
+    moved = smooth[:, turns].toarray() * (2 * rig.friction / dt * late)
+    spread += moved @ moved.T
     spread += 1e-6 * np.mean(np.diag(spread)) * np.eye(len(spread))
     root = cholesky(spread, lower=True)
     white = [

@@ -54,10 +54,10 @@ impl Counts {
         if !(step > 0.0 && step.is_finite()) {
             return Err(range("count", step, "a number above 0"));
         }
-        let mut last = (0.0, 0.0);
+        let mut last = (0.0_f64, 0.0);
         let of = |weight: &f64| {
             // Neighbours mostly have the same, and it takes an integral.
-            if *weight > 0.0 && *weight != last.0 {
+            if *weight > 0.0 && weight.to_bits() != last.0.to_bits() {
                 last = (*weight, surplus(step, *weight));
             }
             last.1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from hidden import once
 from pendmap import virtual_rig
 from pendmap.discrepancy import Discrepancy, diagnose
-from pendmap.discrepancy.information import Columns, Information, Prospects
+from pendmap.discrepancy.ahead import Prospects
+from pendmap.discrepancy.information import Columns, Information
 from pendmap.discrepancy.limits import needed
 from pendmap.discrepancy.menu import menu_of
-from pendmap.discrepancy.power import one_left, wrong_name
+from pendmap.discrepancy.outlook import one_left, wrong_name
 from pendmap.discrepancy.summary import as_json
 from pendmap.discrepancy.trial import fitted
 from pendmap.errors import InputError
@@ -218,3 +221,16 @@ def test_the_rig_does_runs_that_are_planned() -> None:
         Request("hidden", free=1, plans=(plan,))
     with pytest.raises(InputError, match="plan 0: a duration of 0 s"):
         Request("hidden", plans=(dataclasses.replace(plan, duration=0.0),))
+
+
+def test_what_is_not_enough_is_said_to_be_so() -> None:
+    """Of two drags whose gain is small, no run of the menu makes sure: so many more would."""
+    found = once("quadratic_drag", size=0.1)
+    outlook, best = found.advice.outlook, found.advice.best
+    assert outlook is not None
+    assert best is not None
+    assert best.value == max(p.value for p in outlook.prospects) < outlook.wanted
+    said = re.search(r"for 25 about (\d+) such runs are needed", found.advice.next_experiment)
+    assert said is not None
+    ratio = (25 - outlook.now) / (best.value - outlook.now)
+    assert int(said[1]) == math.ceil(ratio * len(best.proposal.runs))

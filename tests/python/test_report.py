@@ -108,7 +108,8 @@ def test_every_verdict_has_its_report(verdict: str, tmp_path: Path) -> None:
     if verdict == "ambiguous":
         (names,) = found.equivalent
         assert all(f"`{name}`" in markdown.split("\n")[2] for name in names)
-        assert "25 are needed" in markdown
+        assert "predicted s G" in markdown
+        assert "| wrong name | one name left |" in markdown
 
 
 def test_its_numbers_are_those_of_the_json() -> None:

@@ -5,7 +5,8 @@ use pendmap::fit::descent::Point;
 use pendmap::fit::problem::{Counts, Problem, Slot};
 use pendmap::fit::window::Window;
 
-use crate::fit_records::{free, record, undriven};
+use crate::fit_records::{free, record};
+use crate::support::undriven;
 
 /// `Phi(high) - Phi(low)` by Simpson's rule.
 fn between(low: f64, high: f64) -> f64 {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.limits import detection_limits
@@ -11,7 +12,7 @@ from pendmap.discrepancy.power import seen, separated, tightened
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.limits import Limit
-    from pendmap.discrepancy.power import Outlook, Prospect
+    from pendmap.discrepancy.outlook import Outlook, Prospect
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores
     from pendmap.discrepancy.verdict import Judgement
@@ -121,7 +122,12 @@ def _revealed(judgement: Judgement, name: str) -> str:
 
 def _separation(outlook: Outlook, best: Prospect) -> str:
     names = ", ".join(outlook.about[:-1]) + f" and {outlook.about[-1]}"
-    enough = "" if outlook.reaches(best) else f"; {outlook.wanted:g} are wanted"
+    enough = ""
+    if not outlook.reaches(best):
+        # Information adds up, run by run.
+        part = (outlook.wanted - outlook.now) / (best.value - outlook.now)
+        runs = math.ceil(len(best.proposal.runs) * part)
+        enough = f"; for {outlook.wanted:g} about {runs} such runs are needed"
     return (
         f"To tell {names} apart, record {best.proposal.what}: predicted s G = "
         f"{_power(best.value)} (now {_power(outlook.now)}{enough}), chance of a wrong name "

@@ -23,15 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Z95", "NamedEffect", "diagnosed_model", "named_effects", "unphysical"]
 
-OPPOSING: Final = (
-    "c_over_m",
-    "Tr",
-    "quadratic_drag.q",
-    "cubic_damping.k3",
-    "power_law_drag.q",
-    "load_dependent_friction.k",
-)
-"""Coefficients of laws that oppose the motion wherever the pendulum is."""
+OPPOSING: Final = ("c_over_m", "Tr")
+"""Coefficients of the damping and the friction that oppose the motion wherever it is."""
 
 Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""
@@ -188,8 +181,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
 def unphysical(fit: TrajectoryFit) -> dict[str, float]:
     """Return the coefficients of damping and friction that a fit made negative, with their values.
 
-    No pendulum has them: they make up for what the model lacks. Their law opposes the motion
-    everywhere, so that a negative one feeds it.
+    No pendulum has them: a negative one feeds the motion. They make up for what the model lacks.
     """
     return {n: fit[n] for n in OPPOSING if n in fit.estimates and fit[n] < 0}
 

@@ -112,9 +112,14 @@ class Refits:
         if found is None or trial.chi2 - found.chi2 < SHORT * promised:
             other = self._fit(trial, added, second)
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
-        if found is None:
-            return None
-        found = self.unslipped(found)
+        if found is None or found.chi2 > trial.chi2:
+            # More can do all that less did: the motion was lost on the way.
+            other = self._fit(trial, added, start, short=True)
+            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+            if found is None:
+                return None
+        else:
+            found = self.unslipped(found)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -171,10 +176,15 @@ class Refits:
             return found  # from short windows on the motion is lost
 
     def _fit(
-        self, trial: Trial, added: Sequence[Candidate], start: dict[str, float]
+        self,
+        trial: Trial,
+        added: Sequence[Candidate],
+        start: dict[str, float],
+        *,
+        short: bool = False,
     ) -> Trial | None:
         try:
-            return with_candidates(self.evidence, trial, added, start)
+            return with_candidates(self.evidence, trial, added, start, short=short)
         except InputError:
             return None  # the start leads out of the range of numbers
 

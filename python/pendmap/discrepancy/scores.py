@@ -152,27 +152,24 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
     """
     fit = trial.fit
     carried = len({name.partition("[")[0] for name in fit.names}) + STATE
-    every, names, windows = [], list[str](), list[WindowSlopes]()
+    every: list[Candidate] = []
+    names: list[str] = []
+    passes: list[list[WindowSlopes]] = []
     for present in _passes(pool, max(PASS - carried, 1)):
-        own = [name for candidate in present for name in candidate.free]
-        model = placed(fit.model, present)
-        found, slopes = window_slopes(fit, evidence.fitted, own, model)
-        wanted = [found.index(name) for name in own]
-        if not every:
+        free = [name for candidate in present for name in candidate.free]
+        found, slopes = window_slopes(fit, evidence.fitted, free, placed(fit.model, present))
+        wanted = [found.index(name) for name in free]
+        if not passes:
             names = [name for name in found if name in fit.estimates]
             wanted = [found.index(name) for name in names] + wanted
-        each = [dataclasses.replace(w, columns=w.columns[:, wanted]) for w in slopes]
-        windows = (
-            [
-                dataclasses.replace(one, columns=np.hstack([one.columns, further.columns]))
-                for one, further in zip(windows or each, each, strict=True)
-            ]
-            if every
-            else each
-        )
+        passes.append([dataclasses.replace(w, columns=w.columns[:, wanted]) for w in slopes])
         every += present
     if not every:
         return Scores((), (), np.zeros((0, 0)), np.zeros(0))
+    windows = [
+        dataclasses.replace(each[0], columns=np.hstack([w.columns for w in each]))
+        for each in zip(*passes, strict=True)
+    ]
     together = freed_together((), windows)
     base, residual = _orthonormal(together.columns[:, : len(names)]), together.residual
     columns = together.columns[:, len(names) :]

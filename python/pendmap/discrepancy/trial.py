@@ -98,7 +98,7 @@ class Trial:
 
     @property
     def chi2(self) -> float:
-        """The sum of squared residuals over standard errors."""
+        """The sum of squared residuals over standard errors, or of deviances of counts."""
         return self.fit.chi2
 
     @property
@@ -173,6 +173,8 @@ def with_candidates(
     trial: Trial,
     added: Sequence[Candidate],
     start: Mapping[str, float],
+    *,
+    short: bool = False,
 ) -> Trial:
     """Fit a trial's model with further effects, from the trial's parameters and windows on.
 
@@ -186,6 +188,8 @@ def with_candidates(
         The effects.
     start : mapping of str to float
         Sizes and phases to begin with.
+    short : bool
+        Whether to begin at short windows instead, where the trial's lead astray.
     """
     model = placed(trial.fit.model, added)
     free = [*trial.free, *(name for c in added for name in (*c.free, *c.adapted))]
@@ -197,7 +201,7 @@ def with_candidates(
         free,
         chosen,
         start=begin,
-        windows=trial.fit.windows,
+        windows=None if short else trial.fit.windows,
         steps=FEW_STEPS,
         least_gain=LITTLE,
     )

@@ -163,8 +163,12 @@ def _closed(search: Search, best: Found) -> float:
     The gap is the sum of squares above that of noise, as the best model's spectrum shows it.
     """
     level = best.trial.remainder.level
-    before = search.base.held.chi2 / level - search.base.held.degrees
-    after = best.held.chi2 / level - best.held.degrees
+    noise = level
+    if any(run.count is not None for run in search.evidence.fitted):
+        # Deviances of counts are not squares: of noise alone they are 1 for each reading, or less.
+        noise = min(best.trial.chi2 / max(best.trial.fit.degrees, 1), 1.0)
+    before = (search.base.held.chi2 - noise * search.base.held.degrees) / level
+    after = (best.held.chi2 - noise * best.held.degrees) / level
     # Noise alone scatters by this much: a gap below it cannot be divided.
     scatter = math.sqrt(2 * best.held.degrees)
     if before < scatter:

@@ -62,6 +62,10 @@ LAG: Final = 0.25
 FARTHEST: Final = 0.25
 """Radians of phase between samples that are taken further apart because of coarse counts."""
 
+FURTHER: Final = 4
+"""Strides beyond the shortest that are read too. From sample to sample a steady motion may pass
+almost whole counts: errors are then alike for long, but not at all strides."""
+
 DITHERED: Final = 0.55
 """Noise over count above which neighbouring readings err independently: sqrt(1/4 + 1/12) less
 some room, from where the error of a rounded sum is that of its parts to a percent."""
@@ -303,7 +307,24 @@ def _apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
         stride = min(2 * stride, most)
     if np.count_nonzero(quick) < FEWEST:
         return None
-    return _only(fit, quick), slowest
+    found = [_only(fit, quick)]
+    if fit is not nearest:
+        for longer in range(stride + 1, min(stride + FURTHER, most) + 1):
+            more = _clean(local_fit(time, theta, degree=6, points=11, stride=longer), bad, speed)
+            found.append(_only(more, np.abs(more.slope) >= slowest))
+    return _pooled(found), slowest
+
+
+def _pooled(fits: list[LocalFit]) -> LocalFit:
+    """Return all residuals of several fits to the same samples, worth no more than those of one."""
+    middle, residual, slope = (
+        np.concatenate([getattr(fit, name) for fit in fits])
+        for name in ("middle", "residual", "slope")
+    )
+    worth = fits[0].sum_of_squares * middle.size / fits[0].middle.size
+    return dataclasses.replace(
+        fits[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
+    )
 
 
 def _clean(fit: LocalFit, bad: NDArray[np.bool_], speed: Floats) -> LocalFit:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy import Discrepancy
     from pendmap.discrepancy.candidates import Candidate
     from pendmap.discrepancy.limits import Limit
-    from pendmap.discrepancy.power import Outlook
+    from pendmap.discrepancy.outlook import Outlook
     from pendmap.report.document import Block, Text
 
 __all__ = ["following", "set_aside"]
