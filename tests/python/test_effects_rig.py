@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import pendmap
 from pendmap import virtual_rig
 from pendmap.discrepancy.baseline import baseline
-from pendmap.discrepancy.candidates import Candidate, place
+from pendmap.discrepancy.candidates import Candidate, placed
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.trial import fitted
 from pendmap.records import read_experiment
@@ -118,7 +118,7 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
     start = base.start | {f"{name}.{size}": 0.5 * truth[size]}
     if unit.phase is not None:
         start[f"{name}.{unit.phase}"] = truth[unit.phase]
-    model, free = place(base.fit.model, unit), [*base.free, *unit.free]
+    model, free = placed(base.fit.model, [unit]), [*base.free, *unit.free]
     found = fitted(evidence, model, free, (unit,), start=start).fit
     # Of a lag the second power of tau is left.
     assert found.rms < (1e-5 if name == "sensor_lag" else 1e-8)

@@ -44,8 +44,10 @@ def in_blocks(run: FitRun) -> FitRun:
     Parameters
     ----------
     run : FitRun
-        A record of angles.
+        A record of angles; one whose readings are intervals stays as it is: their mean is none.
     """
+    if run.count is not None:
+        return run
     weights = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape) ** -2.0
     if run.trusted is not None:
         weights = np.where(run.trusted, weights, 0.0)

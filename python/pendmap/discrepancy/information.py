@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.discrepancy.candidates import place
+from pendmap.discrepancy.candidates import placed
 from pendmap.discrepancy.evidence import held_parts
 from pendmap.identification.free import PER_RUN
 from pendmap.identification.sensitivity import window_slopes
@@ -140,19 +140,16 @@ class Columns:
         # Shapes of one effect are derived one after the other, those of several together.
         for batch in itertools.zip_longest(*by_name.values()) if by_name else [()]:
             present = [candidate for candidate in batch if candidate is not None]
-            model = fit.model
-            for candidate in present:
-                model = place(model, candidate)
             further = [name for candidate in present for name in candidate.free]
-            names, windows = window_slopes(fit, runs, further, model)
+            names, windows = window_slopes(fit, runs, further, placed(fit.model, present))
             wanted = [names.index(name) for name in further]
             if not first:
                 kept = [names.index(name) for name in shared]
                 alone = [k for k, name in enumerate(names) if _of_one_run(name)]
                 first = windows
                 parts = [[w.columns[:, kept], w.columns[:, alone]] for w in windows]
-            for part, window in zip(parts, windows, strict=True):
-                part.insert(len(part) - 1, window.columns[:, wanted])
+            for part, window, one in zip(parts, windows, first, strict=True):
+                part.insert(len(part) - 1, window.columns_as_in(one)[:, wanted])
             for candidate in present:
                 at = len(shared) + sum(len(own) for own in places.values())
                 places[candidate.title] = list(range(at, at + len(candidate.free)))

@@ -162,7 +162,13 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
         if not passes:
             names = [name for name in found if name in fit.estimates]
             wanted = [found.index(name) for name in names] + wanted
-        passes.append([dataclasses.replace(w, columns=w.columns[:, wanted]) for w in slopes])
+        first = passes[0] if passes else slopes
+        passes.append(
+            [
+                dataclasses.replace(w, columns=w.columns_as_in(one)[:, wanted])
+                for w, one in zip(slopes, first, strict=True)
+            ]
+        )
         every += present
     if not every:
         return Scores((), (), np.zeros((0, 0)), np.zeros(0))

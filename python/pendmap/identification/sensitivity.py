@@ -90,6 +90,17 @@ class WindowSlopes:
     residual: NDArray[np.float64]
     weight: NDArray[np.float64]
 
+    def columns_as_in(self, other: WindowSlopes) -> NDArray[np.float64]:
+        """Return the columns with the weights of the same window of another pass.
+
+        The weight of a reading that is an interval goes by the motion, and that of two passes
+        differs by what keeps a phase in them: little, but more than tells columns apart.
+        """
+        ratio = np.divide(
+            other.weight, self.weight, out=np.zeros_like(self.weight), where=self.weight > 0
+        )
+        return np.asarray(self.columns * ratio[:, None], np.float64)
+
     def freed(
         self, further: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
