@@ -3,8 +3,8 @@
     python benchmarks/blind.py --experiments 1000 --out blind.jsonl
     python benchmarks/blind_sindy.py blind.jsonl --workers 2 --out sindy.jsonl
 
-Each experiment that ``blind.py`` wrote down with one effect hidden, two or none is recorded again,
-the same to the last bit. SINDy regresses ``th''`` sparsely on the candidates of ``diagnose`` in the
+Each experiment that ``blind.py`` wrote down with one effect hidden, two or none is recorded again
+from its seed. SINDy regresses ``th''`` sparsely on the candidates of ``diagnose`` in the
 same shapes (:mod:`sindy_features`); torques have the very form that the rig hides. Angle and
 velocity come from a filter of Savitzky and Golay whose width goes by the noise.
 
