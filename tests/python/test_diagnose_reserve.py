@@ -79,7 +79,7 @@ def _chance(residuals: np.ndarray) -> float:
     runs = [FitRun(INTERVAL * np.arange(SAMPLES), np.zeros(SAMPLES), 1.0) for _ in residuals]
     curve = np.vstack([np.zeros(SAMPLES), np.full(SAMPLES, W0)])
     fit = SimpleNamespace(
-        residuals=residuals,
+        white=residuals,
         curves=[curve] * len(runs),
         windows=[(k, 0, SAMPLES, 0.0, 0.0) for k in range(len(runs))],
         estimates={},
