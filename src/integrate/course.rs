@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::tangent::{Number, Tangent};
+use crate::model::effects::Point;
 use crate::model::equation::Forcing;
 use crate::model::recorded::Recorded;
 use crate::model::rest::Load;
@@ -20,13 +21,21 @@ pub const FINEST: f64 = 1e-15;
 /// Angles, and times of a drive's period, at which the rate is looked for.
 const LOOKS: [usize; 2] = [32, 8];
 
+/// The accelerations of a course: the equation of motion over numbers of some kind, and the motion
+/// of the pivot that was recorded.
+#[derive(Clone, Debug)]
+pub struct Field<N> {
+    equation: Equation<N>,
+    recorded: Option<Arc<Recorded>>,
+}
+
 /// The equation of motion over numbers of some kind, and the error allowed to a step.
 #[derive(Clone, Debug)]
 pub struct Course<N> {
-    equation: Equation<N>,
-    /// The same with plain numbers, for what has no derivative: when a stuck pendulum is released.
-    plain: Equation<f64>,
-    recorded: Option<Arc<Recorded>>,
+    field: Field<N>,
+    /// The same with plain numbers, for what has no derivative: where the velocity passes zero, when
+    /// a stuck pendulum is released.
+    plain: Field<f64>,
     watches: bool,
     jumps: bool,
     harmonic: bool,
@@ -62,13 +71,13 @@ impl<N: Number> Course<N> {
         } else {
             pendulum.motion().omega
         });
+        let harmonic = plain.has_closed_release();
         Self {
-            equation,
-            recorded: None,
+            field: Field { equation, recorded: None },
+            plain: Field { equation: plain, recorded: None },
             watches: jumps || pendulum.has_events(),
             jumps,
-            harmonic: plain.has_closed_release(),
-            plain,
+            harmonic,
             period: (!changes).then(|| pendulum.period()),
             look: pendulum.period(),
             longest: LONGEST_STEP.0 * tolerance.powf(LONGEST_STEP.1) / rate,
@@ -79,13 +88,12 @@ impl<N: Number> Course<N> {
     /// The same with the recorded motion of the pivot besides the drive.
     #[must_use]
     pub fn driven_by(mut self, recorded: Arc<Recorded>) -> Self {
-        self.equation = self.equation.with_lateral();
-        self.plain = self.plain.with_lateral();
+        self.field = self.field.driven_by(&recorded);
+        self.plain = self.plain.driven_by(&recorded);
         self.harmonic = false;
         self.period = None;
         self.look = self.look.min(8.0 * recorded.spacing());
         self.longest /= (1.0 + recorded.greatest()).sqrt();
-        self.recorded = Some(recorded);
         self
     }
 
@@ -94,8 +102,8 @@ impl<N: Number> Course<N> {
     pub fn with_gravity(mut self, gravity: N) -> Self {
         let value = gravity.value();
         self.longest /= value.max(1.0).sqrt();
-        self.plain = self.plain.with_gravity(value);
-        self.equation = self.equation.with_gravity(gravity);
+        self.plain.equation = self.plain.equation.with_gravity(value);
+        self.field.equation = self.field.equation.with_gravity(gravity);
         self
     }
 
@@ -107,32 +115,34 @@ impl<N: Number> Course<N> {
         self
     }
 
-    /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
-    /// says (1 or -1).
-    #[inline]
+    /// What accelerates the pendulum.
+    #[must_use]
+    pub fn field(&self) -> &Field<N> {
+        &self.field
+    }
+
+    /// The same without derivatives.
+    #[must_use]
+    pub fn plain(&self) -> &Field<f64> {
+        &self.plain
+    }
+
+    /// [`Field::acceleration`].
     pub fn acceleration(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
-        let mut forcing = self.equation.forcing(N::constant(tau));
-        if let Some(recorded) = &self.recorded {
-            let [up, side] = recorded.acceleration(tau);
-            let gravity = self.equation.gravity();
-            forcing.vertical = gravity.scale_add(up, forcing.vertical);
-            forcing.lateral = gravity.scale_add(side, forcing.lateral);
-        }
-        let at = self.equation.point_held(&forcing, theta, velocity, signs.map(N::constant));
-        self.equation.acceleration(&forcing, &at)
+        self.field.acceleration(tau, theta, velocity, signs)
     }
 
     /// The switching function of an effect with a corner; 1 where there is none.
     #[must_use]
     pub fn switch(&self, tau: f64, [theta, velocity]: [f64; 2]) -> f64 {
-        let at = self.plain.point_held(&self.plain_forcing(tau), theta, velocity, [1.0; 2]);
-        self.plain.switch(&at).unwrap_or(1.0)
+        let at = self.plain.point(tau, theta, velocity, [1.0; 2]).1;
+        self.plain.equation.switch(&at).unwrap_or(1.0)
     }
 
     /// Whether an effect has a corner.
     #[must_use]
     pub fn has_corner(&self) -> bool {
-        self.plain.has_corner()
+        self.plain.equation.has_corner()
     }
 
     /// Whether the equation changes where the velocity passes zero, or turns are wanted anyhow.
@@ -161,27 +171,60 @@ impl<N: Number> Course<N> {
     }
 }
 
-impl<N> Course<N> {
-    /// What the pivot does at time `tau`.
-    fn plain_forcing(&self, tau: f64) -> Forcing<f64> {
-        let mut forcing = self.plain.forcing(tau);
+impl<N: Number> Field<N> {
+    fn driven_by(self, recorded: &Arc<Recorded>) -> Self {
+        Self {
+            equation: self.equation.with_lateral(),
+            recorded: Some(Arc::clone(recorded)),
+        }
+    }
+
+    /// What the pivot does at time `tau`, in the shape of `number`.
+    #[inline(always)]
+    fn forcing(&self, tau: f64, number: N) -> Forcing<N> {
+        let mut forcing = self.equation.forcing(number.like(tau));
         if let Some(recorded) = &self.recorded {
             let [up, side] = recorded.acceleration(tau);
-            forcing.vertical += self.plain.gravity() * up;
-            forcing.lateral += self.plain.gravity() * side;
+            let gravity = self.equation.gravity();
+            forcing.vertical = gravity.scale_add(up, forcing.vertical);
+            forcing.lateral = gravity.scale_add(side, forcing.lateral);
         }
         forcing
+    }
+
+    /// What the pivot does, and where the formulas are evaluated.
+    #[inline(always)]
+    fn point(
+        &self,
+        tau: f64,
+        theta: N,
+        velocity: N,
+        [sense, side]: [f64; 2],
+    ) -> (Forcing<N>, Point<N>) {
+        let forcing = self.forcing(tau, theta);
+        let signs = [theta.like(sense), theta.like(side)];
+        let at = self.equation.point_held(&forcing, theta, velocity, signs);
+        (forcing, at)
+    }
+
+    /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
+    /// says (1 or -1).
+    #[inline]
+    pub fn acceleration(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
+        let (forcing, at) = self.point(tau, theta, velocity, signs);
+        self.equation.acceleration(&forcing, &at)
     }
 }
 
 impl<N> Load for Course<N> {
     fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
-        let forcing = self.plain_forcing(tau);
-        let at = self.plain.point(&forcing, theta, 0.0, 1.0);
-        [self.plain.load(&forcing, &at), self.plain.friction(&at).max(0.0)]
+        let equation = &self.plain.equation;
+        let forcing = self.plain.forcing(tau, theta);
+        let at = equation.point(&forcing, theta, 0.0, 1.0);
+        [equation.load(&forcing, &at), equation.friction(&at).max(0.0)]
     }
     fn equation(&self) -> &Equation<f64> {
-        &self.plain
+        &self.plain.equation
     }
     fn has_closed_release(&self) -> bool {
         self.harmonic

@@ -3,7 +3,7 @@
 //! Hairer, Norsett & Wanner (1993), Solving Ordinary Differential Equations I, section II.10;
 //! coefficients in [`super::dop853`].
 
-use super::course::Course;
+use super::course::Field;
 use super::dop853::{A, ALL_STAGES, C, D, E3, E5, STAGES};
 use super::tangent::Number;
 
@@ -29,14 +29,14 @@ impl<N: Number> Leap<N> {
     /// The step of `length` from `start` at `tau`, where the acceleration is `first`.
     #[must_use]
     pub fn new(
-        course: &Course<N>,
+        field: &Field<N>,
         tau: f64,
         start: [N; 2],
         first: N,
         signs: [f64; 2],
         length: f64,
     ) -> Self {
-        let zero = N::constant(0.0);
+        let zero = first.like(0.0);
         let mut leap = Self {
             tau,
             length,
@@ -49,17 +49,37 @@ impl<N: Number> Leap<N> {
         leap.velocity[0] = start[1];
         leap.acceleration[0] = first;
         for i in 1..STAGES {
-            leap.stage(course, i);
+            leap.stage(field, i);
         }
         // The thirteenth stage stands at the new point.
-        leap.end = leap.stage(course, STAGES);
+        leap.end = leap.stage(field, STAGES);
         leap
+    }
+
+    /// The step without its derivatives.
+    #[must_use]
+    pub fn values(&self) -> Leap<f64> {
+        Leap {
+            tau: self.tau,
+            length: self.length,
+            signs: self.signs,
+            start: self.start.map(N::value),
+            end: self.end.map(N::value),
+            velocity: self.velocity.map(N::value),
+            acceleration: self.acceleration.map(N::value),
+        }
+    }
+
+    /// The step from the same start with another length.
+    #[must_use]
+    pub fn shortened(&self, field: &Field<N>, length: f64) -> Self {
+        Self::new(field, self.tau, self.start, self.first(), self.signs, length)
     }
 
     /// Fills stage `i` and returns its angle and velocity.
     #[inline]
-    fn stage(&mut self, course: &Course<N>, i: usize) -> [N; 2] {
-        let [mut turned, mut gained] = [N::constant(0.0); 2];
+    fn stage(&mut self, field: &Field<N>, i: usize) -> [N; 2] {
+        let [mut turned, mut gained] = [self.start[0].like(0.0); 2];
         for (j, weight) in A[i].iter().enumerate().take(i) {
             // Half of the table is empty.
             if *weight != 0.0 {
@@ -71,7 +91,7 @@ impl<N: Number> Leap<N> {
         let velocity = gained.scale_add(self.length, self.start[1]);
         let tau = self.tau + C[i] * self.length;
         self.velocity[i] = velocity;
-        self.acceleration[i] = course.acceleration(tau, theta, velocity, self.signs);
+        self.acceleration[i] = field.acceleration(tau, theta, velocity, self.signs);
         [theta, velocity]
     }
 
@@ -119,9 +139,9 @@ impl<N: Number> Leap<N> {
 
     /// The curve between the ends, of order 7.
     #[must_use]
-    pub fn curve(&mut self, course: &Course<N>) -> Curve<N> {
+    pub fn curve(&mut self, field: &Field<N>) -> Curve<N> {
         for i in STAGES + 1..ALL_STAGES {
-            self.stage(course, i);
+            self.stage(field, i);
         }
         Curve {
             tau: self.tau,
@@ -139,7 +159,7 @@ impl<N: Number> Leap<N> {
         all[2] = first - gain;
         all[3] = gain.scale(2.0) - (last + first);
         for (coefficient, weights) in all[4..].iter_mut().zip(&D) {
-            let mut sum = N::constant(0.0);
+            let mut sum = gain.like(0.0);
             for (weight, slope) in weights.iter().zip(slopes) {
                 sum = slope.scale_add(*weight, sum);
             }

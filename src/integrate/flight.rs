@@ -188,7 +188,7 @@ impl<'a, N: Number> Flight<'a, N> {
                 self.lose();
                 return None;
             }
-            let mut leap = Leap::new(course, self.tau, self.state, first, signs, length);
+            let leap = Leap::new(course.field(), self.tau, self.state, first, signs, length);
             self.steps += 1;
             let error = leap.error(course.tolerance());
             if error.is_nan() {
@@ -202,7 +202,7 @@ impl<'a, N: Number> Flight<'a, N> {
                 continue;
             }
             let turning =
-                if course.watches() { turning::first(course, &mut leap) } else { Turning::None };
+                if course.watches() { turning::first(course, &leap) } else { Turning::None };
             if matches!(turning, Turning::Unclear) && length > FINE * course.longest_step() {
                 (self.step, growth) = (0.5 * length, 1.0);
                 continue;
@@ -214,8 +214,8 @@ impl<'a, N: Number> Flight<'a, N> {
                 _ => None,
             };
             if course.has_corner() {
-                let mut whole = turned.as_deref().copied().unwrap_or(leap);
-                if let Some(cornered) = corner::first(course, &mut whole, self.since_corner) {
+                let whole = turned.as_deref().unwrap_or(&leap);
+                if let Some(cornered) = corner::first(course, whole, self.since_corner) {
                     self.arrive(&cornered);
                     self.cross(signs);
                     return Some(Piece::Leap(Box::new(cornered)));

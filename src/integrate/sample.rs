@@ -42,7 +42,7 @@ pub fn sample<N: Number>(
         let due = times[done..].iter().take_while(|time| **time <= flight.tau).count();
         if due > 0 {
             let (curve, held) = match piece {
-                Piece::Leap(mut leap) => (Some(leap.curve(course)), Some(leap.signs)),
+                Piece::Leap(mut leap) => (Some(leap.curve(course.field())), Some(leap.signs)),
                 Piece::Rest(..) => (None, None),
             };
             signs.resize(done + due, held);

@@ -49,46 +49,46 @@ pub enum Turning<N> {
     Unclear,
 }
 
-/// The first zero of the velocity of `leap`, located by integrating again from the step's start.
-pub fn first<N: Number>(course: &Course<N>, leap: &mut Leap<N>) -> Turning<N> {
+/// The first zero of the velocity of `leap`, located by integrating again from the step's start:
+/// without derivatives until it is known.
+pub fn first<N: Number>(course: &Course<N>, leap: &Leap<N>) -> Turning<N> {
     if leap.surely_keeps_sense() {
         return Turning::None;
     }
-    let curve = forward(&leap.curve(course), leap.signs[0]);
+    let (field, mut whole) = (course.plain(), leap.values());
+    let curve = forward(&whole.curve(field), whole.signs[0]);
     let Some(part) = first_below_zero(&curve) else { return Turning::None };
-    let shortened =
-        |length: f64| Leap::new(course, leap.tau, leap.start, leap.first(), leap.signs, length);
-    let mut length = part * leap.length;
-    let mut best = shortened(length);
+    let mut length = part * whole.length;
+    let mut best = whole.shortened(field, length);
     for _ in 0..MOST_STEPS {
-        let (velocity, slope) = (best.end[1].value(), best.last().value());
+        let (velocity, slope) = (best.end[1], best.last());
         let next = length - velocity / slope;
-        if !(next > 0.0 && next <= leap.length) {
+        if !(next > 0.0 && next <= whole.length) {
             break;
         }
-        let trial = shortened(next);
-        if trial.end[1].value().abs() >= velocity.abs() {
+        let trial = whole.shortened(field, next);
+        if trial.end[1].abs() >= velocity.abs() {
             break;
         }
         (best, length) = (trial, next);
     }
     let size: f64 = curve.iter().map(|c| c.abs()).sum();
-    if best.end[1].value().abs() <= CLOSE * size {
-        Turning::At(Box::new(best))
+    if best.end[1].abs() <= CLOSE * size {
+        Turning::At(Box::new(leap.shortened(course.field(), length)))
     } else {
         Turning::Unclear
     }
 }
 
 /// The velocity in the sense of the motion.
-fn forward<N: Number>(curve: &Curve<N>, sense: f64) -> Bernstein {
-    let mut all = [sense * curve.velocity[0].value(); DEGREE + 1];
+fn forward(curve: &Curve<f64>, sense: f64) -> Bernstein {
+    let mut all = [sense * curve.velocity[0]; DEGREE + 1];
     for (k, coefficient) in curve.velocity.iter().enumerate().skip(1) {
         // x^i (1 - x)^j times (x + 1 - x)^rest.
         let (i, j) = (k.div_ceil(2), k / 2);
         let rest = DEGREE - i - j;
         for l in 0..=rest {
-            all[i + l] += sense * coefficient.value() * CHOOSE[rest][l] / CHOOSE[DEGREE][i + l];
+            all[i + l] += sense * coefficient * CHOOSE[rest][l] / CHOOSE[DEGREE][i + l];
         }
     }
     all

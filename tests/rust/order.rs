@@ -96,9 +96,9 @@ fn equal_steps(count: usize) -> [f64; 2] {
     for k in 0..count {
         let tau = k as f64 * length;
         let first = course.acceleration(tau, state[0], state[1], [1.0; 2]);
-        let mut leap = Leap::new(&course, tau, state, first, [1.0; 2], length);
+        let mut leap = Leap::new(course.field(), tau, state, first, [1.0; 2], length);
         let middle = tau + 0.37 * length;
-        between = between.max(distance(leap.curve(&course).at(middle), exact(middle)));
+        between = between.max(distance(leap.curve(course.field()).at(middle), exact(middle)));
         state = leap.end;
     }
     [distance(state, exact(until)), between]
