@@ -1,5 +1,6 @@
 //! Residuals of a window and their derivatives.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::counted::{Said, said};
@@ -9,6 +10,9 @@ use crate::integrate::State;
 use crate::integrate::course::Course;
 use crate::integrate::sample::sample;
 use crate::integrate::tangent::{Number, Tangent};
+use crate::lanes::dispatch::Register;
+use crate::lanes::pack::Bundle;
+use crate::lanes::{Lane, Real};
 use crate::model::{Observation, Pendulum};
 
 /// The most derivatives that one pass carries.
@@ -67,28 +71,53 @@ impl Linear {
 #[must_use]
 pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: &Window) -> Linear {
     let directions = columns.motion.len() + 2;
-    let follow = Follow { problem, shaped, columns, window, directions };
+    let register = problem.path.register();
+    let stride = directions.next_multiple_of(register.width());
     let samples = window.to - window.from;
-    let mut slopes = vec![[0.0; 2]; samples * directions];
-    let (mut states, mut heard) = (Vec::new(), Vec::new());
+    let mut motion = Motion {
+        states: Vec::with_capacity(samples),
+        heard: Vec::with_capacity(samples),
+        slopes: vec![0.0; 2 * samples * stride],
+        stride,
+    };
+    let follow = Follow { problem, shaped, columns, window };
     let mut first = 0;
     while first < directions {
         let left = directions - first;
         // The narrowest numbers that hold what is left.
-        let pass = match left {
-            ..=2 => Follow::pass::<2>,
-            3 => Follow::pass::<3>,
-            4 => Follow::pass::<4>,
-            5 => Follow::pass::<5>,
-            6 => Follow::pass::<6>,
-            7..=8 => Follow::pass::<8>,
-            9..=12 => Follow::pass::<12>,
-            _ => Follow::pass::<WIDEST>,
-        };
-        pass(&follow, first, &mut slopes, &mut states, &mut heard);
-        first += left.min(WIDEST);
+        match register {
+            #[cfg(target_arch = "x86_64")]
+            Register::Avx512(isa) => match left {
+                ..=8 => follow.pass::<Bundle<_, 1>, 1>(isa, first, &mut motion),
+                _ => follow.pass::<Bundle<_, 1>, 2>(isa, first, &mut motion),
+            },
+            #[cfg(target_arch = "x86_64")]
+            Register::Avx2(isa) => match left {
+                ..=8 => follow.pass::<Bundle<_, 1>, 2>(isa, first, &mut motion),
+                _ => follow.pass::<Bundle<_, 1>, 4>(isa, first, &mut motion),
+            },
+            Register::Single => match left {
+                ..=5 => follow.pass::<f64, 5>((), first, &mut motion),
+                6..=8 => follow.pass::<f64, 8>((), first, &mut motion),
+                9..=12 => follow.pass::<f64, 12>((), first, &mut motion),
+                _ => follow.pass::<f64, WIDEST>((), first, &mut motion),
+            },
+        }
+        first += WIDEST;
     }
-    follow.read(states, &heard, &slopes)
+    follow.read(motion)
+}
+
+/// What the integrator tells of a window.
+struct Motion {
+    /// Angle and velocity at the samples.
+    states: Vec<State>,
+    /// What the sensor is given: the same, or a rod sensor's reading and nothing.
+    heard: Vec<State>,
+    /// Its derivatives: for each sample two rows.
+    slopes: Vec<f64>,
+    /// The length of a row, in whole registers.
+    stride: usize,
 }
 
 struct Follow<'a> {
@@ -96,32 +125,27 @@ struct Follow<'a> {
     shaped: &'a Shaped,
     columns: &'a Columns,
     window: &'a Window,
-    directions: usize,
 }
 
 impl Follow<'_> {
-    /// What the sensor is given, angle and velocity or a rod sensor's reading and nothing, with
-    /// its derivatives in `N` directions from `first` on.
-    fn pass<const N: usize>(
-        &self,
-        first: usize,
-        slopes: &mut [State],
-        states: &mut Vec<State>,
-        heard: &mut Vec<State>,
-    ) {
+    /// The motion with its derivatives in the directions from `first` on that `N` slopes hold.
+    fn pass<L: Lane, const N: usize>(&self, token: L::Token, first: usize, into: &mut Motion) {
         let record = &self.problem.records[self.window.record];
         let motion = &self.columns.motion;
-        let number = |slot: Slot, value: f64| {
-            // A direction of another pass has no place in this one.
-            let direction = motion.iter().position(|(_, other)| *other == slot);
-            let place = direction.map_or(usize::MAX, |direction| direction.wrapping_sub(first));
-            Tangent::<f64, N>::seeded(value, place)
+        // A direction of another pass has no place in this one.
+        let along = |value: f64, direction: usize| {
+            Tangent::<L, N>::along(token, value, direction.wrapping_sub(first))
         };
-        let Shaped { pendulum, gravity, rod_sensor } = self.shaped;
+        let number = |slot: Slot, value: f64| {
+            let direction = motion.iter().position(|(_, other)| *other == slot);
+            along(value, direction.unwrap_or(usize::MAX))
+        };
+        let Shaped { pendulum, gravity, rod_sensor, rate } = self.shaped;
         let parameter = |index: usize, value: f64| number(Slot::Parameter(index), value);
-        let mut course = Course::new(pendulum, true, self.problem.tolerance, parameter)
-            .watched()
-            .with_gravity(number(Slot::Gravity, *gravity));
+        let mut course =
+            Course::with_rate(pendulum, *rate, true, self.problem.tolerance, parameter)
+                .watched()
+                .with_gravity(number(Slot::Gravity, *gravity));
         if let Some(recorded) = &record.recorded {
             course = course.driven_by(Arc::clone(recorded));
         }
@@ -129,35 +153,32 @@ impl Follow<'_> {
         let rate = pendulum.motion().omega.max(1.0);
         let most =
             MOST_STEPS + (MOST_STEPS_A_TIME * rate * (times[times.len() - 1] - times[0])) as usize;
-        let begin = |of: usize| {
-            let place = (motion.len() + of).wrapping_sub(first);
-            Tangent::<f64, N>::seeded(self.window.start[of], place)
-        };
+        let begin = |of: usize| along(self.window.start[of], motion.len() + of);
         let run =
             sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
-        let given: Vec<[Tangent<f64, N>; 2]> = match rod_sensor {
-            None => run.states.clone(),
-            Some(sensor) => {
-                let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
-                let moments = times.iter().zip(&run.states).zip(&run.signs);
-                moments
-                    .map(|((tau, state), signs)| sensor.read(&course, *tau, *state, *signs, own))
-                    .map(|reading| [reading, Tangent::constant(0.0)])
-                    .collect()
+        into.states.clear();
+        into.heard.clear();
+        let rows = into.slopes.chunks_exact_mut(2 * into.stride);
+        for (k, (state, rows)) in run.states.iter().zip(rows).enumerate() {
+            let given = match rod_sensor {
+                None => *state,
+                Some(sensor) => {
+                    let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
+                    let reading = sensor.read(&course, times[k], *state, run.signs[k], own);
+                    [reading, reading.like(0.0)]
+                }
+            };
+            for (given, row) in given.iter().zip(rows.chunks_exact_mut(into.stride)) {
+                given.slopes(&mut row[first..]);
             }
-        };
-        let filled = N.min(self.directions - first);
-        for (row, given) in slopes.chunks_exact_mut(self.directions).zip(&given) {
-            for (k, slope) in row[first..first + filled].iter_mut().enumerate() {
-                *slope = [given[0].slope[k], given[1].slope[k]];
-            }
+            into.heard.push(given.map(Number::value));
+            into.states.push(state.map(Number::value));
         }
-        *heard = given.into_iter().map(|each| each.map(Number::value)).collect();
-        *states = run.states.iter().map(|state| state.map(Number::value)).collect();
     }
 
     /// What the sensor makes of what it is given.
-    fn read(&self, states: Vec<State>, heard: &[State], slopes: &[State]) -> Linear {
+    fn read(&self, motion: Motion) -> Linear {
+        let Motion { states, heard, slopes, stride } = motion;
         let record = &self.problem.records[self.window.record];
         let sensor = match self.shaped.rod_sensor {
             None => Some(Sensor::new(&self.shaped.pendulum, self.columns)),
@@ -180,7 +201,8 @@ impl Follow<'_> {
                 rows.extend(std::iter::repeat_n(0.0, width));
                 continue;
             }
-            let slopes = &slopes[k * self.directions..(k + 1) * self.directions];
+            let (of_angle, of_velocity) =
+                slopes[2 * k * stride..2 * (k + 1) * stride].split_at(stride);
             let read = sensor
                 .as_ref()
                 .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given));
@@ -201,10 +223,13 @@ impl Follow<'_> {
             residuals.push(residual);
             weights.push(weight);
             let by_state = [0, 1].map(|of| weight * read.slope[of]);
-            let through = |slope: &State| by_state[0] * slope[0] + by_state[1] * slope[1];
-            rows.extend(slopes[..moving].iter().map(through));
+            let through = |range: Range<usize>| {
+                let pairs = of_angle[range.clone()].iter().zip(&of_velocity[range]);
+                pairs.map(|(angle, velocity)| by_state[0] * angle + by_state[1] * velocity)
+            };
+            rows.extend(through(0..moving));
             rows.extend(read.slope[2..2 + reading].iter().map(|slope| weight * slope));
-            rows.extend(slopes[moving..].iter().map(through));
+            rows.extend(through(moving..moving + 2));
         }
         let counted = record.counts.is_some();
         Linear { states, apart, residuals, weights, rows, width, chi2, counted }

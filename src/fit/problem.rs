@@ -5,6 +5,8 @@ use std::sync::Arc;
 use super::counted::surplus;
 use super::rod_sensor::RodSensor;
 use crate::error::Error;
+use crate::integrate::course::greatest_rate;
+use crate::lanes::Path;
 use crate::model::effects::Action;
 use crate::model::{Pendulum, Recorded};
 
@@ -104,6 +106,8 @@ pub struct Problem {
     pub free: Vec<Free>,
     /// The error allowed to a step of the integrator.
     pub tolerance: f64,
+    /// The instruction set that derivatives are computed with.
+    pub path: Path,
 }
 
 /// A record's pendulum with values for the free parameters.
@@ -115,6 +119,8 @@ pub struct Shaped {
     pub gravity: f64,
     /// The record's sensor on the rod.
     pub rod_sensor: Option<RodSensor>,
+    /// [`greatest_rate`] of the pendulum: all windows have it.
+    pub rate: f64,
 }
 
 /// The free parameters of one record: their places in [`Problem::free`], and what they are.
@@ -145,7 +151,8 @@ impl Problem {
     /// # Errors
     /// [`Error::Lengths`] where a record's arrays differ in length, [`Error::Range`] for a number
     /// that is not finite, a time that is not after the one before it, a negative weight, a record
-    /// with fewer than 3 trusted samples, or a free parameter that its record does not have.
+    /// with fewer than 3 trusted samples, or a free parameter that its record does not have;
+    /// [`Error::Simd`] as of [`Path::choose`].
     pub fn new(records: Vec<Record>, free: Vec<Free>, tolerance: f64) -> Result<Self, Error> {
         for record in &records {
             record.check()?;
@@ -173,7 +180,7 @@ impl Problem {
                 }
             }
         }
-        let problem = Self { records, free, tolerance };
+        let problem = Self { records, free, tolerance, path: Path::choose()? };
         for index in 0..problem.records.len() {
             let count = problem.columns(index).reading.len();
             if count > MOST_READINGS {
@@ -224,7 +231,7 @@ impl Problem {
     pub fn shaped(&self, index: usize, values: &[f64]) -> Option<Shaped> {
         let Record { pendulum, rod_sensor, .. } = &self.records[index];
         let (pendulum, rod_sensor) = (pendulum.clone(), *rod_sensor);
-        let mut shaped = Shaped { pendulum, gravity: 1.0, rod_sensor };
+        let mut shaped = Shaped { pendulum, gravity: 1.0, rod_sensor, rate: 1.0 };
         for (free, value) in self.free.iter().zip(values) {
             match free.slot(index) {
                 Some(Slot::Gravity) => shaped.gravity = *value,
@@ -234,7 +241,7 @@ impl Problem {
                 None => {}
             }
         }
-        shaped.is_sound().then_some(shaped)
+        shaped.is_sound().then(|| Shaped { rate: greatest_rate(&shaped.pendulum), ..shaped })
     }
 
     /// How many samples count.

@@ -14,6 +14,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use crate::integrate::course::Course;
 use crate::integrate::tangent::Number;
+use crate::lanes::Work;
 use crate::lanes::sine::Fine;
 
 /// What a sensor on the rod reads of a motion: `rate th' + place (th'' cos tilt + th'^2 sin tilt) +
@@ -42,36 +43,65 @@ impl RodSensor {
         &self,
         course: &Course<N>,
         tau: f64,
-        [theta, velocity]: [N; 2],
+        state: [N; 2],
         signs: Option<[f64; 2]>,
-        [bias, tilt]: [N; 2],
+        own: [N; 2],
     ) -> N {
-        let turning = velocity.scale(self.rate) + bias;
-        if self.place == 0.0 && self.gravity == 0.0 {
-            return turning;
+        let mut reading = own[0];
+        let (sensor, into) = (*self, &mut reading);
+        own[0].aside(Reading { sensor, course, tau, state, signs, own, into });
+        reading
+    }
+    /// Whether all of it are numbers, and it shows anything.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let all = [self.rate, self.place, self.gravity, self.bias, self.interval, self.tilt];
+        all.iter().all(|x| x.is_finite()) && all[..3].iter().any(|factor| *factor != 0.0)
+    }
+}
+
+/// A reading, in a function of its own.
+struct Reading<'a, N> {
+    sensor: RodSensor,
+    course: &'a Course<N>,
+    tau: f64,
+    state: [N; 2],
+    signs: Option<[f64; 2]>,
+    own: [N; 2],
+    into: &'a mut N,
+}
+
+impl<N: Number> Work for Reading<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        let RodSensor { rate, place, gravity, .. } = self.sensor;
+        let ([theta, velocity], [bias, tilt]) = (self.state, self.own);
+        let turning = velocity.scale(rate) + bias;
+        if place == 0.0 && gravity == 0.0 {
+            *self.into = turning;
+            return;
         }
-        let leaning = (theta + tilt).scale(FRAC_1_PI).sine::<Fine>().scale(self.gravity);
+        let leaning = (theta + tilt).scale(FRAC_1_PI).sine::<Fine>().scale(gravity);
         let turned = tilt.scale(FRAC_1_PI);
-        let pull = signs.map_or(N::constant(0.0), |signs| {
-            self.mean_acceleration(course, tau, [theta, velocity], signs)
-        });
+        let pull = match self.signs {
+            Some(signs) => self.mean_acceleration(signs),
+            None => theta.like(0.0),
+        };
         let inward = velocity * velocity * turned.sine::<Fine>();
         let moving = pull.mul_add(turned.cosine::<Fine>(), inward);
-        moving.scale_add(self.place, leaning) + turning
+        *self.into = moving.scale_add(place, leaning) + turning;
     }
+}
 
+impl<N: Number> Reading<'_, N> {
     /// `th''`, with the jump of friction at a turn less than half an interval away shared: the turn
     /// is `|th'| / |th''|` away.
-    fn mean_acceleration<N: Number>(
-        &self,
-        course: &Course<N>,
-        tau: f64,
-        [theta, velocity]: [N; 2],
-        [sense, side]: [f64; 2],
-    ) -> N {
+    #[inline(always)]
+    fn mean_acceleration(&self, [sense, side]: [f64; 2]) -> N {
+        let (course, tau, [theta, velocity]) = (self.course, self.tau, self.state);
         let here = course.acceleration(tau, theta, velocity, [sense, side]);
         let away = velocity.scale(sense);
-        let reach = here.scale((0.5 * self.interval).copysign(here.value()));
+        let reach = here.scale((0.5 * self.sensor.interval).copysign(here.value()));
         if !course.jumps() || away.value() >= reach.value() {
             return here;
         }
@@ -79,16 +109,9 @@ impl RodSensor {
         // Before a turn the pull is against the motion; where it would be so after it, too, friction
         // holds the pendulum.
         if here.value() * sense < 0.0 && there.value() * sense >= 0.0 {
-            there = N::constant(0.0);
+            there = here.like(0.0);
         }
         let share = (away / reach).affine(-0.5, 0.5);
         (there - here).mul_add(share, here)
-    }
-
-    /// Whether all of it are numbers, and it shows anything.
-    #[must_use]
-    pub fn is_sound(&self) -> bool {
-        let all = [self.rate, self.place, self.gravity, self.bias, self.interval, self.tilt];
-        all.iter().all(|x| x.is_finite()) && all[..3].iter().any(|factor| *factor != 0.0)
     }
 }

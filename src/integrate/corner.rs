@@ -96,25 +96,25 @@ pub fn passages<L: Lane>(side: L, values: [L; 2], rates: [L; 2], length: L) -> u
     far.signs() | near.signs() | (far - rates[1] * reach).signs()
 }
 
-/// The step to the first corner within `leap`; none where there is none. `since` says that the leap
-/// starts from one. Derivatives are left out until it is known.
-pub fn first<N: Number>(course: &Course<N>, leap: &Leap<N>, since: bool) -> Option<Leap<N>> {
-    let (field, mut whole) = (course.plain(), leap.values());
+/// The length of the step to the first corner within `leap`; none where there is none. `since` says
+/// that the leap starts from one. Derivatives are left out.
+pub fn first<N: Number>(course: &Course<N>, leap: &Leap<N>, since: bool) -> Option<f64> {
+    let (field, mut step) = (course.plain(), leap.values());
     let (start, side, length) = (leap.tau, leap.signs[1], leap.length);
-    let curve = whole.curve(field);
+    let curve = step.curve(field);
     let value = |part: f64| {
         let tau = start + part * length;
         side * course.switch(tau, curve.at(tau))
     };
     let part = first_below_zero(&value, since)?;
     // What the curve is off, once.
-    let found = whole.shortened(field, part * length);
-    let rest = side * course.switch(start + part * length, found.end);
+    step.shorten(field, part * length);
+    let rest = side * course.switch(start + part * length, step.end);
     let by = 1e-3_f64.min(0.5 * part);
     let slope = (value(part + by) - value(part - by)) / (2.0 * by);
     let next = part - rest / slope;
     let better = (next - part).abs() < by && next < 1.0;
-    Some(leap.shortened(course.field(), if better { next } else { part } * length))
+    Some(if better { next } else { part } * length)
 }
 
 /// The first part of a step from which on the function is negative. Where it starts `since` a zero,

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::tangent::{Number, Tangent};
+use crate::lanes::Work;
 use crate::model::effects::Point;
 use crate::model::equation::Forcing;
 use crate::model::recorded::Recorded;
@@ -58,6 +59,18 @@ impl<N: Number> Course<N> {
         tolerance: f64,
         number: impl FnMut(usize, f64) -> N,
     ) -> Self {
+        Self::with_rate(pendulum, greatest_rate(pendulum), ages, tolerance, number)
+    }
+
+    /// The same with the [`greatest_rate`] of the pendulum, for several courses of one.
+    #[must_use]
+    pub fn with_rate(
+        pendulum: &Pendulum,
+        rate: f64,
+        ages: bool,
+        tolerance: f64,
+        number: impl FnMut(usize, f64) -> N,
+    ) -> Self {
         let mut equation = Equation::lift(pendulum, number);
         equation.ages = ages;
         let mut plain = pendulum.equation();
@@ -66,11 +79,6 @@ impl<N: Number> Course<N> {
         // Negative friction, which a fit may pass through, holds nothing, but jumps all the same.
         let jumps = pendulum.has_friction() || pendulum.theta_r < 0.0;
         let tolerance = tolerance.max(FINEST);
-        let rate = greatest_rate(pendulum).max(if pendulum.is_autonomous() {
-            0.0
-        } else {
-            pendulum.motion().omega
-        });
         let harmonic = plain.has_closed_release();
         Self {
             field: Field { equation, recorded: None },
@@ -88,12 +96,12 @@ impl<N: Number> Course<N> {
     /// The same with the recorded motion of the pivot besides the drive.
     #[must_use]
     pub fn driven_by(mut self, recorded: Arc<Recorded>) -> Self {
-        self.field = self.field.driven_by(&recorded);
-        self.plain = self.plain.driven_by(&recorded);
+        self.field = self.field.driven_by(Arc::clone(&recorded));
         self.harmonic = false;
         self.period = None;
         self.look = self.look.min(8.0 * recorded.spacing());
         self.longest /= (1.0 + recorded.greatest()).sqrt();
+        self.plain = self.plain.driven_by(recorded);
         self
     }
 
@@ -172,11 +180,8 @@ impl<N: Number> Course<N> {
 }
 
 impl<N: Number> Field<N> {
-    fn driven_by(self, recorded: &Arc<Recorded>) -> Self {
-        Self {
-            equation: self.equation.with_lateral(),
-            recorded: Some(Arc::clone(recorded)),
-        }
+    fn driven_by(self, recorded: Arc<Recorded>) -> Self {
+        Self { equation: self.equation.with_lateral(), recorded: Some(recorded) }
     }
 
     /// What the pivot does at time `tau`, in the shape of `number`.
@@ -209,10 +214,36 @@ impl<N: Number> Field<N> {
 
     /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
     /// says (1 or -1).
-    #[inline]
+    #[inline(never)]
     pub fn acceleration(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
+        let mut acceleration = velocity;
+        let state = [theta, velocity];
+        theta.aside(Accelerating { field: self, tau, state, signs, into: &mut acceleration });
+        acceleration
+    }
+
+    /// The same within its caller.
+    #[inline(always)]
+    pub fn at(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
         let (forcing, at) = self.point(tau, theta, velocity, signs);
         self.equation.acceleration(&forcing, &at)
+    }
+}
+
+/// The acceleration, in a function of its own.
+struct Accelerating<'a, N> {
+    field: &'a Field<N>,
+    tau: f64,
+    state: [N; 2],
+    signs: [f64; 2],
+    into: &'a mut N,
+}
+
+impl<N: Number> Work for Accelerating<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { field, tau, state: [theta, velocity], signs, into } = self;
+        *into = field.at(tau, theta, velocity, signs);
     }
 }
 
@@ -237,8 +268,10 @@ impl<N> Load for Course<N> {
     }
 }
 
-/// The greatest frequency or rate of decay of small motions about any angle at any time, at least 1.
-fn greatest_rate(pendulum: &Pendulum) -> f64 {
+/// The greatest frequency or rate of decay of small motions about any angle at any time, or that of the
+/// drive; at least 1.
+#[must_use]
+pub fn greatest_rate(pendulum: &Pendulum) -> f64 {
     let equation = Equation::lift(pendulum, |_, value| Tangent::<f64, 2>::constant(value));
     let (mut stiffness, mut damping) = (1_f64, 0_f64);
     for k in 0..LOOKS[1] {
@@ -253,5 +286,6 @@ fn greatest_rate(pendulum: &Pendulum) -> f64 {
             damping = damping.max(by_velocity.abs());
         }
     }
-    stiffness.sqrt().max(damping)
+    let drive = if pendulum.is_autonomous() { 0.0 } else { pendulum.motion().omega };
+    stiffness.sqrt().max(damping).max(drive)
 }

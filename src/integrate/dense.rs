@@ -3,9 +3,12 @@
 //! Hairer, Norsett & Wanner (1993), Solving Ordinary Differential Equations I, section II.10;
 //! coefficients in [`super::dop853`].
 
+use std::ops::Range;
+
 use super::course::Field;
 use super::dop853::{A, ALL_STAGES, C, D, E3, E5, STAGES};
 use super::tangent::Number;
+use crate::lanes::Work;
 
 /// A step from one time to another with the sense of the motion and the side of a corner held, so that
 /// the equation is analytic even where the velocity or the switching function passes zero.
@@ -26,6 +29,14 @@ pub struct Leap<N> {
 }
 
 impl<N: Number> Leap<N> {
+    /// No step yet, at `start`.
+    #[must_use]
+    pub fn none(start: [N; 2]) -> Self {
+        let none = [start[0].like(0.0); ALL_STAGES];
+        let (tau, length, signs) = (0.0, 0.0, [1.0; 2]);
+        Self { tau, length, signs, start, end: start, velocity: none, acceleration: none }
+    }
+
     /// The step of `length` from `start` at `tau`, where the acceleration is `first`.
     #[must_use]
     pub fn new(
@@ -36,24 +47,32 @@ impl<N: Number> Leap<N> {
         signs: [f64; 2],
         length: f64,
     ) -> Self {
-        let zero = first.like(0.0);
-        let mut leap = Self {
-            tau,
-            length,
-            signs,
-            start,
-            end: start,
-            velocity: [zero; ALL_STAGES],
-            acceleration: [zero; ALL_STAGES],
-        };
-        leap.velocity[0] = start[1];
-        leap.acceleration[0] = first;
-        for i in 1..STAGES {
-            leap.stage(field, i);
-        }
-        // The thirteenth stage stands at the new point.
-        leap.end = leap.stage(field, STAGES);
+        let mut leap = Self::none(start);
+        leap.take(field, tau, start, first, signs, length);
         leap
+    }
+
+    /// Becomes that step.
+    pub fn take(
+        &mut self,
+        field: &Field<N>,
+        tau: f64,
+        start: [N; 2],
+        first: N,
+        signs: [f64; 2],
+        length: f64,
+    ) {
+        (self.tau, self.start, self.signs) = (tau, start, signs);
+        self.velocity[0] = start[1];
+        self.acceleration[0] = first;
+        self.shorten(field, length);
+    }
+
+    /// Becomes the step from the same start with another length.
+    pub fn shorten(&mut self, field: &Field<N>, length: f64) {
+        self.length = length;
+        // The thirteenth stage stands at the new point.
+        self.fill(field, 1..STAGES + 1);
     }
 
     /// The step without its derivatives.
@@ -70,29 +89,34 @@ impl<N: Number> Leap<N> {
         }
     }
 
-    /// The step from the same start with another length.
-    #[must_use]
-    pub fn shortened(&self, field: &Field<N>, length: f64) -> Self {
-        Self::new(field, self.tau, self.start, self.first(), self.signs, length)
+    /// Fills stages: the one place where the formulas stand in a loop.
+    #[inline(never)]
+    fn fill(&mut self, field: &Field<N>, stages: Range<usize>) {
+        self.start[0].aside(Filling { leap: self, field, stages });
     }
 
-    /// Fills stage `i` and returns its angle and velocity.
-    #[inline]
-    fn stage(&mut self, field: &Field<N>, i: usize) -> [N; 2] {
+    /// Fills stage `i`.
+    #[inline(always)]
+    fn stage(&mut self, field: &Field<N>, i: usize) {
         let [mut turned, mut gained] = [self.start[0].like(0.0); 2];
-        for (j, weight) in A[i].iter().enumerate().take(i) {
+        let mut j = 0;
+        while j < i {
+            let weight = A[i][j];
             // Half of the table is empty.
-            if *weight != 0.0 {
-                turned = self.velocity[j].scale_add(*weight, turned);
-                gained = self.acceleration[j].scale_add(*weight, gained);
+            if weight != 0.0 {
+                turned = self.velocity[j].scale_add(weight, turned);
+                gained = self.acceleration[j].scale_add(weight, gained);
             }
+            j += 1;
         }
         let theta = turned.scale_add(self.length, self.start[0]);
         let velocity = gained.scale_add(self.length, self.start[1]);
         let tau = self.tau + C[i] * self.length;
         self.velocity[i] = velocity;
-        self.acceleration[i] = field.acceleration(tau, theta, velocity, self.signs);
-        [theta, velocity]
+        self.acceleration[i] = field.at(tau, theta, velocity, self.signs);
+        if i == STAGES {
+            self.end = [theta, velocity];
+        }
     }
 
     /// The acceleration at the end.
@@ -140,32 +164,70 @@ impl<N: Number> Leap<N> {
     /// The curve between the ends, of order 7.
     #[must_use]
     pub fn curve(&mut self, field: &Field<N>) -> Curve<N> {
-        for i in STAGES + 1..ALL_STAGES {
-            self.stage(field, i);
-        }
-        Curve {
-            tau: self.tau,
-            length: self.length,
-            theta: self.coefficients(0, &self.velocity),
-            velocity: self.coefficients(1, &self.acceleration),
-        }
+        let mut curve = Curve::none(self.start);
+        self.trace(field, &mut curve);
+        curve
     }
 
-    fn coefficients(&self, of: usize, slopes: &[N; ALL_STAGES]) -> [N; 8] {
+    /// The same into a curve that there is.
+    pub fn trace(&mut self, field: &Field<N>, curve: &mut Curve<N>) {
+        (curve.tau, curve.length) = (self.tau, self.length);
+        (curve.theta[0], curve.velocity[0]) = (self.start[0], self.start[1]);
+        self.fill(field, STAGES + 1..ALL_STAGES);
+        self.start[0].aside(Curving { leap: self, curve });
+    }
+
+    #[inline(always)]
+    fn coefficients(&self, of: usize, slopes: &[N; ALL_STAGES], all: &mut [N; 8]) {
         let gain = self.end[of] - self.start[of];
         let (first, last) = (slopes[0].scale(self.length), slopes[STAGES].scale(self.length));
-        let mut all = [self.start[of]; 8];
         all[1] = gain;
         all[2] = first - gain;
         all[3] = gain.scale(2.0) - (last + first);
-        for (coefficient, weights) in all[4..].iter_mut().zip(&D) {
+        let mut k = 0;
+        while k < D.len() {
             let mut sum = gain.like(0.0);
-            for (weight, slope) in weights.iter().zip(slopes) {
-                sum = slope.scale_add(*weight, sum);
+            let mut j = 0;
+            while j < ALL_STAGES {
+                sum = slopes[j].scale_add(D[k][j], sum);
+                j += 1;
             }
-            *coefficient = sum.scale(self.length);
+            all[4 + k] = sum.scale(self.length);
+            k += 1;
         }
-        all
+    }
+}
+
+/// Stages of a step.
+struct Filling<'a, N> {
+    leap: &'a mut Leap<N>,
+    field: &'a Field<N>,
+    stages: Range<usize>,
+}
+
+impl<N: Number> Work for Filling<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        let mut i = self.stages.start;
+        while i < self.stages.end {
+            self.leap.stage(self.field, i);
+            i += 1;
+        }
+    }
+}
+
+/// The coefficients of a curve.
+struct Curving<'a, N> {
+    leap: &'a Leap<N>,
+    curve: &'a mut Curve<N>,
+}
+
+impl<N: Number> Work for Curving<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { leap, curve } = self;
+        leap.coefficients(0, &leap.velocity, &mut curve.theta);
+        leap.coefficients(1, &leap.acceleration, &mut curve.velocity);
     }
 }
 
@@ -181,17 +243,39 @@ pub struct Curve<N> {
 }
 
 impl<N: Number> Curve<N> {
+    /// No curve yet.
+    #[must_use]
+    pub fn none([theta, velocity]: [N; 2]) -> Self {
+        Self { tau: 0.0, length: 0.0, theta: [theta; 8], velocity: [velocity; 8] }
+    }
+
     /// Angle and velocity at time `tau` of the step.
     #[must_use]
     pub fn at(&self, tau: f64) -> [N; 2] {
+        let mut state = [self.theta[7], self.velocity[7]];
         let part = (tau - self.tau) / self.length;
-        [&self.theta, &self.velocity].map(|coefficients| {
-            let mut sum = coefficients[7];
-            for k in (0..7).rev() {
-                let factor = if k % 2 == 0 { part } else { 1.0 - part };
-                sum = sum.scale_add(factor, coefficients[k]);
-            }
-            sum
-        })
+        self.theta[0].aside(Summing { curve: self, part, state: &mut state });
+        state
+    }
+}
+
+/// The values of a curve at a part of its step.
+struct Summing<'a, N> {
+    curve: &'a Curve<N>,
+    part: f64,
+    state: &'a mut [N; 2],
+}
+
+impl<N: Number> Work for Summing<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { curve, part, state } = self;
+        let mut k = 7;
+        while k > 0 {
+            k -= 1;
+            let factor = if k % 2 == 0 { part } else { 1.0 - part };
+            state[0] = state[0].scale_add(factor, curve.theta[k]);
+            state[1] = state[1].scale_add(factor, curve.velocity[k]);
+        }
     }
 }

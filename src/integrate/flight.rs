@@ -31,10 +31,10 @@ const CROWDED: (f64, u32) = (1e-10, 20);
 const PAUSE: f64 = 1e-9;
 
 /// A piece of a trajectory.
-#[derive(Debug)]
-pub enum Piece<N> {
-    /// Moving, in one step.
-    Leap(Box<Leap<N>>),
+#[derive(Clone, Copy, Debug)]
+pub enum Piece {
+    /// Moving, in one step: [`Flight::leap`].
+    Leap,
     /// At rest between two times.
     Rest(f64, f64),
 }
@@ -63,6 +63,8 @@ pub struct Flight<'a, N> {
     pub ratio: f64,
     /// Steps so far.
     pub steps: usize,
+    /// The last step.
+    pub leap: Leap<N>,
     until: f64,
     mode: Mode<N>,
     /// Whether the last piece ended at a corner.
@@ -86,6 +88,7 @@ impl<'a, N: Number> Flight<'a, N> {
             events,
             ratio: 1.0,
             steps: 0,
+            leap: Leap::none(state),
             until,
             mode,
             since_corner: false,
@@ -131,7 +134,7 @@ impl<'a, N: Number> Flight<'a, N> {
 
     /// One piece on; `None` at the end, and where the state leaves the range of numbers, which
     /// [`Flight::is_lost`] tells.
-    pub fn advance(&mut self) -> Option<Piece<N>> {
+    pub fn advance(&mut self) -> Option<Piece> {
         if self.tau >= self.until {
             return None;
         }
@@ -143,7 +146,7 @@ impl<'a, N: Number> Flight<'a, N> {
     }
 
     /// To the end, calling `visit` for each piece.
-    pub fn finish(&mut self, mut visit: impl FnMut(&mut Piece<N>)) {
+    pub fn finish(&mut self, mut visit: impl FnMut(&mut Piece)) {
         while let Some(mut piece) = self.advance() {
             visit(&mut piece);
         }
@@ -164,7 +167,7 @@ impl<'a, N: Number> Flight<'a, N> {
         }
     }
 
-    fn rest(&mut self, wait: Release) -> Piece<N> {
+    fn rest(&mut self, wait: Release) -> Piece {
         let from = self.tau;
         match wait {
             Release::At(time, sense) if time < self.until => {
@@ -177,7 +180,7 @@ impl<'a, N: Number> Flight<'a, N> {
         Piece::Rest(from, self.tau)
     }
 
-    fn leap(&mut self, signs: [f64; 2], first: N) -> Option<Piece<N>> {
+    fn leap(&mut self, signs: [f64; 2], first: N) -> Option<Piece> {
         let (course, shortest) = (self.course, SHORTEST * self.tau.abs().max(1.0));
         let mut growth = CHANGE[1];
         loop {
@@ -188,9 +191,9 @@ impl<'a, N: Number> Flight<'a, N> {
                 self.lose();
                 return None;
             }
-            let leap = Leap::new(course.field(), self.tau, self.state, first, signs, length);
+            self.leap.take(course.field(), self.tau, self.state, first, signs, length);
             self.steps += 1;
-            let error = leap.error(course.tolerance());
+            let error = self.leap.error(course.tolerance());
             if error.is_nan() {
                 (self.step, growth) = (CHANGE[0] * length, 1.0);
                 continue;
@@ -202,34 +205,37 @@ impl<'a, N: Number> Flight<'a, N> {
                 continue;
             }
             let turning =
-                if course.watches() { turning::first(course, &leap) } else { Turning::None };
+                if course.watches() { turning::first(course, &self.leap) } else { Turning::None };
             if matches!(turning, Turning::Unclear) && length > FINE * course.longest_step() {
                 (self.step, growth) = (0.5 * length, 1.0);
                 continue;
             }
             // A step that the end cut short says little about the next one.
             self.step = if length < self.step { self.step.max(next) } else { next };
-            let turned = match turning {
-                Turning::At(turned) => Some(turned),
-                _ => None,
+            let turns = if let Turning::At(length) = turning {
+                self.leap.shorten(course.field(), length);
+                true
+            } else {
+                false
             };
-            if course.has_corner() {
-                let whole = turned.as_deref().unwrap_or(&leap);
-                if let Some(cornered) = corner::first(course, whole, self.since_corner) {
-                    self.arrive(&cornered);
-                    self.cross(signs);
-                    return Some(Piece::Leap(Box::new(cornered)));
-                }
-                self.since_corner = false;
+            let corner = if course.has_corner() {
+                corner::first(course, &self.leap, self.since_corner)
+            } else {
+                None
+            };
+            self.since_corner = false;
+            if let Some(length) = corner {
+                self.leap.shorten(course.field(), length);
             }
-            if let Some(turned) = turned {
-                self.arrive(&turned);
-                self.turn(signs[0], turned.last().value());
-                return Some(Piece::Leap(turned));
+            self.arrive();
+            if corner.is_some() {
+                self.cross(signs);
+            } else if turns {
+                self.turn(signs[0], self.leap.last().value());
+            } else {
+                self.mode = Mode::Moving(signs, self.leap.last());
             }
-            self.arrive(&leap);
-            self.mode = Mode::Moving(signs, leap.last());
-            return Some(Piece::Leap(Box::new(leap)));
+            return Some(Piece::Leap);
         }
     }
 
@@ -238,10 +244,11 @@ impl<'a, N: Number> Flight<'a, N> {
         self.state = self.state.map(|x| x.reset(f64::NAN, 1.0));
     }
 
-    fn arrive(&mut self, leap: &Leap<N>) {
-        let end = leap.tau + leap.length;
+    fn arrive(&mut self) {
+        let Leap { tau, length, end: state, .. } = self.leap;
+        let end = tau + length;
         self.tau = if (end - self.until).abs() < SHORTEST * end.abs() { self.until } else { end };
-        self.state = leap.end;
+        self.state = state;
     }
 
     /// At a velocity 0, reached in the sense `sense` with the acceleration `before`.

@@ -1,6 +1,7 @@
 //! A trajectory at chosen times.
 
 use super::course::Course;
+use super::dense::Curve;
 use super::event::Event;
 use super::flight::{Flight, Piece};
 use super::tangent::Number;
@@ -37,18 +38,19 @@ pub fn sample<N: Number>(
     let at_start = times.iter().take_while(|time| **time <= tau).count();
     states.extend(std::iter::repeat_n(flight.state, at_start));
     let mut signs = vec![flight.signs_held(); at_start];
+    let mut curve = Curve::none(flight.state);
     while let Some(piece) = flight.advance() {
         let done = states.len();
         let due = times[done..].iter().take_while(|time| **time <= flight.tau).count();
         if due > 0 {
-            let (curve, held) = match piece {
-                Piece::Leap(mut leap) => (Some(leap.curve(course.field())), Some(leap.signs)),
-                Piece::Rest(..) => (None, None),
-            };
-            signs.resize(done + due, held);
+            let moves = matches!(piece, Piece::Leap);
+            if moves {
+                flight.leap.trace(course.field(), &mut curve);
+            }
+            signs.resize(done + due, moves.then_some(flight.leap.signs));
             for time in &times[done..done + due] {
-                let moving = curve.filter(|_| *time < flight.tau);
-                states.push(moving.map_or(flight.state, |curve| curve.at(*time)));
+                let within = moves && *time < flight.tau;
+                states.push(if within { curve.at(*time) } else { flight.state });
             }
         }
         if !between(&mut flight, &mut states[done..]) {

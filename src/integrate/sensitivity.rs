@@ -57,8 +57,8 @@ pub fn sensitivities(
         // The narrowest numbers that hold what is left.
         first += match count - first {
             ..=2 => pass.run::<2>(first, &mut all),
-            3..=4 => pass.run::<4>(first, &mut all),
-            5..=8 => pass.run::<8>(first, &mut all),
+            3..=5 => pass.run::<5>(first, &mut all),
+            6..=8 => pass.run::<8>(first, &mut all),
             _ => pass.run::<WIDEST>(first, &mut all),
         };
     }

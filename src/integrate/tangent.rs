@@ -3,7 +3,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::lanes::sine::Degree;
-use crate::lanes::{Lane, Real, Work};
+use crate::lanes::{Lane, MAX_WIDTH, Real, Work};
 
 /// The least root that its derivative is divided by: at 0 that is steep, but a number.
 const LEAST_ROOT: f64 = 1e-150;
@@ -191,54 +191,77 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
 }
 
 /// A single number whose value steers an integrator: with derivatives, or without.
+///
+/// Of numbers on lanes the value is the same in all, and each lane of a slope is a direction of its
+/// own: one trajectory whose derivatives fill a register.
 pub trait Number: Real {
     /// The value alone.
     fn value(self) -> f64;
     /// Another value; every derivative times `factor`.
     #[must_use]
     fn reset(self, value: f64, factor: f64) -> Self;
-    /// The constant `value`, without derivatives.
-    #[must_use]
-    fn constant(value: f64) -> Self;
 }
 
 impl Number for f64 {
+    #[inline(always)]
     fn value(self) -> f64 {
         self
     }
 
+    #[inline(always)]
     fn reset(self, value: f64, _: f64) -> Self {
-        value
-    }
-
-    fn constant(value: f64) -> Self {
         value
     }
 }
 
-impl<const N: usize> Number for Tangent<f64, N> {
+impl<L: Lane, const N: usize> Number for Tangent<L, N> {
+    #[inline(always)]
     fn value(self) -> f64 {
-        self.value
+        self.value.first()
     }
 
-    fn reset(self, value: f64, factor: f64) -> Self {
-        Self { value, slope: self.slope.map(|slope| slope * factor) }
+    #[inline(always)]
+    fn reset(mut self, value: f64, factor: f64) -> Self {
+        for slope in &mut self.slope {
+            *slope = slope.scale(factor);
+        }
+        Self { value: self.value.like(value), slope: self.slope }
+    }
+}
+
+impl<L: Lane, const N: usize> Tangent<L, N> {
+    /// The variable `value` whose derivative in one direction is 1, the lanes of the first slope being
+    /// the first directions; a constant where there is no such direction.
+    #[must_use]
+    pub fn along(token: L::Token, value: f64, direction: usize) -> Self {
+        let mut unit = [0.0; MAX_WIDTH];
+        unit[direction % L::WIDTH] = 1.0;
+        let mut slope = [L::splat(token, 0.0); N];
+        if let Some(entry) = slope.get_mut(direction / L::WIDTH) {
+            *entry = L::load(token, &unit);
+        }
+        Self { value: L::splat(token, value), slope }
     }
 
-    fn constant(value: f64) -> Self {
-        Self { value, slope: [0.0; N] }
+    /// Writes its derivatives, in whole registers and as many of them as `into` holds.
+    #[inline(always)]
+    pub fn slopes(&self, into: &mut [f64]) {
+        for (slope, lanes) in self.slope.iter().zip(into.chunks_exact_mut(L::WIDTH)) {
+            slope.store(lanes);
+        }
     }
 }
 
 impl<const N: usize> Tangent<f64, N> {
-    /// The variable `value` whose derivative in direction `column` is 1; a constant where there is
-    /// no such direction.
+    /// [`Tangent::along`] of numbers that are no lanes.
     #[must_use]
     pub fn seeded(value: f64, column: usize) -> Self {
-        let mut slope = [0.0; N];
-        if let Some(entry) = slope.get_mut(column) {
-            *entry = 1.0;
-        }
-        Self { value, slope }
+        Self::along((), value, column)
+    }
+
+    /// The constant `value`.
+    #[must_use]
+    pub fn constant(value: f64) -> Self {
+        Self { value, slope: [0.0; N] }
     }
 }

@@ -40,44 +40,40 @@ type Bernstein = [f64; DEGREE + 1];
 
 /// What the velocity does within a step.
 #[derive(Debug)]
-pub enum Turning<N> {
+pub enum Turning {
     /// It keeps its sense.
     None,
-    /// It passes zero at the end of this shorter step, where it is 0 to rounding and not yet reset.
-    At(Box<Leap<N>>),
+    /// It passes zero at the end of a step of this length, where it is 0 to rounding.
+    At(f64),
     /// The curve has a zero that the motion has not: the step is too long for its curve.
     Unclear,
 }
 
-/// The first zero of the velocity of `leap`, located by integrating again from the step's start:
-/// without derivatives until it is known.
-pub fn first<N: Number>(course: &Course<N>, leap: &Leap<N>) -> Turning<N> {
+/// The first zero of the velocity of `leap`, located by integrating again from the step's start,
+/// without derivatives.
+pub fn first<N: Number>(course: &Course<N>, leap: &Leap<N>) -> Turning {
     if leap.surely_keeps_sense() {
         return Turning::None;
     }
-    let (field, mut whole) = (course.plain(), leap.values());
-    let curve = forward(&whole.curve(field), whole.signs[0]);
+    let (field, mut step) = (course.plain(), leap.values());
+    let curve = forward(&step.curve(field), step.signs[0]);
     let Some(part) = first_below_zero(&curve) else { return Turning::None };
-    let mut length = part * whole.length;
-    let mut best = whole.shortened(field, length);
+    let mut length = part * leap.length;
+    step.shorten(field, length);
+    let mut velocity = step.end[1];
     for _ in 0..MOST_STEPS {
-        let (velocity, slope) = (best.end[1], best.last());
-        let next = length - velocity / slope;
-        if !(next > 0.0 && next <= whole.length) {
+        let next = length - velocity / step.last();
+        if !(next > 0.0 && next <= leap.length) {
             break;
         }
-        let trial = whole.shortened(field, next);
-        if trial.end[1].abs() >= velocity.abs() {
+        step.shorten(field, next);
+        if step.end[1].abs() >= velocity.abs() {
             break;
         }
-        (best, length) = (trial, next);
+        (velocity, length) = (step.end[1], next);
     }
     let size: f64 = curve.iter().map(|c| c.abs()).sum();
-    if best.end[1].abs() <= CLOSE * size {
-        Turning::At(Box::new(leap.shortened(course.field(), length)))
-    } else {
-        Turning::Unclear
-    }
+    if velocity.abs() <= CLOSE * size { Turning::At(length) } else { Turning::Unclear }
 }
 
 /// The velocity in the sense of the motion.

@@ -68,6 +68,55 @@ impl Path {
     }
 }
 
+/// One register of a path, as numbers that hold a derivative in each lane.
+#[derive(Clone, Copy, Debug)]
+pub enum Register {
+    /// Eight numbers.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(pulp::x86::V4),
+    /// Four.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
+    /// One by one: what the compiler itself makes of a loop is as good as two.
+    Single,
+}
+
+impl Path {
+    /// Its register, or the single one where the processor lacks it.
+    #[must_use]
+    pub fn register(self) -> Register {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Self::Avx512 => {
+                if let Some(isa) = pulp::x86::V4::try_new() {
+                    return Register::Avx512(isa);
+                }
+            }
+            Self::Avx2 => {
+                if let Some(isa) = pulp::x86::V3::try_new() {
+                    return Register::Avx2(isa);
+                }
+            }
+            Self::Sse | Self::Portable => {}
+        }
+        Register::Single
+    }
+}
+
+impl Register {
+    /// How many numbers it holds.
+    #[must_use]
+    pub const fn width(self) -> usize {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => 8,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => 4,
+            Self::Single => 1,
+        }
+    }
+}
+
 impl fmt::Display for Path {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use pulp::{Simd, WithSimd};
+use pulp::{Simd, WithSimd, bytemuck};
 
 use super::elementary;
 use super::isa::Isa;
@@ -202,6 +202,12 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
         for (value, pack) in whole.iter_mut().zip(&self.0) {
             *value = pack.value;
         }
+    }
+
+    #[inline(always)]
+    fn first(self) -> f64 {
+        // As memory: taking a lane out is a function call where the instruction set is not known.
+        bytemuck::cast_slice(std::slice::from_ref(&self.0[0].value))[0]
     }
 
     #[inline(always)]

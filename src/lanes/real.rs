@@ -81,6 +81,8 @@ pub trait Lane: Real {
     fn load(token: Self::Token, source: &[f64]) -> Self;
     /// Writes [`Lane::WIDTH`] values to the front of `target`.
     fn store(self, target: &mut [f64]);
+    /// The first lane.
+    fn first(self) -> f64;
     /// The smaller of two values, lane by lane.
     #[must_use]
     fn min(self, other: Self) -> Self;
@@ -191,6 +193,10 @@ macro_rules! scalar_lane {
             #[inline(always)]
             fn store(self, target: &mut [f64]) {
                 target[0] = $get(self);
+            }
+            #[inline(always)]
+            fn first(self) -> f64 {
+                $get(self)
             }
             #[inline(always)]
             fn min(self, other: Self) -> Self {

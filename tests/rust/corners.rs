@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use pendmap::integrate::accuracy::{choose, distance};
 use pendmap::integrate::course::Course;
 use pendmap::integrate::event::EventKind;
-use pendmap::integrate::flight::Flight;
+use pendmap::integrate::flight::{Flight, Piece};
 use pendmap::integrate::flow::Flow;
 use pendmap::integrate::{State, Strobe};
 use pendmap::model::{Effect, Kind, Pendulum};
@@ -218,11 +218,11 @@ fn a_load_that_only_just_touches_zero_is_not_missed() {
         let course = Course::new(&pendulum, false, 1e-12, |_, value| value);
         let mut flight = Flight::new(&course, 0.0, start, pendulum.period());
         let mut sides = Vec::new();
-        flight.finish(|piece| {
-            if let pendmap::integrate::flight::Piece::Leap(leap) = piece {
-                sides.push(leap.signs[1]);
+        while let Some(piece) = flight.advance() {
+            if matches!(piece, Piece::Leap) {
+                sides.push(flight.leap.signs[1]);
             }
-        });
+        }
         sides.windows(2).filter(|w| w[0] * w[1] < 0.0).count()
     };
     assert!(equation.has_corner());

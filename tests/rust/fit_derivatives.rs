@@ -2,19 +2,22 @@
 
 use std::sync::Arc;
 
+use pendmap::fit::linear::Linear;
 use pendmap::fit::window::Window;
 use pendmap::fit::{Problem, Record, RodSensor, Slot};
 use pendmap::integrate::State;
 use pendmap::integrate::course::Course;
 use pendmap::integrate::event::EventKind;
 use pendmap::integrate::sample::sample;
+use pendmap::lanes::Path;
 use pendmap::model::recorded::{Quantity, Samples};
 use pendmap::model::{Kind, Pendulum, Recorded};
 
 use crate::fit_records::{TOLERANCE, every, everything, free, line, record, with};
-use crate::support::{driven, undriven};
+use crate::support::{driven, paths, undriven};
 
-/// The largest difference of the rows from finite differences, over the size of the column or 1.
+/// The largest difference of the rows from finite differences, over the size of the column or 1, on any
+/// instruction set of this processor.
 fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
     let (mut slots, mut own) = everything(&record.pendulum);
     if let Some(sensor) = record.rod_sensor {
@@ -23,21 +26,31 @@ fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
     }
     let values = values.unwrap_or(own);
     let count = record.times.len();
-    let problem =
+    let mut problem =
         Problem::new(vec![record], free(&slots, 1, &values), TOLERANCE).expect("a problem");
     let window = Window { record: 0, from: 0, to: count, start };
-    let found = line(&problem, &values, &window);
+    let mut worst = 0_f64;
+    for path in paths() {
+        problem.path = path;
+        worst = worst.max(worst_of(&problem, &values, window));
+    }
+    worst
+}
+
+fn worst_of(problem: &Problem, values: &[f64], window: Window) -> f64 {
+    let count = window.to;
+    let found = line(problem, values, &window);
     let columns = problem.columns(0);
     let places: Vec<usize> = columns.places().collect();
     let mut worst = 0_f64;
     for column in 0..found.width {
         let residuals = |h: f64| {
-            let (mut values, mut window) = (values.clone(), window);
+            let (mut values, mut window) = (values.to_vec(), window);
             match places.get(column) {
                 Some(place) => values[*place] += h,
                 None => window.start[column - places.len()] += h,
             }
-            line(&problem, &values, &window).residuals
+            line(problem, &values, &window).residuals
         };
         let [a, b, c, d] = [2e-5, -2e-5, 1e-5, -1e-5].map(residuals);
         let size = (0..count).map(|k| found.row(k)[column].abs()).fold(1.0, f64::max);
@@ -48,6 +61,48 @@ fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
         }
     }
     worst
+}
+
+#[test]
+fn instruction_sets_agree_and_passes_have_the_same_motion() {
+    // Six directions, and more than one pass holds; turns, sticks and every stage of the formulas.
+    let pendulum = with(
+        driven(0.02, 0.5, 2.1).with_friction(0.1).expect("in range"),
+        &[
+            (Kind::QuadraticDrag, &[0.004]),
+            (Kind::PowerLawDrag, &[0.003, 2.5]),
+            (Kind::StribeckFriction, &[0.02, 0.3]),
+            (Kind::BearingHarmonic, &[0.03, 3.0, 0.4]),
+            (Kind::Magnet, &[0.02, 0.2]),
+            (Kind::InertiaRipple, &[0.02, 2.0, 0.3]),
+        ],
+    );
+    let (slots, values) = everything(&pendulum);
+    assert!(slots.len() + 2 > 16);
+    let record = record(pendulum, None, [2.0, 0.1], 40.0);
+    let window = Window { record: 0, from: 0, to: record.times.len(), start: [2.0, 0.1] };
+    let linear = |count: usize, path: Path| {
+        let free = free(&slots[..count], 1, &values[..count]);
+        let mut problem = Problem::new(vec![record.clone()], free, TOLERANCE).expect("a problem");
+        problem.path = path;
+        line(&problem, &values[..count], &window)
+    };
+    let all = linear(slots.len(), Path::Portable);
+    for path in paths() {
+        let [few, many] = [4, slots.len()].map(|count| linear(count, path));
+        assert_eq!(few.states, many.states, "{path}");
+        for column in 0..all.width {
+            let of = |linear: &Linear, k: usize| linear.row(k)[column];
+            let samples = 0..all.states.len();
+            let size = samples.clone().map(|k| of(&all, k).abs()).fold(1.0, f64::max);
+            let apart = samples.map(|k| (of(&all, k) - of(&many, k)).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-8 * size, "{path}, column {column}: {apart:e} of {size:e}");
+        }
+    }
+    if Path::Avx512.available() {
+        let [wide, narrow] = [Path::Avx512, Path::Avx2].map(|path| linear(4, path));
+        assert_eq!((wide.states, wide.rows), (narrow.states, narrow.rows));
+    }
 }
 
 #[test]
