@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.discrepancy.trial import (
+    ASTRAY,
     CLEAN,
     Held,
     Trial,
@@ -119,7 +120,8 @@ class Refits:
             if found is None:
                 return None
         else:
-            found = self.unslipped(found)
+            short = trial.chi2 - found.chi2 < SHORT * promised and not found.fit.converged
+            found = self.unslipped(found, lost=short)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -168,8 +170,10 @@ class Refits:
         except InputError:
             return found
 
-    def unslipped(self, found: Trial) -> Trial:
-        """Return a fit from short windows on, where one is astray and that is better."""
+    def unslipped(self, found: Trial, *, lost: bool = False) -> Trial:
+        """Return a fit from short windows on, where one is lost or astray and that is better."""
+        if not lost and found.chi2 <= ASTRAY * max(found.fit.degrees, 1):
+            return found
         try:
             return from_short_windows(self.evidence, found)
         except InputError:
