@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
-from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
+from pendmap.discrepancy.refit import KICK, WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried
+from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried, with_candidates
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,6 +27,10 @@ where nothing is missing."""
 
 GAIN: Final = 12.0
 """The least fall of the BIC for which an effect is accepted."""
+
+NEARLY: Final = (5.0, 0.3)
+"""A candidate whose score promises so much less than another has gained, or less by this part of
+it, is still fitted in its place: to first order it gains less than it may."""
 
 CHANCE: Final = 5e-4
 """Or the chance of what it gains, times how many were looked at: for several parameters at once the
@@ -315,8 +319,24 @@ class Search:
             return known
         rest = self._less(trial, dropped, chosen)
         if known is not None:
-            return min((rest, known), key=lambda t: t.chi2)
-        return rest if rest.fit.converged else self._refits.unslipped(rest)
+            rest = min((rest, known), key=lambda t: t.chi2)
+        elif not rest.fit.converged:
+            rest = self._refits.unslipped(rest)
+        if rest.chi2 <= self.base.trial.chi2:
+            return rest
+        # It can do all that the baseline does: it was lost, and begins again from there.
+        return min((rest, self._from_base(trial, chosen)), key=lambda t: t.chi2)
+
+    def _from_base(self, trial: Trial, chosen: tuple[Candidate, ...]) -> Trial:
+        """Fit some of a trial's effects from the baseline, where they are nearly nothing."""
+        base = self.base.trial
+        sizes = {candidate.free[0] for candidate in chosen}
+        own = [name for c in chosen for name in (*c.free, *c.adapted)]
+        start = {n: trial.start[n] * (KICK if n in sizes else 1.0) for n in own}
+        try:
+            return with_candidates(self.evidence, base, chosen, start)
+        except InputError:
+            return base
 
     def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
         gone = {*dropped.free, *dropped.adapted}
@@ -354,10 +374,17 @@ class Search:
                 shorter = Found(rest, tried(self.evidence, rest))
                 return self._without_idle(shorter) if len(rest.chosen) > 1 else shorter
             scores = self.scores(rest)
-            ranked = [k for k in scores.best() if scores.scores[k].candidate.name != candidate.name]
-            rest_gain = rest.chi2 - best.trial.chi2
-            for k in ranked[:2]:
-                if scores.scores[k].gain < rest_gain:
+            penalty = level * math.log(max(rest.fit.samples / level, 2.0))
+            own = rest.chi2 - best.trial.chi2 - penalty * candidate.count
+            # What does as much with fewer parameters is better.
+            promised = {
+                k: scores.scores[k].gain - penalty * scores.scores[k].candidate.count
+                for k in scores.best()
+                if scores.scores[k].candidate.name != candidate.name
+            }
+            reach = max(NEARLY[0] * level, NEARLY[1] * (rest.chi2 - best.trial.chi2))
+            for k in sorted(promised, key=lambda k: -promised[k])[:2]:
+                if promised[k] < own - reach:
                     break
                 other = self.refit(rest, scores, [k])
                 if other is None or other.held.chi2 > best.held.chi2 + LOSS * level:

@@ -198,16 +198,30 @@ def with_candidates(
         Whether to begin at short windows instead, where the trial's lead astray.
     """
     model = placed(trial.fit.model, added)
-    free = [*trial.free, *(name for c in added for name in (*c.free, *c.adapted))]
+    free = [*trial.free, *(name for c in added for name in c.free)]
+    shapes = [name for c in added for name in c.adapted]
     begin = trial.start | dict(start)
+    windows = None if short else trial.fit.windows
+    if shapes and not short:
+        # A shape means nothing before its effect has a size.
+        sized = fitted(
+            evidence,
+            model,
+            free,
+            start=begin,
+            windows=windows,
+            steps=FEW_STEPS,
+            least_gain=LITTLE,
+        )
+        begin, windows = sized.start, sized.fit.windows
     chosen = (*trial.chosen, *added)
     return fitted(
         evidence,
         model,
-        free,
+        [*free, *shapes],
         chosen,
         start=begin,
-        windows=None if short else trial.fit.windows,
+        windows=windows,
         steps=FEW_STEPS,
         least_gain=LITTLE,
         growth=GENTLE,
