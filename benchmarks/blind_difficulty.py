@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blind_cases import record
+from pendmap.discrepancy.baseline import baseline
 from pendmap.discrepancy.candidates import candidates
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.refit import Refits
 from pendmap.discrepancy.scores import scores_of
-from pendmap.discrepancy.trial import ASTRAY, fitted
+from pendmap.discrepancy.trial import fitted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,10 +55,9 @@ def difficulty(
         # From the noisy fit: what is measured is the effect, not how well a start is found.
         windows = _windows_at(evidence, base)
         begin = fitted(evidence, base.fit.model, base.free, start=base.start, windows=windows)
-        if begin.chi2 > ASTRAY * begin.fit.degrees and len(case.effects) > 1:
+        if not begin.fit.converged or len(case.effects) > 1:
             # What the other effect of a pair did to the windows may lead astray.
-            again = fitted(evidence, base.fit.model, base.free, start=base.start)
-            begin = min((begin, again), key=lambda trial: trial.chi2)
+            begin = min((begin, baseline(evidence)), key=lambda trial: trial.chi2)
         gains.append(begin.chi2)
         own = effect.split(":")[0]
         reached, own_equals = _impostors(evidence, begin, own, without)

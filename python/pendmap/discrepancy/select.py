@@ -47,6 +47,10 @@ SCATTER: Final = 3.0
 """And by so many standard errors less than is expected: an effect that gains ``G`` where it was
 fitted gains ``f G``, give or take ``2 sqrt(f G)``, of ``f`` times as many samples held back."""
 
+PATIENCE: Final = 0.5
+"""Of what is expected there as much may be lost while another effect is missing too: in the end the
+model must be better than the baseline."""
+
 PAIRED: Final = 8
 """Pairs are looked for among so many candidates."""
 
@@ -150,21 +154,44 @@ class Search:
 
     def run(self) -> Found:
         """Return the best model."""
-        best = self.base
-        while self._room(best.trial) > 0:
-            following = self._following(best)
+        path = [self.base]
+        while self._room(path[-1].trial) > 0:
+            following = self._following(path[-1])
             if following is None:
                 break
-            if not best.trial.chosen and self._begun < BEGUN:
+            if len(path) == 1 and self._begun < BEGUN:
                 better = self._better_base(following.trial)
                 if better is not None:
                     self._begin_again(better)
-                    best = self.base
+                    path = [self.base]
                     continue
-            best = following
-            self._rests[key_of(best.trial.chosen)] = best.trial
-            self.progress(len(best.trial.chosen))
-        return self._without_idle(best) if len(best.trial.chosen) > 1 else best
+            path.append(self._settled(following))
+            best = path[-1].trial
+            self._rests[key_of(best.chosen)] = best
+            self.progress(len(best.chosen))
+        # What was worse on what was held back, for want of another effect, must be better with it.
+        while len(path) > 1 and path[-1].held.chi2 > self.base.held.chi2 + LOSS * self.level():
+            path.pop()
+        best_found = path[-1]
+        return self._without_idle(best_found) if len(best_found.trial.chosen) > 1 else best_found
+
+    def _settled(self, found: Found) -> Found:
+        """Return a fit with all the steps that it wants: candidates are given few."""
+        trial = found.trial
+        if trial.fit.converged:
+            return found
+        try:
+            full = fitted(
+                self.evidence,
+                trial.fit.model,
+                trial.free,
+                trial.chosen,
+                start=trial.start,
+                windows=trial.fit.windows,
+            )
+            return Found(full, tried(self.evidence, full))
+        except InputError:
+            return found
 
     def _better_base(self, found: Trial) -> Trial | None:
         """Return the baseline from where a further effect has led, if it is better there.
@@ -270,7 +297,7 @@ class Search:
         held = (current.held.chi2 - found.held.chi2) / level
         share = current.held.degrees / max(current.trial.fit.degrees, 1)
         expected = max(current.trial.chi2 - found.trial.chi2, 0.0) / level * share
-        least = min(expected - SCATTER * 2 * math.sqrt(expected), 0.0) - LOSS
+        least = min(expected - SCATTER * 2 * math.sqrt(expected), -PATIENCE * expected, 0.0) - LOSS
         return self._gains(current.trial, found.trial) and held >= least
 
     def _gains(self, rest: Trial, full: Trial) -> bool:
