@@ -7,9 +7,9 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.baseline import taken_by
-from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.discrepancy.candidates import Candidate, candidates, placed
 from pendmap.discrepancy.refit import KICK, WORTH, Found, Key, Refits, key_of
-from pendmap.discrepancy.scores import Scores, scores_of
+from pendmap.discrepancy.scores import Score, Scores, scores_of
 from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried, with_candidates
 from pendmap.errors import InputError
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
-    from pendmap.model import Formula
+    from pendmap.model import Formula, Rig
 
 __all__ = ["GATE", "Attempt", "Search"]
 
@@ -165,17 +165,17 @@ class Search:
                     self._begin_again(better)
                     path = [self.base]
                     continue
-            path.append(self._settled(following))
+            path.append(self.settled(following))
             best = path[-1].trial
             self._rests[key_of(best.chosen)] = best
             self.progress(len(best.chosen))
         # What was worse on what was held back, for want of another effect, must be better with it.
-        while len(path) > 1 and path[-1].held.chi2 > self.base.held.chi2 + LOSS * self.level():
+        while len(path) > 1 and not self._holds(self.base, path[-1]):
             path.pop()
         best_found = path[-1]
         return self._without_idle(best_found) if len(best_found.trial.chosen) > 1 else best_found
 
-    def _settled(self, found: Found) -> Found:
+    def settled(self, found: Found) -> Found:
         """Return a fit with all the steps that it wants: candidates are given few."""
         trial = found.trial
         if trial.fit.converged:
@@ -293,12 +293,16 @@ class Search:
 
     def accepts(self, current: Found, found: Found) -> bool:
         """Whether a model is better than one with fewer effects, by more than chance."""
+        return self._gains(current.trial, found.trial) and self._holds(current, found, PATIENCE)
+
+    def _holds(self, current: Found, found: Found, patience: float = 0.0) -> bool:
+        """Whether a model is no worse on what was held back than a right one may be."""
         level = self.level()
         held = (current.held.chi2 - found.held.chi2) / level
         share = current.held.degrees / max(current.trial.fit.degrees, 1)
         expected = max(current.trial.chi2 - found.trial.chi2, 0.0) / level * share
-        least = min(expected - SCATTER * 2 * math.sqrt(expected), -PATIENCE * expected, 0.0) - LOSS
-        return self._gains(current.trial, found.trial) and held >= least
+        scatter = SCATTER * 2 * math.sqrt(expected)
+        return held >= min(expected - scatter, -patience * expected, 0.0) - LOSS
 
     def _gains(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects gain more than chance."""
@@ -366,13 +370,7 @@ class Search:
             return base
 
     def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
-        gone = {*dropped.free, *dropped.adapted}
-        free = [name for name in trial.free if name not in gone]
-        model = trial.fit.model
-        effects = tuple(e for e in model.effects if e.name != dropped.name)
-        own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
-        model = dataclasses.replace(model, effects=effects, **own)
-        start = {name: value for name, value in trial.start.items() if name not in gone}
+        model, free, start = _without(trial, dropped)
         try:
             return fitted(
                 self.evidence,
@@ -388,6 +386,26 @@ class Search:
             # Without it the motion is lost from here: from short windows on, as the baseline began.
             begin = start | {n: v for n, v in self.base.trial.start.items() if n in free}
             return fitted(self.evidence, model, free, chosen, start=begin)
+
+    def instead(self, trial: Trial, dropped: Candidate, score: Score) -> Trial | None:
+        """Fit a trial's model with another effect in an effect's place, that does nearly the same.
+
+        It begins at the trial's own motion.
+        """
+        model, free, start = _without(trial, dropped)
+        other = score.candidate
+        chosen = (*(c for c in trial.chosen if c.name != dropped.name), other)
+        try:
+            return fitted(
+                self.evidence,
+                placed(model, [other]),
+                [*free, *other.free, *other.adapted],
+                chosen,
+                start=start | score.start,
+                windows=trial.fit.windows,
+            )
+        except InputError:
+            return None
 
     def _without_idle(self, best: Found) -> Found:
         """Drop effects that a later one made idle, and exchange those that another one beats."""
@@ -420,3 +438,14 @@ class Search:
                     self._note(Found(rest, best.held), other, scores, [k], good=True)
                     return self._without_idle(other)
         return best
+
+
+def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:
+    """Return a trial's model without an effect, what is free of it, and where it stands."""
+    gone = {*dropped.free, *dropped.adapted}
+    model = trial.fit.model
+    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
+    effects = tuple(e for e in model.effects if e.name != dropped.name)
+    model = dataclasses.replace(model, effects=effects, **own)
+    free = [name for name in trial.free if name not in gone]
+    return model, free, {name: value for name, value in trial.start.items() if name not in gone}
