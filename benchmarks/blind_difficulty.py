@@ -10,19 +10,22 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from blind_cases import record
+from pendmap.discrepancy.baseline import baseline
 from pendmap.discrepancy.candidates import candidates
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.refit import Refits
 from pendmap.discrepancy.scores import scores_of
-from pendmap.discrepancy.trial import ASTRAY, fitted
+from pendmap.discrepancy.trial import fitted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from blind_cases import Case
-    from pendmap.discrepancy.trial import Trial
+    from pendmap.discrepancy.trial import Trial, Windows
 
 CLEAR = 25.0
 """Separation times score from which names are told apart nearly always."""
@@ -50,13 +53,11 @@ def difficulty(
         experiment, sigma = record(alone, folder, clean=True)
         evidence = _with_noise(evidence_of(experiment), sigma)
         # From the noisy fit: what is measured is the effect, not how well a start is found.
-        begin = fitted(
-            evidence, base.fit.model, base.free, start=base.start, windows=base.fit.windows
-        )
-        if begin.chi2 > ASTRAY * begin.fit.degrees and len(case.effects) > 1:
+        windows = _windows_at(evidence, base)
+        begin = fitted(evidence, base.fit.model, base.free, start=base.start, windows=windows)
+        if not begin.fit.converged or len(case.effects) > 1:
             # What the other effect of a pair did to the windows may lead astray.
-            again = fitted(evidence, base.fit.model, base.free, start=base.start)
-            begin = min((begin, again), key=lambda trial: trial.chi2)
+            begin = min((begin, baseline(evidence)), key=lambda trial: trial.chi2)
         gains.append(begin.chi2)
         own = effect.split(":")[0]
         reached, own_equals = _impostors(evidence, begin, own, without)
@@ -111,6 +112,24 @@ def _impostors(
                 continue
         gains[name] = gain
     return gains, equals
+
+
+def _windows_at(evidence: Evidence, base: Trial) -> Windows:
+    """Return a fit's windows for runs of the same motion with other instants.
+
+    Readings without noise and counts may be put together where those with them are not.
+    """
+    moved = []
+    for run, first, last, theta, velocity in base.fit.windows:
+        old, new = base.runs[run].time, evidence.fitted[run].time
+        if old.size == new.size:
+            moved.append((run, first, last, theta, velocity))
+            continue
+        begin = int(np.searchsorted(new, old[first]))
+        end = new.size if last == old.size else int(np.searchsorted(new, old[last]))
+        if begin < end:
+            moved.append((run, begin, end, theta + velocity * (new[begin] - old[first]), velocity))
+    return tuple(moved)
 
 
 def _with_noise(evidence: Evidence, sigma: float) -> Evidence:

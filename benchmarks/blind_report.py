@@ -93,9 +93,10 @@ def confidently_wrong(row: Row) -> bool:
 
 def careful(row: Row) -> bool:
     """Whether a withheld effect got no name, or a reserved one of its family."""
-    if row["verdict"] in {"unknown", "partial"}:
+    if not row["named"]:
         return True
-    return bool(row["named"]) and all(row["approximate"]) and of_family(row)
+    with_reserve = row["verdict"] == "partial" or all(row["approximate"])
+    return with_reserve and of_family(row)
 
 
 def figures(rows: list[Row]) -> list[list[str]]:

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -138,9 +139,17 @@ fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<P
     Ok(Problem::new(records, free.collect(), tolerance)?)
 }
 
-fn windows(given: Vec<WindowTuple>) -> Vec<Window> {
-    let window =
-        |(record, from, to, theta, velocity)| Window { record, from, to, start: [theta, velocity] };
+fn windows(given: Vec<WindowTuple>, problem: &Problem) -> PyResult<Vec<Window>> {
+    let window = |(record, from, to, theta, velocity): WindowTuple| {
+        let length = problem.records.get(record).map_or(0, |record| record.times.len());
+        if from < to && to <= length {
+            return Ok(Window { record, from, to, start: [theta, velocity] });
+        }
+        Err(PyValueError::new_err(format!(
+            "window of samples {from} to {to} of run {record}, which has {length}: allowed are \
+             samples of a run, the first before the last"
+        )))
+    };
     given.into_iter().map(window).collect()
 }
 
@@ -155,7 +164,7 @@ pub fn fit_runs<'py>(
     windows: Option<Vec<WindowTuple>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let problem = problem(runs, &free, choices.tolerance)?;
-    let given = windows.map(self::windows);
+    let given = windows.map(|given| self::windows(given, &problem)).transpose()?;
     let FitChoices { shortest, growth, steps, gain, hold, .. } = choices;
     let settings = Settings { shortest, growth, steps, gain, hold };
     let (found, ends) = watched(py, None, |control| {
@@ -184,7 +193,7 @@ pub fn fit_equations<'py>(
     windows: Vec<WindowTuple>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let problem = problem(runs, &free, tolerance)?;
-    let windows = self::windows(windows);
+    let windows = self::windows(windows, &problem)?;
     let at = watched(py, None, |_| Point::new(&problem, problem.start(), windows))?;
     point(py, &problem, &at)
 }
@@ -201,7 +210,7 @@ pub fn fit_rows<'py>(
     windows: Vec<WindowTuple>,
 ) -> PyResult<Bound<'py, PyList>> {
     let problem = problem(runs, &free, tolerance)?;
-    let windows = self::windows(windows);
+    let windows = self::windows(windows, &problem)?;
     let all = watched(py, None, |_| {
         linearised(&problem, &problem.start(), &windows).ok_or(Error::Diverges)
     })?;

@@ -239,6 +239,13 @@ LAWS = {
 }
 
 
+@pytest.mark.parametrize("window", [(0, 0, 21), (0, 9, 9), (1, 0, 20)])
+def test_windows_are_samples_of_their_runs(window: tuple[int, int, int]) -> None:
+    run = FitRun(np.arange(20.0) * 0.05, 0.1 * np.cos(0.3 * np.arange(20)), 1e-3)
+    with pytest.raises(InputError, match="allowed are samples of a run"):
+        fit_runs([run], Rig(w0=6.0), ["w0"], windows=((*window, 0.1, 0.0),))
+
+
 @pytest.mark.skipif(not RECORDS, reason="PENDMAP_RECORDS names no folder of measured records")
 @pytest.mark.parametrize(
     ("name", "stretch", "limits"),

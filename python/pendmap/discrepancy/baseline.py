@@ -8,16 +8,26 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.discrepancy.candidates import own_name
-from pendmap.discrepancy.trial import Trial, fitted
+from pendmap.discrepancy.trial import GENTLE, Trial, fitted
 from pendmap.errors import InputError
+from pendmap.identification.fitting import fit_runs
 from pendmap.identification.rough import rough_start
 from pendmap.identification.start import starting_values
 from pendmap.model import Rig
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.identification.runs import FitRun
 
 __all__ = ["baseline", "taken_by"]
+
+SOUND: Final = 1.5
+"""Sum of squares for each degree of freedom up to which a fit is taken for what it is."""
+
+PARTS: Final = (1, 3, 10)
+"""Windows that a run is divided into, in turn, until the model follows it."""
 
 POOR: Final = 0.1
 """Residuals above this part of a record's own scatter are no fit: the search went astray."""
@@ -51,6 +61,11 @@ def baseline(evidence: Evidence, model: Rig | None = None) -> Trial:
     free = ["w0", "c_over_m", "Tr"]
     first = _start(evidence)
     found = _through_all(evidence, first, free) or fitted(evidence, first, free)
+    if not found.fit.converged:
+        gently = fitted(evidence, first, free, growth=GENTLE)
+        divided = None if gently.fit.converged else _in_parts(evidence, first, free)
+        tried = (t for t in (found, gently, divided) if t is not None)
+        found = min(tried, key=lambda t: t.chi2)
     if found.fit.converged and not _poor(evidence, found):
         return found
     best = found
@@ -60,6 +75,35 @@ def baseline(evidence: Evidence, model: Rig | None = None) -> Trial:
         if not _poor(evidence, best):
             break
     return best
+
+
+def _in_parts(evidence: Evidence, start: Rig, free: list[str]) -> Trial | None:
+    """Return the fit with runs divided that a model does not follow as a whole even by themselves.
+
+    So released near the top, where a swing that is nearly right becomes a turn: in a fit of all
+    runs one that is lost draws the others along. None where there is no such run.
+    """
+    runs = [run if run.forced else _followed(run, start, free) for run in evidence.fitted]
+    if all(new is old for new, old in zip(runs, evidence.fitted, strict=True)):
+        return None
+    try:
+        return fitted(dataclasses.replace(evidence, fitted=tuple(runs)), start, free)
+    except InputError:
+        return None
+
+
+def _followed(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
+    """Return a run with windows as long as a model of its own can follow it."""
+    for part in PARTS:
+        longest = float(np.ptp(run.time)) / part
+        divided = run if part == 1 else dataclasses.replace(run, longest_s=longest)
+        try:
+            fit = fit_runs([divided], start, free, profiled=())
+        except InputError:
+            continue  # its motion is lost
+        if fit.converged and fit.chi2 < SOUND * max(fit.degrees, 1):
+            return divided
+    return run
 
 
 def _through_all(evidence: Evidence, start: Rig, free: list[str]) -> Trial | None:

@@ -31,9 +31,10 @@ greatest in equal ratios: neighbouring shapes are then alike to a few percent.""
 PLACES: Final = 9
 """The same of a place on the circle, in equal steps."""
 
-FAINT: Final = 1e-7
+FAINT: Final = 1e-12
 """A size without dimensions at which an effect with a phase is scored: at 0 the phase would do
-nothing, and this is far below what any record shows."""
+nothing, and this is far below what any record shows, also where a chaotic motion has made a
+million times as much of it: effects are derived in several passes, all about one motion."""
 
 
 @dataclasses.dataclass(frozen=True)

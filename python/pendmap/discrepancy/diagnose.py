@@ -195,6 +195,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     steps = max_effects + 3
     evidence = evidence_of(experiment)
     begin = baseline(evidence, model)
+    # Windows are as long as it could follow the runs.
+    evidence = dataclasses.replace(evidence, fitted=begin.runs)
     report(1, steps)
     search = Search(
         evidence, begin, max_effects, without, lambda done: report(1 + done, steps), own=own

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.discrepancy.trial import (
+    ASTRAY,
     CLEAN,
     Held,
     Trial,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.scores import Scores
 
-__all__ = ["WORTH", "Found", "Key", "Refits", "key_of"]
+__all__ = ["KICK", "WORTH", "Found", "Key", "Refits", "key_of"]
 
 WORTH: Final = 0.4
 """The part of the greatest score that a candidate's must have to be refitted beside it."""
@@ -97,20 +98,19 @@ class Refits:
         start = {n: v for k in places for n, v in scores.scores[k].start.items()}
         sizes = {candidate.free[0] for candidate in added}
         kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
-        adapted = len(added) == 1 and bool(added[0].adapted)
-        # A shape that is adapted too needs its effect's size from the start.
-        first, second = (start, kick) if adapted else (kick, start)
-        found = self._fit(trial, added, first)
-        if adapted:
+        found = self._fit(trial, added, kick)
+        if len(added) == 1 and added[0].adapted:
             for k in self._other_shapes(scores, places[0]):
                 if found is not None and found.remainder.z < CLEAN:
                     break  # where nothing is left no shape gains anything
                 bent = scores.scores[k]
-                again = self._fit(trial, [bent.candidate], bent.start)
+                size = bent.candidate.free[0]
+                faint = bent.start | {size: KICK * bent.start[size]}
+                again = self._fit(trial, [bent.candidate], faint)
                 found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
         promised = scores.together(places)
         if found is None or trial.chi2 - found.chi2 < SHORT * promised:
-            other = self._fit(trial, added, second)
+            other = self._fit(trial, added, start)
             found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
         if found is None or found.chi2 > trial.chi2:
             # More can do all that less did: the motion was lost on the way.
@@ -119,7 +119,8 @@ class Refits:
             if found is None:
                 return None
         else:
-            found = self.unslipped(found)
+            short = trial.chi2 - found.chi2 < SHORT * promised and not found.fit.converged
+            found = self.unslipped(found, lost=short)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -168,8 +169,10 @@ class Refits:
         except InputError:
             return found
 
-    def unslipped(self, found: Trial) -> Trial:
-        """Return a fit from short windows on, where one is astray and that is better."""
+    def unslipped(self, found: Trial, *, lost: bool = False) -> Trial:
+        """Return a fit from short windows on, where one is lost or astray and that is better."""
+        if not lost and found.chi2 <= ASTRAY * max(found.fit.degrees, 1):
+            return found
         try:
             return from_short_windows(self.evidence, found)
         except InputError:

@@ -132,18 +132,23 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
     reach = max(NEAR[0], NEAR[1] * gain)
     rivals = []
     for rank, k in enumerate(others):
-        score, found = scores.scores[k], None
+        score = scores.scores[k]
         reached, refitted = score.gain / level, False
         if scores.same(own, k):
             reached = gain
         elif rank < REFITTED and gain - reached < reach:
             found = search.refit(rest, scores, [k])
             if found is not None:
-                reached, refitted = (rest.chi2 - found.trial.chi2) / level, True
+                rival = search.settled(found).trial
+                if not rival.fit.converged and scores.likeness(own, k) > CONTAINS:
+                    # What does the same begins at the same motion.
+                    other = search.instead(best.trial, candidate, score)
+                    rival = min((t for t in (rival, other) if t), key=lambda t: t.chi2)
+                reached, refitted = (rest.chi2 - rival.chi2) / level, True
         likeness = scores.likeness(own, k)
-        if refitted and found is not None:
+        if refitted:
             # Its shape has been adapted since: what counts is what it does now.
-            likeness = max(likeness, _likeness(search.evidence, best.trial, found.trial, rest))
+            likeness = max(likeness, _likeness(search.evidence, best.trial, rival, rest))
         more = score.candidate.count > candidate.count
         rivals.append(
             Rival(

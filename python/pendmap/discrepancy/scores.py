@@ -162,11 +162,11 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
         if not passes:
             names = [name for name in found if name in fit.estimates]
             wanted = [found.index(name) for name in names] + wanted
-        first = passes[0] if passes else slopes
+        bare = passes[0] if passes else slopes
         passes.append(
             [
                 dataclasses.replace(w, columns=w.columns_as_in(one)[:, wanted])
-                for w, one in zip(slopes, first, strict=True)
+                for w, one in zip(slopes, bare, strict=True)
             ]
         )
         every += present

@@ -7,17 +7,17 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.baseline import taken_by
-from pendmap.discrepancy.candidates import Candidate, candidates
-from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
-from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried
+from pendmap.discrepancy.candidates import Candidate, candidates, placed
+from pendmap.discrepancy.refit import KICK, WORTH, Found, Key, Refits, key_of
+from pendmap.discrepancy.scores import Score, Scores, scores_of
+from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried, with_candidates
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
-    from pendmap.model import Formula
+    from pendmap.model import Formula, Rig
 
 __all__ = ["GATE", "Attempt", "Search"]
 
@@ -27,6 +27,10 @@ where nothing is missing."""
 
 GAIN: Final = 12.0
 """The least fall of the BIC for which an effect is accepted."""
+
+NEARLY: Final = (5.0, 0.3)
+"""A candidate whose score promises so much less than another has gained, or less by this part of
+it, is still fitted in its place: to first order it gains less than it may."""
 
 CHANCE: Final = 5e-4
 """Or the chance of what it gains, times how many were looked at: for several parameters at once the
@@ -42,6 +46,10 @@ errors of what a parameter that is right, but not exact, does there."""
 SCATTER: Final = 3.0
 """And by so many standard errors less than is expected: an effect that gains ``G`` where it was
 fitted gains ``f G``, give or take ``2 sqrt(f G)``, of ``f`` times as many samples held back."""
+
+PATIENCE: Final = 0.5
+"""Of what is expected there as much may be lost while another effect is missing too: in the end the
+model must be better than the baseline."""
 
 PAIRED: Final = 8
 """Pairs are looked for among so many candidates."""
@@ -146,21 +154,44 @@ class Search:
 
     def run(self) -> Found:
         """Return the best model."""
-        best = self.base
-        while self._room(best.trial) > 0:
-            following = self._following(best)
+        path = [self.base]
+        while self._room(path[-1].trial) > 0:
+            following = self._following(path[-1])
             if following is None:
                 break
-            if not best.trial.chosen and self._begun < BEGUN:
+            if len(path) == 1 and self._begun < BEGUN:
                 better = self._better_base(following.trial)
                 if better is not None:
                     self._begin_again(better)
-                    best = self.base
+                    path = [self.base]
                     continue
-            best = following
-            self._rests[key_of(best.trial.chosen)] = best.trial
-            self.progress(len(best.trial.chosen))
-        return self._without_idle(best) if len(best.trial.chosen) > 1 else best
+            path.append(self.settled(following))
+            best = path[-1].trial
+            self._rests[key_of(best.chosen)] = best
+            self.progress(len(best.chosen))
+        # What was worse on what was held back, for want of another effect, must be better with it.
+        while len(path) > 1 and not self._holds(self.base, path[-1]):
+            path.pop()
+        best_found = path[-1]
+        return self._without_idle(best_found) if len(best_found.trial.chosen) > 1 else best_found
+
+    def settled(self, found: Found) -> Found:
+        """Return a fit with all the steps that it wants: candidates are given few."""
+        trial = found.trial
+        if trial.fit.converged:
+            return found
+        try:
+            full = fitted(
+                self.evidence,
+                trial.fit.model,
+                trial.free,
+                trial.chosen,
+                start=trial.start,
+                windows=trial.fit.windows,
+            )
+            return Found(full, tried(self.evidence, full))
+        except InputError:
+            return found
 
     def _better_base(self, found: Trial) -> Trial | None:
         """Return the baseline from where a further effect has led, if it is better there.
@@ -262,12 +293,16 @@ class Search:
 
     def accepts(self, current: Found, found: Found) -> bool:
         """Whether a model is better than one with fewer effects, by more than chance."""
+        return self._gains(current.trial, found.trial) and self._holds(current, found, PATIENCE)
+
+    def _holds(self, current: Found, found: Found, patience: float = 0.0) -> bool:
+        """Whether a model is no worse on what was held back than a right one may be."""
         level = self.level()
         held = (current.held.chi2 - found.held.chi2) / level
         share = current.held.degrees / max(current.trial.fit.degrees, 1)
         expected = max(current.trial.chi2 - found.trial.chi2, 0.0) / level * share
-        least = min(expected - SCATTER * 2 * math.sqrt(expected), 0.0) - LOSS
-        return self._gains(current.trial, found.trial) and held >= least
+        scatter = SCATTER * 2 * math.sqrt(expected)
+        return held >= min(expected - scatter, -patience * expected, 0.0) - LOSS
 
     def _gains(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects gain more than chance."""
@@ -315,17 +350,27 @@ class Search:
             return known
         rest = self._less(trial, dropped, chosen)
         if known is not None:
-            return min((rest, known), key=lambda t: t.chi2)
-        return rest if rest.fit.converged else self._refits.unslipped(rest)
+            rest = min((rest, known), key=lambda t: t.chi2)
+        elif not rest.fit.converged:
+            rest = self._refits.unslipped(rest)
+        if rest.chi2 <= self.base.trial.chi2:
+            return rest
+        # It can do all that the baseline does: it was lost, and begins again from there.
+        return min((rest, self._from_base(trial, chosen)), key=lambda t: t.chi2)
+
+    def _from_base(self, trial: Trial, chosen: tuple[Candidate, ...]) -> Trial:
+        """Fit some of a trial's effects from the baseline, where they are nearly nothing."""
+        base = self.base.trial
+        sizes = {candidate.free[0] for candidate in chosen}
+        own = [name for c in chosen for name in (*c.free, *c.adapted)]
+        start = {n: trial.start[n] * (KICK if n in sizes else 1.0) for n in own}
+        try:
+            return with_candidates(self.evidence, base, chosen, start)
+        except InputError:
+            return base
 
     def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
-        gone = {*dropped.free, *dropped.adapted}
-        free = [name for name in trial.free if name not in gone]
-        model = trial.fit.model
-        effects = tuple(e for e in model.effects if e.name != dropped.name)
-        own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
-        model = dataclasses.replace(model, effects=effects, **own)
-        start = {name: value for name, value in trial.start.items() if name not in gone}
+        model, free, start = _without(trial, dropped)
         try:
             return fitted(
                 self.evidence,
@@ -342,6 +387,26 @@ class Search:
             begin = start | {n: v for n, v in self.base.trial.start.items() if n in free}
             return fitted(self.evidence, model, free, chosen, start=begin)
 
+    def instead(self, trial: Trial, dropped: Candidate, score: Score) -> Trial | None:
+        """Fit a trial's model with another effect in an effect's place, that does nearly the same.
+
+        It begins at the trial's own motion.
+        """
+        model, free, start = _without(trial, dropped)
+        other = score.candidate
+        chosen = (*(c for c in trial.chosen if c.name != dropped.name), other)
+        try:
+            return fitted(
+                self.evidence,
+                placed(model, [other]),
+                [*free, *other.free, *other.adapted],
+                chosen,
+                start=start | score.start,
+                windows=trial.fit.windows,
+            )
+        except InputError:
+            return None
+
     def _without_idle(self, best: Found) -> Found:
         """Drop effects that a later one made idle, and exchange those that another one beats."""
         level = self.level()
@@ -354,10 +419,17 @@ class Search:
                 shorter = Found(rest, tried(self.evidence, rest))
                 return self._without_idle(shorter) if len(rest.chosen) > 1 else shorter
             scores = self.scores(rest)
-            ranked = [k for k in scores.best() if scores.scores[k].candidate.name != candidate.name]
-            rest_gain = rest.chi2 - best.trial.chi2
-            for k in ranked[:2]:
-                if scores.scores[k].gain < rest_gain:
+            penalty = level * math.log(max(rest.fit.samples / level, 2.0))
+            own = rest.chi2 - best.trial.chi2 - penalty * candidate.count
+            # What does as much with fewer parameters is better.
+            promised = {
+                k: scores.scores[k].gain - penalty * scores.scores[k].candidate.count
+                for k in scores.best()
+                if scores.scores[k].candidate.name != candidate.name
+            }
+            reach = max(NEARLY[0] * level, NEARLY[1] * (rest.chi2 - best.trial.chi2))
+            for k in sorted(promised, key=lambda k: -promised[k])[:2]:
+                if promised[k] < own - reach:
                     break
                 other = self.refit(rest, scores, [k])
                 if other is None or other.held.chi2 > best.held.chi2 + LOSS * level:
@@ -366,3 +438,14 @@ class Search:
                     self._note(Found(rest, best.held), other, scores, [k], good=True)
                     return self._without_idle(other)
         return best
+
+
+def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:
+    """Return a trial's model without an effect, what is free of it, and where it stands."""
+    gone = {*dropped.free, *dropped.adapted}
+    model = trial.fit.model
+    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
+    effects = tuple(e for e in model.effects if e.name != dropped.name)
+    model = dataclasses.replace(model, effects=effects, **own)
+    free = [name for name in trial.free if name not in gone]
+    return model, free, {name: value for name, value in trial.start.items() if name not in gone}

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ASTRAY",
     "CLEAN",
+    "GENTLE",
     "LITTLE",
     "Held",
     "Trial",
@@ -40,6 +41,9 @@ short again may find a better one."""
 
 MOST_STEPS: Final = 40
 """Steps of a fit at most."""
+
+GENTLE: Final = 1.5
+"""By so much windows grow from stage to stage where a fit was lost as they grew by more."""
 
 LITTLE: Final = 0.05
 """Of a sum of squares: far below what decides between candidates."""
@@ -139,6 +143,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     windows: Windows | None = None,
     steps: int = MOST_STEPS,
     least_gain: float = 1e-3,
+    growth: float = 4.0,
 ) -> Trial:
     """Fit a model to the evidence.
 
@@ -152,7 +157,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         What is fitted.
     chosen : sequence of Candidate
         The effects of the model that were added to the baseline.
-    start, windows, steps, least_gain
+    start, windows, steps, least_gain, growth
         As of :func:`pendmap.identification.fitting.fit_runs`.
     """
     fit = fit_runs(
@@ -164,6 +169,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         profiled=(),
         steps=steps,
         least_gain=least_gain,
+        growth=growth,
     )
     return Trial(fit, tuple(free), tuple(chosen), evidence.fitted)
 
@@ -192,33 +198,46 @@ def with_candidates(
         Whether to begin at short windows instead, where the trial's lead astray.
     """
     model = placed(trial.fit.model, added)
-    free = [*trial.free, *(name for c in added for name in (*c.free, *c.adapted))]
+    free = [*trial.free, *(name for c in added for name in c.free)]
+    shapes = [name for c in added for name in c.adapted]
     begin = trial.start | dict(start)
+    windows = None if short else trial.fit.windows
+    if shapes and not short:
+        # A shape means nothing before its effect has a size.
+        sized = fitted(
+            evidence,
+            model,
+            free,
+            start=begin,
+            windows=windows,
+            steps=FEW_STEPS,
+            least_gain=LITTLE,
+        )
+        begin, windows = sized.start, sized.fit.windows
     chosen = (*trial.chosen, *added)
     return fitted(
         evidence,
         model,
-        free,
+        [*free, *shapes],
         chosen,
         start=begin,
-        windows=None if short else trial.fit.windows,
+        windows=windows,
         steps=FEW_STEPS,
         least_gain=LITTLE,
+        growth=GENTLE,
     )
 
 
 def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:
-    """Fit a trial's model again from short windows on, if it may have slipped; return the better.
+    """Fit a trial's model again from short windows on; return the better of both.
 
     Parameters
     ----------
     evidence : Evidence
         The records.
     trial : Trial
-        The fit.
+        A fit that may have slipped.
     """
-    if trial.chi2 <= ASTRAY * max(trial.fit.degrees, 1):
-        return trial
     again = fitted(
         evidence,
         trial.fit.model,
@@ -227,6 +246,7 @@ def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:
         start=trial.start,
         steps=FEW_STEPS,
         least_gain=LITTLE,
+        growth=GENTLE,
     )
     return min((trial, again), key=lambda t: t.chi2)
 

@@ -37,7 +37,8 @@ FAINT: Final = 60.0
 shows in no torque, no residual and no run."""
 
 DOUBTFUL: Final = 0.5
-"""Probability below which names are more likely wrong than right: none is claimed."""
+"""Probability below which names that explain all are more likely wrong than right: none is
+claimed."""
 
 SURE: Final = 0.9
 """Probability that names are right below which they are given with reserve."""
@@ -144,8 +145,7 @@ def judge(
     if not trial.chosen:
         verdict = "unknown" if rest else "none"
     elif rest and not faint:
-        most = closed >= CLOSED and spread <= SPREAD and sure >= DOUBTFUL
-        verdict = "partial" if most else "unknown"
+        verdict = "partial" if closed >= CLOSED and spread <= SPREAD else "unknown"
     elif sure < DOUBTFUL and not faint:
         verdict = "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):

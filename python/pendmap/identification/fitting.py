@@ -112,13 +112,14 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     hold: bool = False,
     steps: int = 40,
     least_gain: float = 1e-3,
+    growth: float = 4.0,
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
 
     The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free
     parameters and over an initial state for each window; where readings are intervals, by counts
     coarser than the noise, ``-2 log P`` of them stands for the square. Windows begin with about one
-    swing and grow fourfold from stage to stage, to the whole record of a free decay.
+    swing and grow from stage to stage, to the whole record of a free decay.
 
     Parameters
     ----------
@@ -148,6 +149,9 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         The most steps of a stage.
     least_gain : float
         A step that promises less of the sum of squares than this is the last one.
+    growth : float
+        By how much windows grow from stage to stage: with less a motion near the top, where small
+        errors of its state soon are large, is lost less often.
 
     Raises
     ------
@@ -170,7 +174,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     choices = {
         "tolerance": tolerance_of(runs),
         "shortest": units.w0 * (swing if shortest_s is None else shortest_s),
-        "growth": 4.0,
+        "growth": growth,
         "steps": steps,
         "gain": least_gain,
         "hold": len([q for q in quantities if q.name.partition("[")[0] in free]) if hold else 0,

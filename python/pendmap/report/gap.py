@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.torque import STANDS_OUT
+from pendmap.discrepancy.verdict import CHANCE
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
-from pendmap.report.wording import chance, compared, gained, joined, mrad, values
+from pendmap.report.wording import chance, compared, joined, mrad, values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,28 +53,30 @@ def verdict(found: Discrepancy) -> Section:
     blocks += [
         Paragraph(("Not told apart here: ", *joined(names), ".")) for names in found.equivalent
     ]
-    judged = found.judgement
-    rests = [
-        (
-            f"The slow part of what is left differs from that of noise by {gained(judged.left)} "
-            "standard errors; above 5 something is left."
-        ),
-        (
-            f"Chi-squared over degrees of freedom is {judged.ratio:.4g}; the doubt about the noise "
-            f"allows up to {judged.ratio_allowed:.4g}."
-        ),
-        (
-            f"Noise alone would leave such a torque over angle, velocity, amplitude, phase or time "
-            f"with a probability {_rare(judged.chance)}."
-        ),
-    ]
-    if len(found.evidence.fitted) > 1:
-        rests.append(
-            f"The runs, each by itself, differ in their parameters by {gained(judged.uneven)} "
-            "standard errors; above 5 they do not agree."
-        )
-    blocks += [Paragraph("It rests on this:"), Items(tuple(rests))]
+    blocks += [Paragraph("It rests on this:"), Items(tuple(_rests(found)))]
     return Section("Verdict", tuple(blocks))
+
+
+def _rests(found: Discrepancy) -> Iterator[Text]:
+    judged = found.judgement
+    form = judged.form
+    yield (
+        f"Chi-squared over degrees of freedom is {judged.ratio:.4g}; the doubt about the noise "
+        f"allows up to {judged.ratio_allowed:.4g}."
+    )
+    further = () if form.further is None else (" (", Name(form.further), " would take up most)")
+    left: dict[str, tuple[str | Name, ...]] = {
+        "slow": ("so much in the slow part of the residuals",),
+        "torque": ("such a torque over angle, velocity, amplitude, phase or time",),
+        "runs": ("the parameters of the runs so far apart",),
+        "effects": ("so much for an effect that is not in the model", *further),
+    }
+    for key, words in left.items():
+        chance_of = _rare(form.chances[key])
+        yield ("Noise alone would leave ", *words, f" with a probability {chance_of}.")
+    yield (
+        f"Something is left where the least of these, times how many they are, is below {CHANCE:g}."
+    )
 
 
 def _rare(probability: float) -> str:
