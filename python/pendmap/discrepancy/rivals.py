@@ -119,7 +119,7 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
     """
     level = search.level()
     try:
-        rest = search.less(best.trial, candidate)
+        rest = search.rests.less(best.trial, candidate)
     except InputError:
         return Standing(candidate, math.inf, ())  # without it there is no motion to speak of
     gain = (rest.chi2 - best.trial.chi2) / level
@@ -142,7 +142,7 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
                 rival = search.settled(found).trial
                 if not rival.fit.converged and scores.likeness(own, k) > CONTAINS:
                     # What does the same begins at the same motion.
-                    other = search.instead(best.trial, candidate, score)
+                    other = search.rests.instead(best.trial, candidate, score)
                     rival = min((t for t in (rival, other) if t), key=lambda t: t.chi2)
                 reached, refitted = (rest.chi2 - rival.chi2) / level, True
         likeness = scores.likeness(own, k)

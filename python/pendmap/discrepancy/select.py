@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.baseline import taken_by
-from pendmap.discrepancy.candidates import Candidate, candidates, placed
-from pendmap.discrepancy.refit import KICK, WORTH, Found, Key, Refits, key_of
-from pendmap.discrepancy.scores import Score, Scores, scores_of
-from pendmap.discrepancy.trial import CLEAN, LITTLE, Trial, fitted, tried, with_candidates
+from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
+from pendmap.discrepancy.rests import Rests
+from pendmap.discrepancy.scores import Scores, scores_of
+from pendmap.discrepancy.trial import CLEAN, Trial, fitted, tried
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
-    from pendmap.model import Formula, Rig
+    from pendmap.model import Formula
 
 __all__ = ["GATE", "Attempt", "Search"]
 
@@ -62,9 +63,6 @@ ALIKE: Final = 1.5
 
 BEGUN: Final = 2
 """So often a search begins again from a better baseline."""
-
-LESS_STEPS: Final = 16
-"""Steps of a fit without one of the effects: beyond them a model that is wrong only creeps."""
 
 ZERO: Final = "encoder_offset"
 """Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
@@ -142,7 +140,7 @@ class Search:
         # What was computed once is not again: rivals are often candidates that were tried.
         self._scores: dict[Key, Scores] = {}
         self._refits = Refits(evidence)
-        self._rests: dict[Key, Trial] = {key_of(base.chosen): base}
+        self.rests = Rests(evidence, base, self._refits)
 
     def _begin_again(self, base: Trial) -> None:
         """Forget everything but a better baseline."""
@@ -150,7 +148,7 @@ class Search:
         self.base = Found(base, tried(self.evidence, base))
         self.attempts, self.first = [], None
         self._scores, self._refits = {}, Refits(self.evidence)
-        self._rests = {key_of(base.chosen): base}
+        self.rests = Rests(self.evidence, base, self._refits)
 
     def run(self) -> Found:
         """Return the best model."""
@@ -167,7 +165,7 @@ class Search:
                     continue
             path.append(self.settled(following))
             best = path[-1].trial
-            self._rests[key_of(best.chosen)] = best
+            self.rests.keep(best)
             self.progress(len(best.chosen))
         # What was worse on what was held back, for want of another effect, must be better with it.
         while len(path) > 1 and not self._holds(self.base, path[-1]):
@@ -205,7 +203,7 @@ class Search:
         try:
             for candidate in found.chosen:
                 chosen = tuple(c for c in rest.chosen if c.name != candidate.name)
-                rest = self._less(rest, candidate, chosen)
+                rest = self.rests.fit_without(rest, candidate, chosen)
         except InputError:
             return None
         return rest if rest.chi2 < self.base.trial.chi2 - GATE * self.level() else None
@@ -332,87 +330,12 @@ class Search:
             )
         )
 
-    def less(self, trial: Trial, dropped: Candidate) -> Trial:
-        """Fit a trial's model without one of the effects that were added."""
-        chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
-        key = key_of(chosen)
-        if key not in self._rests:
-            self._rests[key] = self._rest(trial, dropped, chosen)
-        return self._rests[key]
-
-    def _rest(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
-        """Return the best fit of the effects that stay: from with the other one, or without it.
-
-        Where much is missing a fit that begins at a good model's windows may be lost.
-        """
-        known = self._refits.known(self.base.trial, chosen)
-        if known is not None and known.fit.converged:
-            return known
-        rest = self._less(trial, dropped, chosen)
-        if known is not None:
-            rest = min((rest, known), key=lambda t: t.chi2)
-        elif not rest.fit.converged:
-            rest = self._refits.unslipped(rest)
-        if rest.chi2 <= self.base.trial.chi2:
-            return rest
-        # It can do all that the baseline does: it was lost, and begins again from there.
-        return min((rest, self._from_base(trial, chosen)), key=lambda t: t.chi2)
-
-    def _from_base(self, trial: Trial, chosen: tuple[Candidate, ...]) -> Trial:
-        """Fit some of a trial's effects from the baseline, where they are nearly nothing."""
-        base = self.base.trial
-        sizes = {candidate.free[0] for candidate in chosen}
-        own = [name for c in chosen for name in (*c.free, *c.adapted)]
-        start = {n: trial.start[n] * (KICK if n in sizes else 1.0) for n in own}
-        try:
-            return with_candidates(self.evidence, base, chosen, start)
-        except InputError:
-            return base
-
-    def _less(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
-        model, free, start = _without(trial, dropped)
-        try:
-            return fitted(
-                self.evidence,
-                model,
-                free,
-                chosen,
-                start=start,
-                windows=trial.fit.windows,
-                steps=LESS_STEPS,
-                least_gain=LITTLE,
-            )
-        except InputError:
-            # Without it the motion is lost from here: from short windows on, as the baseline began.
-            begin = start | {n: v for n, v in self.base.trial.start.items() if n in free}
-            return fitted(self.evidence, model, free, chosen, start=begin)
-
-    def instead(self, trial: Trial, dropped: Candidate, score: Score) -> Trial | None:
-        """Fit a trial's model with another effect in an effect's place, that does nearly the same.
-
-        It begins at the trial's own motion.
-        """
-        model, free, start = _without(trial, dropped)
-        other = score.candidate
-        chosen = (*(c for c in trial.chosen if c.name != dropped.name), other)
-        try:
-            return fitted(
-                self.evidence,
-                placed(model, [other]),
-                [*free, *other.free, *other.adapted],
-                chosen,
-                start=start | score.start,
-                windows=trial.fit.windows,
-            )
-        except InputError:
-            return None
-
     def _without_idle(self, best: Found) -> Found:
         """Drop effects that a later one made idle, and exchange those that another one beats."""
         level = self.level()
         for candidate in best.trial.chosen:
             try:
-                rest = self.less(best.trial, candidate)
+                rest = self.rests.less(best.trial, candidate)
             except InputError:
                 continue  # without it there is no motion to speak of: it is not idle
             if not self._gains(rest, best.trial):
@@ -438,14 +361,3 @@ class Search:
                     self._note(Found(rest, best.held), other, scores, [k], good=True)
                     return self._without_idle(other)
         return best
-
-
-def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:
-    """Return a trial's model without an effect, what is free of it, and where it stands."""
-    gone = {*dropped.free, *dropped.adapted}
-    model = trial.fit.model
-    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
-    effects = tuple(e for e in model.effects if e.name != dropped.name)
-    model = dataclasses.replace(model, effects=effects, **own)
-    free = [name for name in trial.free if name not in gone]
-    return model, free, {name: value for name, value in trial.start.items() if name not in gone}

@@ -1,0 +1,132 @@
+"""What stays of a model without one of its effects, or with another one in its place."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap.discrepancy.candidates import Candidate, placed
+from pendmap.discrepancy.refit import KICK, Key, Refits, key_of
+from pendmap.discrepancy.trial import LITTLE, Trial, fitted, with_candidates
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.scores import Score
+    from pendmap.model import Rig
+
+__all__ = ["Rests"]
+
+LESS_STEPS: Final = 16
+"""Steps of a fit without one of the effects: beyond them a model that is wrong only creeps."""
+
+
+class Rests:
+    """Fits without one of the effects that were added; what was computed once is not again.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    base : Trial
+        The model that the search began with.
+    refits : Refits
+        The fits of candidates that were made.
+    """
+
+    def __init__(self, evidence: Evidence, base: Trial, refits: Refits) -> None:
+        self.base = base
+        self._evidence = evidence
+        self._refits = refits
+        self._known: dict[Key, Trial] = {}
+        self.keep(base)
+
+    def keep(self, trial: Trial) -> None:
+        """Remember a fit: a larger model's rest may be the same."""
+        self._known[key_of(trial.chosen)] = trial
+
+    def less(self, trial: Trial, dropped: Candidate) -> Trial:
+        """Fit a trial's model without one of the effects that were added."""
+        chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+        key = key_of(chosen)
+        if key not in self._known:
+            self._known[key] = self._rest(trial, dropped, chosen)
+        return self._known[key]
+
+    def _rest(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
+        """Return the best fit of the effects that stay: from with the other one, or without it.
+
+        Where much is missing a fit that begins at a good model's windows may be lost.
+        """
+        known = self._refits.known(self.base, chosen)
+        if known is not None and known.fit.converged:
+            return known
+        rest = self.fit_without(trial, dropped, chosen)
+        if known is not None:
+            rest = min((rest, known), key=lambda t: t.chi2)
+        elif not rest.fit.converged:
+            rest = self._refits.unslipped(rest)
+        if rest.chi2 <= self.base.chi2:
+            return rest
+        # It can do all that the baseline does: it was lost, and begins again from there.
+        return min((rest, self._from_base(trial, chosen)), key=lambda t: t.chi2)
+
+    def _from_base(self, trial: Trial, chosen: tuple[Candidate, ...]) -> Trial:
+        """Fit some of a trial's effects from the baseline, where they are nearly nothing."""
+        sizes = {candidate.free[0] for candidate in chosen}
+        own = [name for c in chosen for name in (*c.free, *c.adapted)]
+        start = {n: trial.start[n] * (KICK if n in sizes else 1.0) for n in own}
+        try:
+            return with_candidates(self._evidence, self.base, chosen, start)
+        except InputError:
+            return self.base
+
+    def fit_without(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
+        """Fit a trial's model without an effect, with those that stay, from its own motion."""
+        model, free, start = _without(trial, dropped)
+        try:
+            return fitted(
+                self._evidence,
+                model,
+                free,
+                chosen,
+                start=start,
+                windows=trial.fit.windows,
+                steps=LESS_STEPS,
+                least_gain=LITTLE,
+            )
+        except InputError:
+            # Without it the motion is lost from here: from short windows on, as the baseline began.
+            begin = start | {n: v for n, v in self.base.start.items() if n in free}
+            return fitted(self._evidence, model, free, chosen, start=begin)
+
+    def instead(self, trial: Trial, dropped: Candidate, score: Score) -> Trial | None:
+        """Fit a trial's model with another effect in an effect's place, that does nearly the same.
+
+        It begins at the trial's own motion.
+        """
+        model, free, start = _without(trial, dropped)
+        other = score.candidate
+        chosen = (*(c for c in trial.chosen if c.name != dropped.name), other)
+        try:
+            return fitted(
+                self._evidence,
+                placed(model, [other]),
+                [*free, *other.free, *other.adapted],
+                chosen,
+                start=start | score.start,
+                windows=trial.fit.windows,
+            )
+        except InputError:
+            return None
+
+
+def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:
+    """Return a trial's model without an effect, what is free of it, and where it stands."""
+    gone = {*dropped.free, *dropped.adapted}
+    model = trial.fit.model
+    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
+    effects = tuple(e for e in model.effects if e.name != dropped.name)
+    model = dataclasses.replace(model, effects=effects, **own)
+    free = [name for name in trial.free if name not in gone]
+    return model, free, {name: value for name, value in trial.start.items() if name not in gone}
