@@ -23,6 +23,9 @@ COUNTS = (1024, 2048, 4096, 8192)
 BASE = ("viscous_damping", "coulomb_friction")
 """What the baseline has: not hidden."""
 
+AGEING = {name for name, e in library().items() if "time in the laboratory" in e["formula"]}
+"""What changes from run to run."""
+
 SPOILT = {"correlation": 0.5, "dropouts": 0.02, "outliers": 0.003, "jitter": 0.0005}
 """What records are spoilt with, one thing in each experiment that is."""
 
@@ -55,7 +58,7 @@ def draw(what: str, rng: np.random.Generator) -> Case:
     known = {e["name"]: e for e in virtual_rig.describe()}
     usable = [n for n in library() if n in known and n not in BASE]
     if kind == "single":
-        usable = [n for n in usable if "drift" not in n]
+        usable = [n for n in usable if n not in AGEING]
     if kind != "mixed":
         usable = [n for n in usable if library()[n]["group"] != "drive" and not known[n]["needs"]]
     effects: tuple[str, ...] = ("none",)

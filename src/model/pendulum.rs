@@ -188,10 +188,15 @@ impl Pendulum {
     #[must_use]
     pub fn greatest_pull(&self) -> f64 {
         let motion = self.motion();
-        let carried =
-            |e: &Effect| if e.is(&[Action::Driven]) { e.parameters[0].abs() } else { 0.0 };
-        let further: f64 = self.effects.iter().map(carried).sum();
-        1.0 + (1.0 + further) * (motion.p.abs() + motion.second.abs()) + motion.lateral.abs()
+        let (mut own, mut further) = (1.0, 1.0);
+        for effect in self.effects.iter().filter(|e| e.is(&[Action::Driven])) {
+            // What drifts acts on gravity as on the drive.
+            let drifts = effect.kind.definition().mappable == Mappable::Frozen;
+            let share = effect.parameters[0].abs() * if drifts { self.lab_time.abs() } else { 1.0 };
+            further += share;
+            own += if drifts { share } else { 0.0 };
+        }
+        own + further * (motion.p.abs() + motion.second.abs()) + motion.lateral.abs()
     }
 
     /// The unit of "periods": `2 pi / omega`, or `2 pi` without drive.

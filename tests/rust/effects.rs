@@ -130,11 +130,16 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
         ("asymmetric_viscous", [b]) => own = -b * speed,
         ("coulomb_drift", [r]) => own = -r * lab * sign,
         ("viscous_drift", [r]) => own = -r * lab * velocity,
+        ("coulomb_warm_up", [f, tau]) => own = -f * (-lab / tau).exp_m1() * sign,
+        ("viscous_warm_up", [b, tau]) => own = -b * (-lab / tau).exp_m1() * velocity,
         ("bias_torque", [torque]) => own = *torque,
         ("bearing_harmonic", [a, n, psi]) => own = a * (n * theta + psi).sin(),
         ("magnet", [a, w]) => {
             let x = theta - 2.0 * PI * (theta / (2.0 * PI)).round();
             own = -a * (x / w) * (-x * x / (2.0 * w * w)).exp();
+        }
+        ("natural_frequency_drift", [r]) => {
+            own = -r * lab * w0 * w0 * (1.0 + up) * theta.sin();
         }
         ("elastic_restoring", [k]) => own = -k * theta,
         ("drive_amplitude", [e]) => up = drive(p * (1.0 + e), omega, phase),

@@ -111,7 +111,10 @@ fn a_friction_that_turns_negative_holds_nothing() {
 
 #[test]
 fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
-    let effect = |kind, r| Effect::new(kind, &[r]).expect("in range");
+    let effect = |kind: Kind, r| {
+        let shape = [r, 9.0];
+        Effect::new(kind, &shape[..kind.definition().parameters.len()]).expect("in range")
+    };
     let plain = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
     let rougher = driven(0.1, 0.6, 2.0).with_friction(0.15).expect("in range");
     let drifting = has(plain, effect(Kind::CoulombDrift, 4e-4));
@@ -120,9 +123,15 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
     for (a, b) in a.iter().zip(&b) {
         assert!(distance(*a, *b) < 1e-10, "{a:?} {b:?}");
     }
-    for kind in [Kind::CoulombDrift, Kind::ViscousDrift] {
+    for (kind, size) in [
+        (Kind::CoulombDrift, 3e-4),
+        (Kind::ViscousDrift, 3e-4),
+        (Kind::NaturalFrequencyDrift, 3e-4),
+        (Kind::CoulombWarmUp, -3e-3),
+        (Kind::ViscousWarmUp, -3e-3),
+    ] {
         // Two stretches, one after the other, are one.
-        let early = has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind, 3e-4));
+        let early = has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind, size));
         let mut late = early.clone();
         late.lab_time += 5.0;
         let end = |pendulum: &Pendulum, from: State, until: f64| {

@@ -17,10 +17,13 @@ pub fn term(kind: Kind) -> Option<&'static str> {
         "asymmetric_viscous" => "-b*abs(v)",
         "coulomb_drift" => "-r*t*sign(v)",
         "viscous_drift" => "-r*t*v",
+        "coulomb_warm_up" => "f*(1 - exp(-t/tau))*sign(v)",
+        "viscous_warm_up" => "b*(1 - exp(-t/tau))*v",
         "bias_torque" => "torque",
         "bearing_harmonic" => "amplitude*sin(n*theta + psi)",
         "magnet" => "-amplitude*(wrap(theta)/width)*exp(-wrap(theta)^2/(2*width^2))",
         "elastic_restoring" => "-k*theta",
+        "natural_frequency_drift" => "-r*t*w0^2*(1 + a)*sin(theta)",
         "lateral_drive" => "-w0^2*amplitude*cos(phase + psi)*cos(theta)",
         _ => return None,
     })

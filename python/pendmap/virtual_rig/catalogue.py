@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
+from pendmap.virtual_rig.ageing import AGEING
 from pendmap.virtual_rig.damping import DAMPING
 from pendmap.virtual_rig.readings import READINGS
 from pendmap.virtual_rig.stands import STANDS
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["ANY", "EFFECTS", "NONE", "describe", "draw", "draws_size"]
 
 EFFECTS: Final[dict[str, type[Effect]]] = {
-    effect.full_name(): effect for effect in (*DAMPING, *TORQUES, *STANDS, *READINGS)
+    effect.full_name(): effect for effect in (*DAMPING, *AGEING, *TORQUES, *STANDS, *READINGS)
 }
 """Every effect, by name and variant."""
 

@@ -172,72 +172,6 @@ class LoadDependentFriction(Effect):
 
 
 @dataclass(frozen=True)
-class CoulombDrift(Effect):
-    """Wear: dry friction grows with lab time."""
-
-    name = "coulomb_drift"
-    group = "friction"
-    formula = "-r t sign v, t lab time"
-
-    r: float = size(2.5e-05, 0.0001, "rad/s^3")
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.r * motion.lab
-
-
-@dataclass(frozen=True)
-class WarmingCoulomb(Effect):
-    """A bearing that warms up: dry friction falls to a new level."""
-
-    name = "coulomb_drift"
-    variant = "warm_up"
-    group = "friction"
-    formula = "+f (1 - exp(-t/tau)) sign v, t lab time"
-
-    f: float = size(0.01, 0.04, "rad/s^2")
-    tau: float = shape(60.0, 240.0, "s", least=1e-3)
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.f * np.expm1(-motion.lab / self.tau)
-
-    def least_friction(self) -> float:
-        return -self.f
-
-
-@dataclass(frozen=True)
-class ViscousDrift(Effect):
-    """Grease that thickens: viscous damping grows with lab time."""
-
-    name = "viscous_drift"
-    group = "damping"
-    formula = "-r t v, t lab time"
-
-    r: float = size(5e-06, 2e-05, "1/s^2")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.r * motion.lab * motion.velocity
-
-
-@dataclass(frozen=True)
-class WarmingViscous(Effect):
-    """Grease that warms up: viscous damping falls to a new level."""
-
-    name = "viscous_drift"
-    variant = "warm_up"
-    group = "damping"
-    formula = "+b (1 - exp(-t/tau)) v, t lab time"
-
-    b: float = size(0.0012, 0.005, "1/s")
-    tau: float = shape(60.0, 240.0, "s", least=1e-3)
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.b * np.expm1(-motion.lab / self.tau) * motion.velocity
-
-    def least_damping(self) -> float:
-        return -self.b
-
-
-@dataclass(frozen=True)
 class DahlFriction(Effect):
     """Friction of a contact that yields before it slips.
 
@@ -287,10 +221,6 @@ DAMPING: tuple[type[Effect], ...] = (
     LoadDependentFriction,
     AsymmetricViscous,
     AsymmetricCoulomb,
-    CoulombDrift,
-    WarmingCoulomb,
-    ViscousDrift,
-    WarmingViscous,
     DahlFriction,
     RoughSpot,
 )

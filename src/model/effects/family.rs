@@ -44,17 +44,20 @@ impl Kind {
             | Self::CubicDamping
             | Self::PowerLawDrag
             | Self::AsymmetricViscous
-            | Self::ViscousDrift => Family::Damping,
+            | Self::ViscousDrift
+            | Self::ViscousWarmUp => Family::Damping,
             Self::CoulombFriction
             | Self::StribeckFriction
             | Self::LoadDependentFriction
             | Self::AsymmetricCoulomb
             | Self::CoulombDrift
+            | Self::CoulombWarmUp
             | Self::RoughSpot => Family::DryFriction,
             Self::BiasTorque
             | Self::BearingHarmonic
             | Self::Magnet
             | Self::ElasticRestoring
+            | Self::NaturalFrequencyDrift
             | Self::InertiaRipple
             | Self::RigTilt => Family::PositionTorque,
             Self::AddedMass

@@ -1,0 +1,33 @@
+//! A natural frequency that changes as the rod's length does with the temperature, or a mass creeps.
+
+use super::law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+};
+use crate::lanes::Real;
+
+pub struct NaturalFrequencyDrift;
+
+impl Law for NaturalFrequencyDrift {
+    const DEFINITION: Definition = Definition {
+        name: "natural_frequency_drift",
+        group: Group::Torque,
+        action: Action::Driven,
+        formula: "-r t (1 + a) sin(theta), in SI times w0^2, t time in the laboratory, \
+                  a the pivot's acceleration over gravity",
+        parameters: &[Parameter {
+            name: "r",
+            unit: "1/s",
+            power: Power::Of(1),
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            typical: [1e-9, 1e-5],
+            meaning: "rate of change of w0^2, over w0^2",
+        }],
+        revealed_by: "the same run again, hours later",
+        mappable: Mappable::Frozen,
+    };
+
+    #[inline(always)]
+    fn torque<R: Real>([r, ..]: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        -(*r * at.lab * at.vertical * at.sine)
+    }
+}
