@@ -22,6 +22,10 @@ __all__ = ["Rival", "Standing", "standing_of"]
 ALIKE: Final = 10.0
 """Twice the difference of log-likelihoods below which two effects are not told apart."""
 
+CHANCE: Final = 1e-3
+"""Chance of what is left below which the model is wrong by so much at least: a form that is wrong
+moves the effects' gains against each other by as much."""
+
 NEAR: Final = (30.0, 0.3)
 """A rival is refitted if its score falls short of the winner's gain by less than the first, or than
 this part of it."""
@@ -59,6 +63,8 @@ class Rival:
         Whether the gain is that of a fit; else it is the score's.
     contains : bool
         Whether it has the effect found as a special case.
+    margin : float
+        By how much it may be behind and not be told apart.
     """
 
     candidate: Candidate
@@ -68,11 +74,12 @@ class Rival:
     likeness: float
     refitted: bool
     contains: bool
+    margin: float
 
     @property
     def alike(self) -> bool:
         """Whether the records do not tell it from the effect that was found."""
-        return self.behind < ALIKE and not self.contains
+        return self.behind < self.margin and not self.contains
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,8 +107,15 @@ class Standing:
 
     @property
     def share(self) -> float:
-        """The share of its likelihood among all names, with equal odds for each beforehand."""
-        weights = [math.exp(-0.5 * max(r.behind, 0.0)) for r in self.rivals if not r.contains]
+        """The share of its likelihood among all names, with equal odds for each beforehand.
+
+        Where the model is wrong by more than noise, likelihoods count as so much less.
+        """
+        weights = [
+            math.exp(-0.5 * max(r.behind, 0.0) * ALIKE / r.margin)
+            for r in self.rivals
+            if not r.contains
+        ]
         return 1.0 / (1.0 + sum(weights))
 
 
@@ -129,7 +143,9 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
     if own is None:
         return Standing(candidate, gain, ())
     others = [k for k in places if k != own and scores.scores[k].gain > 0]
-    reach = max(NEAR[0], NEAR[1] * gain)
+    remainder = best.trial.remainder
+    margin = max(ALIKE, remainder.excess) if remainder.chance < CHANCE else ALIKE
+    reach = max(NEAR[0], NEAR[1] * gain, margin)
     rivals = []
     for rank, k in enumerate(others):
         score = scores.scores[k]
@@ -159,6 +175,7 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
                 likeness,
                 refitted,
                 contains=more and likeness > CONTAINS and reached - gain < BETTER,
+                margin=margin,
             )
         )
     rivals.sort(key=lambda r: r.behind)
