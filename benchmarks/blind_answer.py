@@ -35,18 +35,27 @@ FAMILIES = {
 
 
 def family(effect: str) -> str:
-    """Return the family of an effect, with or without a variant."""
+    """Return the family of an effect."""
+    return str(library()[effect]["family"])
+
+
+def families(effect: str) -> set[str]:
+    """Return the families that what the rig hides may be called, with or without a variant.
+
+    A variant may belong to another one than the library's effect of its name: a constant added mass
+    shows against the drive only, one that is put on between two runs as another frequency too.
+    """
     name = effect.partition(":")[0]
-    if name in library():
-        return str(library()[name]["family"])
-    groups = {e["name"].split(":")[0]: e["group"] for e in virtual_rig.describe()}
-    return FAMILIES[groups[name]]
+    groups = {e["name"]: e["group"] for e in virtual_rig.describe()}
+    own = {FAMILIES[groups[effect]]} if name not in library() or name != effect else set()
+    return own | ({family(name)} if name in library() else set())
 
 
 def run(case: Case) -> dict[str, Any]:
     """Make, diagnose and judge one case."""
     result: dict[str, Any] = dataclasses.asdict(case)
-    result["families"] = [family(effect) for effect in case.effects if effect != "none"]
+    hidden = [effect for effect in case.effects if effect != "none"]
+    result["families"] = sorted({f for effect in hidden for f in families(effect)})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         # How hard it is does not count what spoils the records.

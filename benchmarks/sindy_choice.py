@@ -11,7 +11,7 @@ import numpy as np
 import pysindy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -28,19 +28,27 @@ ALIKE = 0.9999
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """Effects that were chosen, each with those whose features are the same, and the gain."""
+    """Effects that were chosen, each with those whose features are the same."""
 
     names: list[str]
     classes: list[list[str]]
-    score: float
 
 
-def choose(data: Regression, setting: Setting) -> Model:
-    """Return the sparse model with the least BIC of an optimizer's whole path."""
+def choose(data: Regression, setting: Setting, penalties: Sequence[float]) -> list[Model]:
+    """Return the sparse model with the least BIC of an optimizer's whole path, by penalty."""
     found = models(data, setting.optimizer, best=setting.best)
-    scores = [gain - setting.penalty * count for _, gain, count in found]
-    k = int(np.argmax(scores))
-    support = found[k][0]
+    known: dict[int, Model] = {}
+    chosen = []
+    for penalty in penalties:
+        scores = [gain - penalty * count for _, gain, count in found]
+        k = int(np.argmax(scores))
+        if k not in known:
+            known[k] = _model(data, found[k][0])
+        chosen.append(known[k])
+    return chosen
+
+
+def _model(data: Regression, support: tuple[int, ...]) -> Model:
     names: list[str] = []
     classes: list[list[str]] = []
     for name in dict.fromkeys(data.features[i].effect for i in support):
@@ -48,7 +56,7 @@ def choose(data: Regression, setting: Setting) -> Model:
             continue  # the same feature once more, for what is not linear in it
         names.append(name)
         classes.append(_same(data, [i for i in support if data.features[i].effect == name]))
-    return Model(names, classes, scores[k])
+    return Model(names, classes)
 
 
 def models(
