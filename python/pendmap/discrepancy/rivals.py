@@ -26,6 +26,9 @@ CHANCE: Final = 1e-3
 """Chance of what is left below which the model is wrong by so much at least: a form that is wrong
 moves the effects' gains against each other by as much."""
 
+NEARBY: Final = 0.1
+"""But no rival counts as equal that falls short of the winner's gain by more than this part."""
+
 NEAR: Final = (30.0, 0.3)
 """A rival is refitted if its score falls short of the winner's gain by less than the first, or than
 this part of it."""
@@ -144,7 +147,9 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
         return Standing(candidate, gain, ())
     others = [k for k in places if k != own and scores.scores[k].gain > 0]
     remainder = best.trial.remainder
-    margin = max(ALIKE, remainder.excess) if remainder.chance < CHANCE else ALIKE
+    margin = ALIKE
+    if remainder.chance < CHANCE:
+        margin = max(ALIKE, min(remainder.excess, NEARBY * gain))
     reach = max(NEAR[0], NEAR[1] * gain, margin)
     rivals = []
     for rank, k in enumerate(others):

@@ -38,7 +38,10 @@ shows in no torque, no residual and no run."""
 
 DOUBTFUL: Final = 0.5
 """Probability below which names that explain all are more likely wrong than right: none is
-claimed."""
+claimed, unless what is in doubt is little beside one of them."""
+
+LITTLE: Final = 0.1
+"""Part of the greatest effect's gain that all others together are, if the doubt is about those."""
 
 SURE: Final = 0.9
 """Probability that names are right below which they are given with reserve."""
@@ -144,10 +147,10 @@ def judge(
     faint = sum(standing.gain for standing in standings) < FAINT and form.unnamed >= CHANCE
     if not trial.chosen:
         verdict = "unknown" if rest else "none"
-    elif rest and not faint:
-        verdict = "partial" if closed >= CLOSED and spread <= SPREAD else "unknown"
-    elif sure < DOUBTFUL and not faint:
-        verdict = "unknown"
+    elif not faint and (rest or sure < DOUBTFUL):
+        gains = sorted(standing.gain for standing in standings)
+        clear = rest or (len(gains) > 1 and sum(gains[:-1]) < LITTLE * gains[-1])
+        verdict = "partial" if clear and closed >= CLOSED and spread <= SPREAD else "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
     else:
