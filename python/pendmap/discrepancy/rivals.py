@@ -41,8 +41,8 @@ CONTAINS: Final = 0.99
 special case: it is no other explanation."""
 
 
-BETTER: Final = 2.7
-"""Unless its shape gains more than this (90 % point of chi-squared): then it may be the truth."""
+BETTER: Final = 3.84
+"""Unless its shape gains more than this (95 % point of chi-squared): then it may be the truth."""
 
 
 @dataclasses.dataclass(frozen=True)
