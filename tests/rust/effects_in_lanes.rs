@@ -112,7 +112,7 @@ fn a_friction_that_turns_negative_holds_nothing() {
 #[test]
 fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
     let effect = |kind: Kind, r| {
-        let shape = [r, 9.0];
+        let shape = [r, 200.0];
         Effect::new(kind, &shape[..kind.definition().parameters.len()]).expect("in range")
     };
     let plain = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
@@ -127,8 +127,8 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
         (Kind::CoulombDrift, 3e-4),
         (Kind::ViscousDrift, 3e-4),
         (Kind::NaturalFrequencyDrift, 3e-4),
-        (Kind::CoulombWarmUp, -3e-3),
-        (Kind::ViscousWarmUp, -3e-3),
+        (Kind::CoulombWarmUp, -5e-2),
+        (Kind::ViscousWarmUp, -5e-2),
     ] {
         // Two stretches, one after the other, are one.
         let early = has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind, size));
