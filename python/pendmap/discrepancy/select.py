@@ -312,7 +312,7 @@ class Search:
         self.attempts.append(
             Attempt(
                 tuple(candidate.name for candidate in added),
-                dict(found.trial.chosen[-len(added)].shape),
+                found.trial.shape_of(found.trial.chosen[-len(added)]),
                 scores.together(places) / level,
                 current.trial.bic(level) - found.trial.bic(level),
                 (current.held.chi2 - found.held.chi2) / level,
