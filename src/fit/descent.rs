@@ -53,20 +53,6 @@ impl Point {
         let normal = Normal::at(problem, &values, &windows)?;
         Some(Self { values, windows, normal })
     }
-
-    /// The point a whole step on from one above `least`, if that is below it and should be.
-    ///
-    /// A valley of the sum of squares that is narrow and bends, as that of a power and the factor
-    /// before it, is left by a step along it, and the next one leads back to its floor, far ahead
-    /// (the watchdog of Chamberlain, Powell, Lemarechal & Pedersen 1982, Mathematical Programming
-    /// Studies 16, 1). With steps that must all go down the search would creep along.
-    fn rounded(&self, problem: &Problem, held: &[usize], least: f64) -> Option<Self> {
-        let step = self.normal.step(0.0, held);
-        if self.normal.chi2 - step.gain >= least {
-            return None;
-        }
-        self.moved(problem, &step).filter(|next| next.normal.chi2 < least)
-    }
 }
 
 /// How far to go.
@@ -128,13 +114,7 @@ pub fn descend(
                         if damping > FIRST_DAMPING { damping / (GROWTH * GROWTH) } else { 0.0 };
                 }
             }
-            over => {
-                let rounded = over.filter(|_| damping == 0.0 && steps < limit.steps);
-                if let Some(next) = rounded.and_then(|over| over.rounded(problem, held, chi2)) {
-                    steps += 1;
-                    *point = next;
-                    continue;
-                }
+            _ => {
                 damping = (damping * GROWTH).max(FIRST_DAMPING);
                 // At a kink, as where a half swing more or less is made before the last stop, the
                 // sum of squares has a least value without being flat.
