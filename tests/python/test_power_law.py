@@ -146,7 +146,8 @@ def test_errors_are_as_great_as_they_are_said_to_be(tmp_path: Path) -> None:
     for seed in range(1, 13):
         truth, trials = hidden(tmp_path, seed)
         one, other = (trial.fit for trial in trials)
-        assert abs(one[N] - other[N]) < 0.1 * one.estimates[N].stderr
+        # Fits of candidates end 0.05 above the least sum of squares at most.
+        assert abs(one[N] - other[N]) < 2 * math.sqrt(0.05) * one.estimates[N].stderr
         size, power = one.estimates[Q], one.estimates[N]
         # That of the size is one of its logarithm.
         scaled.append(

@@ -31,7 +31,10 @@ STAGES: Final = 8
 """Exponents that are tried at most."""
 
 REACH: Final = 0.2
-"""The longest step of an exponent: half of what it is from one of the scan to the next."""
+"""The longest step of an exponent: less than from one of the scan to the next."""
+
+FARTHEST: Final = 3.0
+"""The most that the logarithm of a size changes at once."""
 
 SHORTER: Final = 0.25
 """Of the reach, after an exponent at which the fit was worse."""
@@ -75,12 +78,13 @@ def nearer(
     reach = REACH
     for _ in range(STAGES):
         step, gain, follow = _step(fit, runs, exponent)
-        if gain < PROMISED or reach < SHORTEST:
+        if gain < PROMISED or reach < SHORTEST or fit[size] == 0:
             break
         step = math.copysign(min(abs(step), reach), step)
         start = {name: e.value - step * follow[name] for name, e in fit.estimates.items()}
-        # A size goes with its exponent as a power does.
-        start[size] = fit[size] * math.exp(-step * follow[size] / fit[size])
+        # A size goes with its exponent as a power does; what is nearly 0 has no derivative by it.
+        power = max(-FARTHEST, min(-step * follow[size] / fit[size], FARTHEST))
+        start[size] = fit[size] * math.exp(power)
         try:
             found = again(_with(fit.model, exponent, step), start, fit)
         except InputError:
