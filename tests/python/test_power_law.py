@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
+from hidden import diagnosed
 from pendmap import virtual_rig
 from pendmap.discrepancy.baseline import baseline
 from pendmap.discrepancy.candidates import candidates
 from pendmap.discrepancy.evidence import evidence_of
+from pendmap.discrepancy.named import diagnosed_model
 from pendmap.discrepancy.trial import with_candidates
 from pendmap.identification.fitting import FitRun, fit_runs, score
 from pendmap.identification.sensitivity import sensitivities, window_slopes
-from pendmap.model import Formula, Rig
+from pendmap.model import Formula, Rig, load_model, save_model
 from pendmap.model.effects import Effect
 from pendmap.records import read_experiment
 
@@ -159,3 +161,22 @@ def test_errors_are_as_great_as_they_are_said_to_be(tmp_path: Path) -> None:
     assert np.abs(scaled).max() < 3
     rms = np.sqrt(np.mean(np.square(scaled), axis=0))
     assert ((rms > 0.7) & (rms < 1.4)).all()
+
+
+def test_a_diagnosis_says_how_well_the_power_is_known(tmp_path: Path) -> None:
+    found, truth = diagnosed(
+        tmp_path, "power_law_drag", size=4.0, free=3, forced=0, noise=0.05, rate=50.0
+    )
+    (drag,) = (effect for effect in found.effects if effect.name == "power_law_drag")
+    for name, (low, high) in drag.ci95.items():
+        wide = high - low
+        assert low - wide / 2 < truth["power_law_drag"][name] < high + wide / 2
+    assert set(drag.ci95) == {"q", "n"}
+    assert {Q, N} <= set(found.runs.coefficients)
+    path = save_model(diagnosed_model(found), tmp_path / "model.toml")
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    names, matrix = content["covariance"]["names"], np.array(content["covariance"]["matrix"])
+    size, power = matrix[names.index(Q)], matrix[names.index(N)]
+    assert size[names.index(N)] ** 2 > 0.8**2 * size[names.index(Q)] * power[names.index(N)]
+    (again,) = (effect for effect in load_model(path).effects if effect.name == drag.name)
+    assert again.ci95 == drag.ci95
