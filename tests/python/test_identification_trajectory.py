@@ -222,9 +222,6 @@ def test_what_does_not_fit_together_is_refused(decay: np.ndarray) -> None:
     run = FitRun(TIME, decay, 1e-3)
     with pytest.raises(InputError, match=r"free has 'quadratic_drag.q'"):
         fit_runs([run], Rig(w0=6.2), ["quadratic_drag.q"])
-    drag = Rig(w0=6.2, effects=(Effect("power_law_drag", {"q": 0.01, "n": 1.5}),))
-    with pytest.raises(InputError, match="whose unit depends on it"):
-        fit_runs([run], drag, ["power_law_drag.q", "power_law_drag.n"])
     short = identify(TIME[:40], decay[:40])
     assert not short.applicable
     assert "half swings" in short.warnings[0]

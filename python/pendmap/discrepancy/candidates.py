@@ -81,21 +81,12 @@ class Candidate:
     def adapted(self) -> list[str]:
         """What a fit calls the parameters of its shape that are adapted with its size.
 
-        Whole numbers are not, nor what the unit of the size depends on.
+        Whole numbers are not.
         """
         entries = self.definition["parameters"]
-        less = {e["power_of_w0_less"] for e in entries}
         return [
-            f"{self.name}.{e['name']}"
-            for e in entries
-            if e["name"] in self.shape and e["name"] not in less and not _whole(e)
+            f"{self.name}.{e['name']}" for e in entries if e["name"] in self.shape and not _whole(e)
         ]
-
-    @property
-    def counts_turns(self) -> bool:
-        """Whether its shape is a whole number, of periods a turn."""
-        entries = self.definition["parameters"]
-        return any(_whole(e) for e in entries if e["name"] in self.shape)
 
     @property
     def count(self) -> int:

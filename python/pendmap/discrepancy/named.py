@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.discrepancy.candidates import own_name
+from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
 
@@ -95,10 +96,11 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
     for standing in judgement.standings:
         candidate = standing.candidate
         parameters, errors = _values(best, candidate)
+        mixed = best.trial.fit.mixed
         ci95 = {
-            name: (parameters[name] - Z95 * widening * e, parameters[name] + Z95 * widening * e)
-            for name, e in errors.items()
-            if math.isfinite(e)
+            n: interval(parameters[n], half, mixed=f"{candidate.name}.{n}" in mixed)
+            for n, error in errors.items()
+            if math.isfinite(half := Z95 * widening * error)
         }
         named.append(
             NamedEffect(

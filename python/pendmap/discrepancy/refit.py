@@ -1,12 +1,9 @@
-"""Candidates fitted, from the score's step, from other shapes, and with their shapes refined."""
+"""Candidates fitted, from the score's step and from other shapes."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Final
-
-import numpy as np
 
 from pendmap.discrepancy.trial import (
     ASTRAY,
@@ -33,15 +30,6 @@ WORTH: Final = 0.4
 
 STARTS: Final = 3
 """From so many shapes a candidate is fitted whose shape is adapted."""
-
-FIRST_BEND: Final = 1.1
-"""Ratio of neighbouring shapes that are tried about the best one of the scan; then its root."""
-
-BENDS: Final = 2
-"""How often."""
-
-SLIGHT: Final = 1.0
-"""Of a sum of squares: a shape that promises less is where it should be."""
 
 KICK: Final = 1e-3
 """Part of the score's step from which a candidate is fitted. The step belongs to one of all other
@@ -103,10 +91,10 @@ class Refits:
             for k in self._other_shapes(scores, places[0]):
                 if found is not None and found.remainder.z < CLEAN:
                     break  # where nothing is left no shape gains anything
-                bent = scores.scores[k]
-                size = bent.candidate.free[0]
-                faint = bent.start | {size: KICK * bent.start[size]}
-                again = self._fit(trial, [bent.candidate], faint)
+                score = scores.scores[k]
+                size = score.candidate.free[0]
+                faint = score.start | {size: KICK * score.start[size]}
+                again = self._fit(trial, [score.candidate], faint)
                 found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
         promised = scores.together(places)
         if found is None or trial.chi2 - found.chi2 < SHORT * promised:
@@ -136,39 +124,6 @@ class Refits:
         ]
         return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: STARTS - 1]
 
-    def bent(self, trial: Trial, found: Found) -> Found:
-        """Return a fit whose last effect has its scanned shape brought to its best by parabolas."""
-        candidate = found.trial.chosen[-1]
-        scanned = [n for n in candidate.shape if f"{candidate.name}.{n}" not in candidate.adapted]
-        if not scanned or candidate.counts_turns or len(found.trial.chosen) > len(trial.chosen) + 1:
-            return found
-        name = scanned[0]
-        fits = {candidate.shape[name]: found.trial}
-
-        def fit_at(value: float) -> None:
-            nearest = fits[min(fits, key=lambda x: abs(math.log(x / value)))]
-            bent = dataclasses.replace(candidate, shape={**candidate.shape, name: value})
-            again = self._fit(trial, [bent], nearest.start)
-            if again is not None:
-                fits[value] = again
-
-        width = FIRST_BEND
-        for _ in range(BENDS):
-            best = min(fits, key=lambda x: fits[x].chi2)
-            for other in (best / width, best * width):
-                fit_at(other)
-            vertex, gain = _vertex(fits)
-            if gain > SLIGHT:
-                fit_at(vertex)
-            elif gain >= 0:
-                break
-            width = math.sqrt(width)
-        best_trial = min(fits.values(), key=_chi2)
-        try:
-            return Found(best_trial, tried(self.evidence, best_trial))
-        except InputError:
-            return found
-
     def unslipped(self, found: Trial, *, lost: bool = False) -> Trial:
         """Return a fit from short windows on, where one is lost or astray and that is better."""
         if not lost and found.chi2 <= ASTRAY * max(found.fit.degrees, 1):
@@ -190,23 +145,6 @@ class Refits:
             return with_candidates(self.evidence, trial, added, start, short=short)
         except InputError:
             return None  # the start leads out of the range of numbers
-
-
-def _vertex(fits: dict[float, Trial]) -> tuple[float, float]:
-    """Return where the parabola through the best fit and its neighbours is least.
-
-    And by how much that is less than the best; negative where there is no such place.
-    """
-    places = sorted(fits)
-    k = places.index(min(fits, key=lambda x: fits[x].chi2))
-    if not 0 < k < len(places) - 1:
-        return math.nan, -1.0
-    x = np.log(places[k - 1 : k + 2])
-    y = np.array([fits[p].chi2 for p in places[k - 1 : k + 2]])
-    a, b, _ = np.polyfit(x - x[1], y, 2)  # exact: three points
-    return (
-        (float(math.exp(x[1] - b / (2 * a))), float(b * b / (4 * a))) if a > 0 else (math.nan, -1.0)
-    )
 
 
 def key_of(chosen: Sequence[Candidate]) -> Key:

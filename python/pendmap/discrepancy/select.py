@@ -11,7 +11,7 @@ from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import CLEAN, Trial, fitted, tried
+from pendmap.discrepancy.trial import Trial, fitted, tried
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,9 +54,6 @@ model must be better than the baseline."""
 
 PAIRED: Final = 8
 """Pairs are looked for among so many candidates."""
-
-BENT: Final = 2
-"""Of how many refitted candidates."""
 
 ALIKE: Final = 1.5
 """Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
@@ -261,12 +258,6 @@ class Search:
             if found is not None:
                 refitted.append((found, places))
         refitted.sort(key=lambda pair: pair[0].trial.bic(level))
-        # A shape that was only scanned may lose to another effect for that reason.
-        for k, (found, places) in enumerate(refitted[:BENT]):
-            # Beside one that leaves nothing no shape gains anything.
-            if k == 0 or refitted[0][0].trial.remainder.z > CLEAN:
-                refitted[k] = (self._refits.bent(current.trial, found), places)
-        refitted.sort(key=lambda pair: pair[0].trial.bic(level))
         accepted = None
         for found, places in refitted:
             good = accepted is None and self.accepts(current, found)
@@ -321,7 +312,7 @@ class Search:
         self.attempts.append(
             Attempt(
                 tuple(candidate.name for candidate in added),
-                dict(found.trial.chosen[-len(added)].shape),
+                found.trial.shape_of(found.trial.chosen[-len(added)]),
                 scores.together(places) / level,
                 current.trial.bic(level) - found.trial.bic(level),
                 (current.held.chi2 - found.held.chi2) / level,

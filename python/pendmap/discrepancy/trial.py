@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.candidates import placed
 from pendmap.discrepancy.noise import Remainder, remainder_of
+from pendmap.discrepancy.valley import exponents, nearer
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 
 if TYPE_CHECKING:
@@ -113,7 +114,13 @@ class Trial:
     @property
     def start(self) -> dict[str, float]:
         """Where another fit may begin: damping may be negative there, as in no model."""
-        return {name: estimate.value for name, estimate in self.fit.estimates.items()}
+        return _values(self.fit)
+
+    def shape_of(self, candidate: Candidate) -> dict[str, float]:
+        """Return an effect's shape as it was fitted, without dimensions."""
+        model = self.fit.model
+        bare = {e.name: e.bare(model.units).parameters for e in model.effects}
+        return {name: bare[candidate.name][name] for name in candidate.shape}
 
     def bic(self, level: float) -> float:
         """The sum of squares with Schwarz's penalty for each number that was adapted.
@@ -213,7 +220,9 @@ def with_candidates(
             steps=FEW_STEPS,
             least_gain=LITTLE,
         )
-        begin, windows = sized.start, sized.fit.windows
+        near = _near_exponents(evidence, sized, added)
+        # An exponent's start is the model's; it sets the unit of its size.
+        model, begin, windows = near.model, _values(near), near.windows
     chosen = (*trial.chosen, *added)
     return fitted(
         evidence,
@@ -226,6 +235,31 @@ def with_candidates(
         least_gain=LITTLE,
         growth=GENTLE,
     )
+
+
+def _near_exponents(evidence: Evidence, sized: Trial, added: Sequence[Candidate]) -> TrajectoryFit:
+    """Return a fit with candidates' sizes, whose exponents are brought near their best."""
+
+    def again(model: Rig, start: Mapping[str, float], before: TrajectoryFit) -> TrajectoryFit:
+        return fitted(
+            evidence,
+            model,
+            sized.free,
+            start=start,
+            windows=before.windows,
+            steps=FEW_STEPS,
+            least_gain=LITTLE,
+        ).fit
+
+    fit = sized.fit
+    for candidate in added:
+        for size, exponent in exponents(candidate).items():
+            fit = nearer(fit, evidence.fitted, size, exponent, again)
+    return fit
+
+
+def _values(fit: TrajectoryFit) -> dict[str, float]:
+    return {name: estimate.value for name, estimate in fit.estimates.items()}
 
 
 def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification.free import PER_RUN, PLACES, Quantity, free_quantities
+from pendmap.identification.conversion import Conversion, interval
+from pendmap.identification.free import PER_RUN, PLACES, free_quantities
 from pendmap.identification.result import Estimate
 from pendmap.identification.runs import (
     FitRun,
@@ -42,7 +43,8 @@ class TrajectoryFit:
     ----------
     estimates : mapping of str to Estimate
         Of the free parameters, in SI; standard errors from the covariance, intervals from the
-        profile of the likelihood. A name with ``[k]`` belongs to run ``k`` alone.
+        profile of the likelihood, but for those that are ``mixed``. A name with ``[k]`` belongs to
+        run ``k`` alone.
     names : tuple of str
         The free parameters, in the order of the covariance.
     covariance : ndarray of float, shape (k, k)
@@ -76,6 +78,9 @@ class TrajectoryFit:
         Above 1 where the sum of squares is greater than chance allows, as it is where the model
         lacks something: the intervals are wider by its root, covariance and standard errors are
         not.
+    mixed : tuple of str
+        The parameters whose unit depends on an exponent that is free too: their intervals are in
+        equal ratios, by the covariance.
     """
 
     estimates: Mapping[str, Estimate]
@@ -93,6 +98,7 @@ class TrajectoryFit:
     steps: int
     converged: bool
     widening: float
+    mixed: tuple[str, ...]
 
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""
@@ -167,9 +173,10 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
     units = Units(model.w0, si=True)
-    quantities, given = prepared(runs, model, free, start or {}, units)
-    wanted = [q.name for q in quantities] if profiled is None else list(profiled)
-    chosen = [k for k, q in enumerate(quantities) if {q.name, q.name.partition("[")[0]} & {*wanted}]
+    unknown, given = prepared(runs, model, free, start or {}, units)
+    names = unknown.names
+    wanted = names if profiled is None else profiled
+    chosen = [k for k, n in enumerate(names) if {n, n.partition("[")[0]} & {*wanted}]
     swing = math.tau / model.w0
     choices = {
         "tolerance": tolerance_of(runs),
@@ -177,19 +184,17 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         "growth": growth,
         "steps": steps,
         "gain": least_gain,
-        "hold": len([q for q in quantities if q.name.partition("[")[0] in free]) if hold else 0,
-        "profiled": chosen,
+        "hold": len([n for n in names if n.partition("[")[0] in free]) if hold else 0,
+        "profiled": [k for k in chosen if k not in unknown.mixed],
         "level": LEVEL,
         "doubt": sigma_doubt,
     }
-    bare = [(q.places, q.bare(q.start, units)) for q in quantities]
+    begun = None if windows is None else bare_windows(windows, units)
     try:
-        found = _core.fit_runs(
-            given, bare, choices, None if windows is None else bare_windows(windows, units)
-        )
+        found = _core.fit_runs(given, unknown.start, choices, begun)
     except ValueError as error:
         raise InputError(str(error)) from None
-    return _result(found, model, quantities, chosen, units)
+    return _result(found, model, unknown, chosen)
 
 
 def score(
@@ -225,17 +230,15 @@ def score(
     units = Units(model.w0, si=True)
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
-    quantities, given = prepared(runs, model, [*base, *candidates], start, units)
-    bare = [(q.places, q.bare(q.start, units)) for q in quantities]
+    unknown, given = prepared(runs, model, [*base, *candidates], start, units)
     try:
         windows = bare_windows(fit.windows, units)
-        at = _core.fit_equations(given, bare, tolerance_of(runs), windows)
+        at = _core.fit_equations(given, unknown.start, tolerance_of(runs), windows)
     except ValueError as error:
         raise InputError(str(error)) from None
-    slopes = np.array([q.slope(b, units) for q, (_, b) in zip(quantities, bare, strict=True)])
-    pull = at["pull"] / slopes
-    information = at["information"] / np.outer(slopes, slopes)
-    new = np.array([q.name not in fit.estimates for q in quantities])
+    pull = unknown.columns(at["pull"][None], at["values"])[0]
+    information = unknown.columns(unknown.columns(at["information"], at["values"]).T, at["values"])
+    new = np.array([name not in fit.estimates for name in unknown.names])
     old = ~new
     through = information[np.ix_(new, old)] @ np.linalg.pinv(
         information[np.ix_(old, old)], hermitian=True
@@ -252,37 +255,39 @@ def prepared(
     free: Sequence[str],
     start: Mapping[str, float],
     units: Units,
-) -> tuple[list[Quantity], list[dict[str, Any]]]:
+) -> tuple[Conversion, list[dict[str, Any]]]:
     """Return the free parameters, and the runs as the core takes them."""
     if not runs:
         raise InputError("runs is empty: allowed is one record or more")
     rigs = [rig_of(run, model) for run in runs]
     given = [bare_run(run, rig, units) for run, rig in zip(runs, rigs, strict=True)]
-    return free_quantities(runs, rigs, free, start), given
+    return Conversion(free_quantities(runs, rigs, free, start), units), given
 
 
 def _result(
-    found: Mapping[str, Any],
-    model: Rig,
-    quantities: Sequence[Quantity],
-    chosen: Sequence[int],
-    units: Units,
+    found: Mapping[str, Any], model: Rig, unknown: Conversion, chosen: Sequence[int]
 ) -> TrajectoryFit:
-    values = found["values"]
-    slopes = np.array([q.slope(v, units) for q, v in zip(quantities, values, strict=True)])
-    with np.errstate(invalid="ignore"):
-        covariance = found["covariance"] * np.outer(slopes, slopes)
-    ends = dict(zip(chosen, found["intervals"], strict=True))
+    units, bare = unknown.units, found["values"]
+    values = unknown.given(bare)
+    covariance = unknown.covariance(found["covariance"], bare)
+    errors = [math.sqrt(variance) for variance in np.diag(covariance)]
+    # Of sizes that are no number of the core's there is no profile: the covariance stands for it.
+    wide = math.sqrt(LEVEL * found["widening"])
+    intervals = {
+        k: interval(float(values[k]), wide * errors[k], mixed=True)
+        for k in unknown.mixed
+        if k in chosen
+    }
+    profiled = [k for k in chosen if k not in unknown.mixed]
+    for k, ends in zip(profiled, found["intervals"], strict=True):
+        both = (unknown.given([*bare[:k], end, *bare[k + 1 :]])[k] for end in ends)
+        low, high = sorted(float(end) for end in both)  # the unit of a bias may be negative
+        intervals[k] = low, high
     estimates = {}
-    for k, (q, value) in enumerate(zip(quantities, values, strict=True)):
-        interval = ends.get(k)
-        # The unit of a bias may be negative.
-        low, high = sorted(q.given(e, units) for e in interval or (math.nan, math.nan))
-        estimates[q.name] = Estimate(
-            q.given(value, units),
-            math.sqrt(covariance[k, k]),
-            (low, high) if math.isfinite(low) and math.isfinite(high) else None,
-        )
+    for k, name in enumerate(unknown.names):
+        low, high = intervals.get(k, (math.nan, math.nan))
+        known = math.isfinite(low) and math.isfinite(high)
+        estimates[name] = Estimate(float(values[k]), errors[k], (low, high) if known else None)
     curves, residuals, squares = [], [], 0.0
     for curve in found["runs"]:
         curves.append(np.stack([curve["theta"], units.given(curve["velocity"], 1)]))
@@ -306,6 +311,7 @@ def _result(
         steps=found["steps"],
         converged=found["converged"],
         widening=found["widening"],
+        mixed=tuple(unknown.names[k] for k in unknown.mixed),
     )
 
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun, RodSensor
     from pendmap.model import Rig
     from pendmap.model.effects import Effect
-    from pendmap.model.units import Units
 
 __all__ = ["PER_RUN", "PLACES", "SENSOR", "Quantity", "free_quantities"]
 
@@ -42,7 +41,8 @@ PER_RUN: Final = ("p", "Omega", "phi")
 class Quantity:
     """A free parameter: its name in SI, the power of ``w0`` that it has, where it stands.
 
-    ``unit`` is what one of the core's is in SI besides.
+    ``unit`` is what one of the core's is in SI besides; ``less`` is the free parameter whose value
+    is taken off the power.
     """
 
     name: str
@@ -50,29 +50,12 @@ class Quantity:
     places: list[tuple[int, int]]
     start: float
     unit: float = 1.0
+    less: str | None = None
 
     @property
     def is_w0(self) -> bool:
         """Whether it is ``w0``, in the core a factor on gravity."""
         return self.name == "w0"
-
-    def bare(self, value: float, units: Units) -> float:
-        """Return what the core calls it: of ``w0`` gravity."""
-        if self.is_w0:
-            return (value / units.w0) ** 2
-        return float(units.bare(value, self.power)) / self.unit
-
-    def given(self, value: float, units: Units) -> float:
-        """Return in SI what the core calls ``value``."""
-        if self.is_w0:
-            return units.w0 * math.sqrt(value) if value > 0 else math.nan
-        return self.unit * float(units.given(value, self.power))
-
-    def slope(self, value: float, units: Units) -> float:
-        """Return the derivative of :meth:`given`."""
-        if self.is_w0:
-            return 0.5 * units.w0 / math.sqrt(value)
-        return self.unit * float(units.given(1.0, self.power))
 
 
 def free_quantities(
@@ -112,9 +95,8 @@ def free_quantities(
             places = [(k, place) for k in where if (place := _place_of(name, rigs[k])) is not None]
             if not places:
                 raise InputError(f"free has {checks.shown(name)}: allowed are {known}")
-            quantities.append(
-                Quantity(own, _power_of(name, rigs[places[0][0]], names), places, math.nan)
-            )
+            power, less = _power_of(name, rigs[places[0][0]], names)
+            quantities.append(Quantity(own, power, places, math.nan, less=less))
     if "phi" not in names:
         quantities += [
             Quantity(f"phi[{k}]" if len(runs) > 1 else "phi", 0, [(k, PLACES["phi"])], math.nan)
@@ -157,12 +139,13 @@ def _place_of(name: str, rig: Rig) -> int | None:
     return None if found is None else found[0] + list(found[1].parameters).index(found[2])
 
 
-def _power_of(name: str, rig: Rig, free: Sequence[str]) -> float:
+def _power_of(name: str, rig: Rig, free: Sequence[str]) -> tuple[float, str | None]:
+    """Return a parameter's power of ``w0``, and what is taken off it, if that is free too."""
     if name == "w0":
-        return 1
+        return 1, None
     own = dict(COUNTERPARTS.values())
     if name in own:
-        return own[name]
+        return own[name], None
     found = _effect(name, rig)
     if found is None:
         raise InputError(f"free has {checks.shown(name)}: the model has no such effect")
@@ -170,13 +153,10 @@ def _power_of(name: str, rig: Rig, free: Sequence[str]) -> float:
     entry = next(e for e in effect.definition["parameters"] if e["name"] == parameter)
     less = entry["power_of_w0_less"]
     if less is None:
-        return float(entry["power_of_w0"])
+        return float(entry["power_of_w0"]), None
     if f"{effect.name}.{less}" in free:
-        raise InputError(
-            f"free has {effect.name}.{less} beside {name}, whose unit depends on it: allowed is "
-            "one of them"
-        )
-    return float(entry["power_of_w0"] - effect.parameters[less])
+        return float(entry["power_of_w0"]), f"{effect.name}.{less}"
+    return float(entry["power_of_w0"] - effect.parameters[less]), None
 
 
 def _value_of(quantity: Quantity, rigs: Sequence[Rig]) -> float:

@@ -133,20 +133,20 @@ def window_slopes(
     units = Units(model.w0, si=True)
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
-    quantities, given = prepared(runs, model, [*base, *candidates], start, units)
-    bare = [(q.places, q.bare(q.start, units)) for q in quantities]
+    unknown, given = prepared(runs, model, [*base, *candidates], start, units)
+    begin = unknown.start
     try:
-        found = _core.fit_rows(given, bare, tolerance_of(runs), bare_windows(fit.windows, units))
+        found = _core.fit_rows(given, begin, tolerance_of(runs), bare_windows(fit.windows, units))
     except ValueError as error:
         raise InputError(str(error)) from None
-    slopes = np.array([q.slope(b, units) for q, (_, b) in zip(quantities, bare, strict=True)])
+    at = [value for _, value in begin]
     all_slopes = []
     for (places, rows, residual, weight), window in zip(found, fit.windows, strict=True):
-        columns = np.zeros((len(rows), len(quantities)))
-        columns[:, places] = rows[:, :-STATE] / slopes[places]
-        states = rows[:, -STATE:]
+        bare = np.zeros((len(rows), len(begin)))
+        bare[:, places] = rows[:, :-STATE]
+        columns, states = unknown.columns(bare, at), rows[:, -STATE:]
         all_slopes.append(WindowSlopes(*window[:2], columns, states, residual, weight))
-    return tuple(q.name for q in quantities), all_slopes
+    return unknown.names, all_slopes
 
 
 def sensitivities(
