@@ -7,15 +7,18 @@ density at the phase ``w`` from sample to sample is
 ``S(w) = scale (c (1 - rho^2) / (1 + rho^2 - 2 rho cos w) + 1 - c)``,
 
 ``c`` the coloured share of the variance and ``scale`` all of it. A process of first order without
-the floor would be drawn to it at high frequencies, and fall short at low ones.
+the floor would be drawn to it at high frequencies, and fall short at low ones. There it is the
+floor over the least density of the coloured part that counts,
+
+``phi = (1 - c) / c (1 + |rho|) / (1 - |rho|)``.
 
 By Whittle's likelihood squared amplitudes ``P`` are worth ``sum log S + P / S``. Where all are
-quick, ``rho`` and ``c`` are known only together, and what they say of slow ones is no better known
-than that: so no law is chosen, each keeps its share of the likelihood, evenly laid out in ``c`` and
-in ``arctanh rho``, half the logarithm of the coloured part at the lowest frequencies over that at
-the highest. Rounding to counts of ``q`` has a variance of its own, ``q^2 / 12``: no law has less
-of white noise, and those with just as much are the likelier ones, other white noise in a reading
-being rare.
+quick, ``rho`` and ``phi`` are known only together, and what they say of slow ones is no better
+known than that: so no law is chosen, each keeps its share of the likelihood, evenly laid out in
+``log phi`` and in ``arctanh rho``, a quarter of the logarithm of the coloured part at the lowest
+frequencies over that at the highest. Rounding to counts of ``q`` has a variance of its own,
+``q^2 / 12``: no law has less of white noise, and those with just as much are the likelier ones,
+other white noise in a reading being rare.
 
 References
 ----------
@@ -39,17 +42,18 @@ if TYPE_CHECKING:
 
 __all__ = ["Laws", "laws_of"]
 
-COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 141))
+COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 101))
 """Correlations from sample to sample that are tried."""
 
-SHARES: Final = np.linspace(0.05, 1.0, 20)
-"""Coloured shares of the variance that are tried."""
+FLOORS: Final = np.concatenate([[0.0], np.geomspace(0.03, 50.0, 35)])
+"""White floors over the least density of the coloured part, ``phi``, that are tried."""
 
-CERTAIN: Final = 12.0
-"""Gain in twice the logarithm of Whittle's likelihood from which noise is said to be coloured."""
+RARE: Final = 0.0025
+"""How likely coloured noise is beforehand, all its laws together, over white noise: a colour must
+be plain to be believed, but one that may be there has its say."""
 
 FAINT: Final = 1e-6
-"""Laws with less than this part of the greatest likelihood are left out."""
+"""Laws with less than this part of the greatest probability are left out."""
 
 COUNTED: Final = 10.0
 """How much likelier than any other a floor is that rounding alone makes."""
@@ -68,7 +72,7 @@ class Laws:
     weights : ndarray of float, shape (laws,)
         Probability of each.
     colours, shares : ndarray of float, shape (laws,)
-        ``rho`` and ``c``; 0 of white noise.
+        ``rho`` and ``c``; 0 and 1 of white noise.
     shapes : ndarray of float, shape (laws, bins)
         Spectral density over the variance.
     scales : ndarray of float, shape (laws, runs)
@@ -91,7 +95,7 @@ class Laws:
 
 
 def laws_of(power: Floats, sizes: Floats, floors: Floats) -> Laws:
-    """Return the laws that spectra of noise allow: white noise alone where no colour is certain.
+    """Return the laws that spectra of noise allow.
 
     Parameters
     ----------
@@ -103,41 +107,70 @@ def laws_of(power: Floats, sizes: Floats, floors: Floats) -> Laws:
     floors : ndarray of float, shape (runs,)
         Variance of rounding in each run, in units of the readings' standard errors squared.
     """
-    colours, shares, shapes = _tried()
+    tried = _tried()
     total, number = sizes.sum(), sizes.sum(axis=1)
     own = number >= OWN
-    sums = (1 / shapes) @ power.T
+    sums = tried.inverse @ power.T
     together = sums.sum(axis=1) / total
     scales = np.where(own, sums / np.where(own, number, 1.0), together[:, None])
     scales = np.maximum(scales, np.finfo(float).tiny)
-    deviance = np.log(shapes) @ sizes.sum(axis=0) + np.log(scales) @ number
+    deviance = tried.logarithms @ sizes.sum(axis=0) + np.log(scales) @ number
     deviance += (sums / scales).sum(axis=1)
-    # By how many steps of the shares a law's floor exceeds that of rounding.
-    rounded = 1 - (floors @ number) / (scales @ number)
-    above = (np.clip(rounded, SHARES[0], 1.0) - shares) / (SHARES[1] - SHARES[0])
-    prior = np.where(above > -1, 1 + COUNTED * SHARES.size * np.maximum(1 - np.abs(above), 0), 0.0)
-    allowed = prior > 0
-    allowed[0] = True
-    best = deviance[allowed].min()
-    keep = allowed & (deviance < best - 2 * np.log(FAINT))
-    if deviance[0] - best <= CERTAIN:
-        keep = np.arange(deviance.size) == 0
-    weights = np.where(shares[keep] > 0, prior[keep], 1.0) * np.exp(-0.5 * (deviance[keep] - best))
+    prior = _prior(tried, float(floors @ number) / (scales @ number))
+    deviance[prior == 0] = np.inf
+    weights = prior * np.exp(-0.5 * (deviance - deviance.min()))
+    weights /= weights.sum()
+    keep = weights > FAINT * weights.max()
     return Laws(
-        weights / weights.sum(),
-        colours[keep],
-        shares[keep],
-        shapes[keep],
+        weights[keep],
+        tried.colours[keep],
+        tried.shares[keep],
+        tried.shapes[keep],
         scales[keep],
         np.where(own, number, total),
     )
 
 
+@dataclasses.dataclass(frozen=True)
+class _Tried:
+    """All laws, white noise first: shapes over the variance, one over them, their logarithms."""
+
+    colours: Floats
+    floors: Floats
+    shares: Floats
+    shapes: Floats
+    inverse: Floats
+    logarithms: Floats
+
+
 @functools.cache
-def _tried() -> tuple[Floats, Floats, Floats]:
-    """Return colours, shares and shapes of all laws that are tried, white noise first."""
-    rho, share = (v.ravel() for v in np.meshgrid(COLOURS, SHARES, indexing="ij"))
-    rho, share = np.concatenate([[0.0], rho]), np.concatenate([[0.0], share])
+def _tried() -> _Tried:
+    rho, floor = (v.ravel() for v in np.meshgrid(COLOURS, FLOORS, indexing="ij"))
+    share = 1 / (1 + floor * _least(rho))
+    rho, floor, share = (
+        np.concatenate([[white], values])
+        for white, values in ((0.0, rho), (0.0, floor), (1.0, share))
+    )
     r, c = rho[:, None], share[:, None]
-    coloured = (1 - r**2) / (1 + r**2 - 2 * r * np.cos(PHASES))
-    return rho, share, c * coloured + 1 - c
+    shapes = c * (1 - r**2) / (1 + r**2 - 2 * r * np.cos(PHASES)) + 1 - c
+    return _Tried(rho, floor, share, shapes, 1 / shapes, np.log(shapes))
+
+
+def _least(rho: Floats) -> Floats:
+    """Return the least density of a process of first order over its variance."""
+    return np.asarray((1 - np.abs(rho)) / (1 + np.abs(rho)), np.float64)
+
+
+def _prior(tried: _Tried, rounding: Floats) -> Floats:
+    """Return how likely laws are beforehand; ``rounding`` has this share in each variance."""
+    ratio = rounding / (tried.shares * _least(tried.colours))
+    # Where among the floors that of rounding is, and how many steps the law's is above it.
+    steps = np.arange(FLOORS.size)
+    place = np.interp(np.log(np.maximum(ratio, FLOORS[1])), np.log(FLOORS[1:]), steps[1:])
+    place = np.minimum(place, ratio / FLOORS[1])
+    above = np.searchsorted(FLOORS, tried.floors) - place
+    rounded = COUNTED * FLOORS.size * np.maximum(1 - np.abs(above), 0)
+    prior = np.where(above > -1, 1 + rounded, 0.0)
+    prior[1:] *= RARE / prior[1:].sum()
+    prior[0] = 1.0
+    return np.asarray(prior, np.float64)

@@ -73,7 +73,7 @@ class Evidence:
 
     @property
     def floors(self) -> tuple[float, ...]:
-        """Of each fitted run the variance of rounding to counts, ``count^2 / 12``, over the noise's.
+        """Of each fitted run the share of rounding, ``count^2 / 12``, in the noise's variance.
 
         Rounding errs anew with each sample, whatever the colour of what is rounded.
         """

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 __all__ = ["Remainder", "remainder_of"]
+
+FOR_SURE: Final = 1e9
+"""So many amplitudes tell a level for sure."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,6 +56,10 @@ class Remainder:
         That noise alone leaves so much, in all runs together or in any of them: Fisher's F of the
         slow part over the rest, times how often was looked (Bonferroni); the mean over all laws of
         the noise.
+    laws : ndarray of float, shape (2, laws)
+        Levels of the laws that the noise may have, and the probability of each.
+    amplitudes : float
+        How many independent amplitudes a level was read from.
     """
 
     level: float
@@ -61,6 +68,32 @@ class Remainder:
     stderr: float
     by_run: tuple[float, ...]
     chance: float
+    laws: Floats = dataclasses.field(repr=False)
+    amplitudes: float = dataclasses.field(repr=False)
+
+    def chance_of(self, gain: float, count: int, least: float = 0.0) -> float:
+        """Return the chance that noise alone makes a sum of squares fall by so much.
+
+        Parameters
+        ----------
+        gain : float
+            By how much, in units of the readings' standard errors squared.
+        count : int
+            How many numbers were adapted for it.
+        least : float
+            Levels below it count as this one.
+
+        Returns
+        -------
+        float
+            By Fisher's F, the mean over all laws of the noise; 1 where nothing was adapted.
+        """
+        from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
+
+        if count == 0:
+            return 1.0
+        levels, weights = np.maximum(self.laws[0], least), self.laws[1]
+        return float(weights @ fdtrc(count, self.amplitudes, gain / count / levels))
 
     @property
     def z(self) -> float:
@@ -86,7 +119,7 @@ def remainder_of(
     """
     spectra = spectra_of(fit, runs)
     if not spectra.quick_sizes.any():
-        return Remainder(1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs), 1.0)
+        return Remainder(1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs), 1.0, np.ones((2, 1)), FOR_SURE)
     laws = laws_of(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
     sizes = spectra.slow_sizes.sum(axis=1)
     degrees = sizes - spectra.states - adapted * sizes / sizes.sum()
@@ -103,8 +136,17 @@ def remainder_of(
         by_run.append(above / error if error > 0 else 0.0)
         chances.append(chance)
     chance = min(min(chances) * len(chances), 1.0)
+    # The noise's density where the motion is.
+    levels = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1) / spectra.motion.sum()
     return Remainder(
-        _level(spectra, laws), laws.correlation, excess, stderr, tuple(by_run), chance
+        float(laws.weights @ levels),
+        laws.correlation,
+        excess,
+        stderr,
+        tuple(by_run),
+        chance,
+        np.stack([levels, laws.weights]),
+        float(spectra.quick_sizes.sum()),
     )
 
 
@@ -117,31 +159,33 @@ def _tenable(laws: Laws, spectra: Spectra, degrees: Floats) -> Laws:
     """Return the laws with what the slow part says of them.
 
     What a model lacks only adds to noise. So a law is as much less likely as it is improbable that
-    noise leaves so little: that is the likelihood if anything at all may be added to it.
+    noise leaves so little, the likelihood where any sum may have been added; or as it is that noise
+    leaves just as much, where the model lacks nothing. Both are equally likely beforehand.
     """
+    from scipy.special import fdtr  # noqa: PLC0415 (where it is needed)
+    from scipy.stats import f  # noqa: PLC0415
+
     sizes, free = spectra.slow_sizes.sum(axis=1), float(degrees.sum())
     if laws.weights.size == 1 or free <= 0:
         return laws
-    total = _left(laws, spectra).sum(axis=1)
-    weights = laws.weights * _fisher(laws, sizes, free).cdf(total / free)
+    mean = _left(laws, spectra).sum(axis=1) / free
+    others = _others(laws, sizes)
+    weights = laws.weights * (fdtr(free, others, mean) + mean * f.pdf(mean, free, others))
     # All are too great where parameters took up noise: the quick part alone has the say then.
     if not weights.sum() > 0:
         return laws
     return dataclasses.replace(laws, weights=weights / weights.sum())
 
 
-def _fisher(laws: Laws, sizes: Floats, free: float) -> Any:  # noqa: ANN401 (scipy's)
-    """Return the law of the slow part's mean square over that of noise.
-
-    What each run is divided by has its own error: Satterthwaite's degrees of freedom of them all.
-    """
-    from scipy.stats import f  # noqa: PLC0415 (where it is needed)
-
-    return f(free, float(sizes.sum() ** 2 / np.sum(sizes**2 / laws.sizes)))
+def _others(laws: Laws, sizes: Floats) -> float:
+    """Return the degrees of freedom of what slow parts are divided by (Satterthwaite's)."""
+    return float(sizes.sum() ** 2 / np.sum(sizes**2 / laws.sizes))
 
 
 def _beyond(left: Floats, degrees: Floats, sizes: Floats, laws: Laws) -> tuple[float, float, float]:
     """Return what runs leave beyond noise, its standard error, and the chance of so much."""
+    from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
+
     number, free = float(sizes.sum()), float(degrees.sum())
     if number == 0 or free <= 0:
         return 0.0, 0.0, 1.0
@@ -149,11 +193,5 @@ def _beyond(left: Floats, degrees: Floats, sizes: Floats, laws: Laws) -> tuple[f
     mean = float(laws.weights @ total)
     scatter = 2 * number + 2 * float(np.sum(sizes**2 / laws.sizes))
     stderr = math.sqrt(scatter + float(laws.weights @ (total - mean) ** 2))
-    chances = _fisher(laws, sizes, free).sf(total / free)
+    chances = fdtrc(free, _others(laws, sizes), total / free)
     return mean - free, stderr, float(laws.weights @ chances)
-
-
-def _level(spectra: Spectra, laws: Laws) -> float:
-    """Return the noise's density, the mean over where the motion is and over all laws."""
-    densities = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1)
-    return float(laws.weights @ densities / spectra.motion.sum())

@@ -104,6 +104,11 @@ class Trial:
         return remainder_of(self.fit, self.runs, len(self.fit.names), self.floors)
 
     @property
+    def widening(self) -> float:
+        """By how much variances exceed the fit's: coloured or strong noise, or what is left."""
+        return max(self.remainder.level, self.chi2 / max(self.fit.degrees, 1), 1.0)
+
+    @property
     def chi2(self) -> float:
         """The sum of squared residuals over standard errors, or of deviances of counts."""
         return self.fit.chi2
