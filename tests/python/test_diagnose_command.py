@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from typing import TYPE_CHECKING
 
@@ -58,6 +59,10 @@ def test_json_and_a_model_that_every_command_takes(
     names = content["covariance"]["names"]
     assert "quadratic_drag.q" in names
     assert len(content["covariance"]["matrix"]) == len(names)
+    place = names.index("quadratic_drag.q")
+    deviation = math.sqrt(content["covariance"]["matrix"][place][place])
+    assert high - low == pytest.approx(2 * 1.96 * deviation, rel=1e-4)
+    assert found["parameters"]["quadratic_drag.q"]["stderr"] == pytest.approx(deviation, rel=1e-9)
     assert content["provenance"]["verdict"] == "named"
     assert content["provenance"]["records"][0]["sha256"]
     assert Rig.from_toml(path).effects[0].name == "quadratic_drag"

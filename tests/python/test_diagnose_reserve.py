@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 
 import pendmap
 from hidden import diagnosed
 from pendmap.discrepancy.calibration import complete
-from pendmap.discrepancy.noise import remainder_of
 from pendmap.discrepancy.verdict import CHANCE, SURE
-from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -54,35 +50,3 @@ def test_what_two_others_do_together_is_given_with_reserve(seed: int, tmp_path: 
     )
     assert found.effects == () or all(effect.approximate for effect in found.effects)
     assert all(effect.probability < SURE for effect in found.effects)
-
-
-@pytest.mark.parametrize("swell", [1.0, 1.15])
-def test_slow_residuals_have_the_chance_that_noise_gives_them(swell: float) -> None:
-    # Noise about swings whose initial states were fitted, in one run stronger than is stated.
-    rng = np.random.default_rng(2)
-    chances = []
-    for _ in range(200):
-        noise = rng.standard_normal((4, SAMPLES)) * np.array([swell, 1.0, 1.0, 1.0])[:, None]
-        chances.append(_chance(noise - noise @ SWING.T @ SWING))
-    assert np.mean(np.array(chances) < 0.1) < 0.18  # two standard errors above a tenth and more
-    assert np.mean(np.array(chances) < 0.5) > 0.2
-    assert min(chances) > CHANCE
-    assert _chance(noise + 0.25 * np.sqrt(SAMPLES) * SWING[0]) < CHANCE
-
-
-SAMPLES, INTERVAL, W0 = 800, 0.02, 6.0
-_WAVES = np.exp(1j * W0 * INTERVAL * np.arange(SAMPLES))
-SWING = np.linalg.qr(np.column_stack([_WAVES.real, _WAVES.imag]))[0].T
-
-
-def _chance(residuals: np.ndarray) -> float:
-    runs = [FitRun(INTERVAL * np.arange(SAMPLES), np.zeros(SAMPLES), 1.0) for _ in residuals]
-    curve = np.vstack([np.zeros(SAMPLES), np.full(SAMPLES, W0)])
-    fit = SimpleNamespace(
-        white=residuals,
-        curves=[curve] * len(runs),
-        windows=[(k, 0, SAMPLES, 0.0, 0.0) for k in range(len(runs))],
-        estimates={},
-        model=pendmap.Rig(w0=W0),
-    )
-    return remainder_of(fit, runs, 0).chance  # type: ignore[arg-type]

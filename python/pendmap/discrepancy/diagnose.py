@@ -203,7 +203,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     )
     nearest = search.run()
     report(steps - 1, steps)
-    runs = run_by_run(evidence, nearest.trial, nearest.trial.remainder.level)
+    runs = run_by_run(evidence, nearest.trial)
     after = residual_torque(evidence, nearest.trial)
     judgement = judge(evidence, search, nearest, runs, after.chance)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}

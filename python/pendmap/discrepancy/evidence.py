@@ -72,6 +72,15 @@ class Evidence:
         return any(run.drive is not None for run in self.fitted)
 
     @property
+    def floors(self) -> tuple[float, ...]:
+        """Of each fitted run the share of rounding, ``count^2 / 12``, in the noise's variance.
+
+        Rounding errs anew with each sample, whatever the colour of what is rounded.
+        """
+        readings = (self.readings[k] for k in self.fitted_of)
+        return tuple((r.count / r.sigma) ** 2 / 12 if r.sigma > 0 else 0.0 for r in readings)
+
+    @property
     def doubt(self) -> float:
         """Relative standard error of the noise of all fitted runs together.
 

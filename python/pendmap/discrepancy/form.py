@@ -14,7 +14,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from pendmap.discrepancy.scores import Scores
 
@@ -49,15 +49,22 @@ class Form:
         return min(min(others) * len(others), 1.0)
 
 
-def form_of(scores: Scores, level: float, *, torque: float, slow: float, runs: float) -> Form:
+def form_of(
+    scores: Scores,
+    chance_of: Callable[[float, int], float],
+    *,
+    torque: float,
+    slow: float,
+    runs: float,
+) -> Form:
     """Return what is left.
 
     Parameters
     ----------
     scores : Scores
         Of all candidates at the best model.
-    level : float
-        Of the noise.
+    chance_of : callable
+        Of a gain and how many numbers were adapted for it, the chance that noise alone makes it.
     torque : float
         Chance that noise leaves as much torque in bins.
     slow : float
@@ -65,13 +72,11 @@ def form_of(scores: Scores, level: float, *, torque: float, slow: float, runs: f
     runs : float
         Chance that noise makes the runs' parameters differ so much.
     """
-    from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
-
     shapes = Counter(score.candidate.name for score in scores.scores)
     best = scores.best()
     tails = {
         scores.scores[k].candidate.name: shapes[scores.scores[k].candidate.name]
-        * float(chi2.sf(scores.scores[k].gain / level, len(scores.columns[k])))
+        * chance_of(scores.scores[k].gain, len(scores.columns[k]))
         for k in best
         if scores.scores[k].gain > 0
     }

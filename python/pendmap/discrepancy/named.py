@@ -90,8 +90,7 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
         Its standing.
     """
     del evidence
-    # Standard errors are wider where noise is stronger than stated, or something is left.
-    widening = math.sqrt(max(best.trial.remainder.level, judgement.ratio, 1.0))
+    widening = math.sqrt(best.trial.widening)
     named = []
     for standing in judgement.standings:
         candidate = standing.candidate
@@ -140,8 +139,9 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """Return the model of a diagnosis with the notes of its file.
 
     Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
-    fitted, ``[provenance]`` the records with their SHA-256, the version, the command and the
-    verdict. A negative damping is set to 0 in the model, which ``[provenance]`` says.
+    fitted, widened as those intervals are, ``[provenance]`` the records with their SHA-256, the
+    version, the command and the verdict. A negative damping is set to 0 in the model, which
+    ``[provenance]`` says.
 
     Parameters
     ----------
@@ -152,6 +152,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """
     fit = found.best.trial.fit
     model = fit.model
+    covariance = found.best.trial.widening * fit.covariance
     named = {effect.name: effect.effect for effect in found.effects}
     own = {own_name(name) for name in named} - {None}
     kept = tuple(e for e in model.effects if e.name not in named)
@@ -161,7 +162,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     notes: dict[str, Any] = {
         "covariance": {
             "names": [_called(name, named) for name in fit.names],
-            "matrix": np.where(np.isfinite(fit.covariance), fit.covariance, 0.0).tolist(),
+            "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
         },
         "provenance": provenance(files, command)
         | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},

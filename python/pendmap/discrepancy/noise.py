@@ -3,21 +3,20 @@
 A pendulum's model errs slowly: what it lacks shows at the frequencies of the swing, of its few
 lowest harmonics and below. Noise stands above them too, so that the spectrum there says how strong
 it is where errors of the model cannot be told from it: as strong if it is white, stronger where it
-is correlated from sample to sample. A process of first order (AR(1)) is adapted to the upper part
-of the spectrum by Whittle's likelihood, and continued downward.
-
-References
-----------
-Whittle (1953), Arkiv foer Matematik 2, 423.
+is correlated from sample to sample. The laws that the upper part of the spectrum allows
+(:mod:`pendmap.discrepancy.colour`) are continued downward, each with its probability.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from pendmap.discrepancy.colour import Laws, laws_of
+from pendmap.discrepancy.spectrum import spectra_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,20 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Remainder", "remainder_of"]
 
-HARMONICS: Final = 4.0
-"""What a model lacks shows up to so many times the frequency of swing or rotation."""
-
-GAP: Final = 1.5
-"""Noise is read from so many times that frequency on."""
-
-COLOURS: Final = np.linspace(-0.9, 0.95, 75)
-"""Correlations from sample to sample that are tried."""
-
-CERTAIN: Final = 12.0
-"""Gain in twice the logarithm of Whittle's likelihood from which noise is said to be coloured."""
-
-LEAST: Final = 8
-"""Samples of a window that a spectrum is taken of."""
+FOR_SURE: Final = 1e9
+"""So many amplitudes tell a level for sure."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,20 +41,25 @@ class Remainder:
     Parameters
     ----------
     level : float
-        Spectral density of the noise at low frequencies; 1 for white noise of the stated size. Sums
-        of squares that a slow effect gains count as so much less.
+        Spectral density of the noise where the motion is; 1 for white noise of the stated size.
+        Sums of squares that a slow effect gains count as so much less.
     colour : float
-        Correlation of the noise from sample to sample; 0 where none is certain.
+        Correlation of the noise from sample to sample, the mean over all laws that it may have.
     excess : float
-        What is left in the slow part beyond noise: the sum of squares, over ``level``, that a model
-        without error would gain.
+        What is left in the slow part beyond noise: the sum of squares, over the noise's density,
+        that a model without error would gain.
     stderr : float
-        Its standard error from the noise alone.
+        Its standard error from the noise alone, and from what is not known of its law.
     by_run : tuple of float
         The same for each run, over its own standard error.
     chance : float
         That noise alone leaves so much, in all runs together or in any of them: Fisher's F of the
-        slow part over the rest, times how often was looked (Bonferroni).
+        slow part over the rest, times how often was looked (Bonferroni); the mean over all laws of
+        the noise.
+    laws : ndarray of float, shape (2, laws)
+        Levels of the laws that the noise may have, and the probability of each.
+    amplitudes : float
+        How many independent amplitudes a level was read from.
     """
 
     level: float
@@ -76,6 +68,32 @@ class Remainder:
     stderr: float
     by_run: tuple[float, ...]
     chance: float
+    laws: Floats = dataclasses.field(repr=False)
+    amplitudes: float = dataclasses.field(repr=False)
+
+    def chance_of(self, gain: float, count: int, least: float = 0.0) -> float:
+        """Return the chance that noise alone makes a sum of squares fall by so much.
+
+        Parameters
+        ----------
+        gain : float
+            By how much, in units of the readings' standard errors squared.
+        count : int
+            How many numbers were adapted for it.
+        least : float
+            Levels below it count as this one.
+
+        Returns
+        -------
+        float
+            By Fisher's F, the mean over all laws of the noise; 1 where nothing was adapted.
+        """
+        from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
+
+        if count == 0:
+            return 1.0
+        levels, weights = np.maximum(self.laws[0], least), self.laws[1]
+        return float(weights @ fdtrc(count, self.amplitudes, max(gain, 0.0) / count / levels))
 
     @property
     def z(self) -> float:
@@ -83,17 +101,9 @@ class Remainder:
         return self.excess / self.stderr if self.stderr > 0 else 0.0
 
 
-@dataclasses.dataclass(frozen=True)
-class _Spectrum:
-    run: int
-    slow: Floats
-    states: int
-    quick: Floats
-    cosines: Floats
-    slow_cosines: Floats
-
-
-def remainder_of(fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int) -> Remainder:
+def remainder_of(
+    fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int, floors: Sequence[float]
+) -> Remainder:
     """Return what a fit leaves.
 
     Parameters
@@ -104,83 +114,79 @@ def remainder_of(fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int) -> Re
         Its records.
     adapted : int
         How many parameters were adapted to them.
+    floors : sequence of float
+        Share of rounding in the variance of each run's noise; 0 where there are no counts.
     """
-    from scipy.stats import f  # noqa: PLC0415 (where it is needed)
-
-    spectra = [s for s in (_spectrum(fit, runs, w) for w in fit.windows) if s is not None]
-    if not spectra:
-        return Remainder(1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs), 1.0)
-    quick = np.concatenate([s.quick for s in spectra])
-    cosines = np.concatenate([s.cosines for s in spectra])
-    colour = _colour(quick, cosines)
-    innovation = float(np.mean(quick * _shape(colour, cosines)))
-    slow = np.concatenate([s.slow for s in spectra])
-    at_slow = innovation / _shape(colour, np.concatenate([s.slow_cosines for s in spectra]))
-    level = float(np.mean(at_slow))
-    degrees = slow.size - sum(s.states for s in spectra) - adapted
-    excess = float(np.sum(slow / at_slow)) - degrees
-    stderr = math.sqrt(2 * slow.size + 2 * slow.size**2 / max(quick.size, 1))
-    by_run = []
-    chances = [_beyond(excess + degrees, degrees, quick.size, f)]
+    spectra = spectra_of(fit, runs)
+    if not spectra.quick_sizes.any():
+        return Remainder(1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs), 1.0, np.ones((2, 1)), FOR_SURE)
+    laws = laws_of(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
+    sizes = spectra.slow_sizes.sum(axis=1)
+    degrees = sizes - spectra.states - adapted * sizes / sizes.sum()
+    # Of each law and run: the slow part over what is expected of noise.
+    left = ((1 / laws.shapes) @ spectra.slow.T) / laws.scales
+    laws = _tenable(laws, left, degrees, sizes)
+    excess, stderr, chance = _beyond(left, degrees, sizes, laws)
+    by_run, chances = [], [chance]
     for k in range(len(runs)):
-        own = [s for s in spectra if s.run == k]
-        size = sum(s.slow.size for s in own)
-        total = sum(
-            float(np.sum(s.slow * _shape(colour, s.slow_cosines))) / innovation for s in own
+        own = slice(k, k + 1)
+        above, error, chance = _beyond(
+            left[:, own], degrees[own], sizes[own], dataclasses.replace(laws, sizes=laws.sizes[own])
         )
-        share = adapted * size / max(slow.size, 1)
-        free = size - sum(s.states for s in own) - share
-        by_run.append((total - free) / math.sqrt(2 * max(size, 1)))
-        # By its own noise: a run's standard error is not known better than to a few per cent.
-        rest = np.concatenate([s.quick * _shape(colour, s.cosines) for s in own] or [quick])
-        chances.append(_beyond(total * innovation / float(np.mean(rest)), free, rest.size, f))
+        by_run.append(above / error if error > 0 else 0.0)
+        chances.append(chance)
     chance = min(min(chances) * len(chances), 1.0)
-    return Remainder(level, colour, excess, stderr, tuple(by_run), chance)
-
-
-def _beyond(total: float, degrees: float, others: int, law: Any) -> float:  # noqa: ANN401 (scipy's)
-    """Return the chance of so great a sum of squares, over the mean square of the rest."""
-    return float(law.sf(total / degrees, degrees, others)) if degrees > 0 else 1.0
-
-
-def _shape(colour: float, cosines: Floats) -> Floats:
-    """One over the spectral density of an AR(1) process with innovations of unit variance."""
-    return 1.0 + colour**2 - 2.0 * colour * cosines
-
-
-def _colour(quick: Floats, cosines: Floats) -> float:
-    def deviance(colour: float) -> float:
-        shape = _shape(colour, cosines)
-        innovation = float(np.mean(quick * shape))
-        return quick.size * math.log(max(innovation, 1e-300)) - float(np.sum(np.log(shape)))
-
-    all_deviances = [deviance(float(c)) for c in COLOURS]
-    best = int(np.argmin(all_deviances))
-    return float(COLOURS[best]) if deviance(0.0) - all_deviances[best] > CERTAIN else 0.0
-
-
-def _spectrum(
-    fit: TrajectoryFit, runs: Sequence[FitRun], window: tuple[int, int, int, float, float]
-) -> _Spectrum | None:
-    from scipy.fft import dct  # noqa: PLC0415 (where it is needed)
-
-    run, first, last = window[:3]
-    record = runs[run]
-    residual = fit.white[run][first:last]
-    good = np.isfinite(residual)
-    if record.trusted is not None:
-        good &= record.trusted[first:last]
-    if np.count_nonzero(good) < LEAST:
-        return None
-    residual, time = residual[good], record.time[first:last][good]
-    power = np.asarray(dct(residual, type=2, norm="ortho"), np.float64) ** 2
-    interval = float(np.median(np.diff(time)))
-    speed = np.abs(fit.curves[run][1][first:last][good])
-    swing = max(
-        fit["w0"] if "w0" in fit.estimates else fit.model.w0, float(np.quantile(speed, 0.9))
+    # The noise's density where the motion is.
+    levels = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1) / spectra.motion.sum()
+    return Remainder(
+        float(laws.weights @ levels),
+        laws.correlation,
+        excess,
+        stderr,
+        tuple(by_run),
+        chance,
+        np.stack([levels, laws.weights]),
+        float(spectra.quick_sizes.sum()),
     )
-    # Phase that the motion passes from sample to sample; the spectrum ends at pi.
-    angle = np.pi * np.arange(residual.size) / residual.size
-    edge = min(HARMONICS * swing * interval, 0.4 * np.pi)
-    slow, quick = angle <= edge, angle >= GAP * edge
-    return _Spectrum(run, power[slow], 2, power[quick], np.cos(angle[quick]), np.cos(angle[slow]))
+
+
+def _tenable(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws:
+    """Return the laws with what the slow part says of them.
+
+    What a model lacks only adds to noise. So a law is as much less likely as it is improbable that
+    noise leaves so little, the likelihood where any sum may have been added; or as it is that noise
+    leaves just as much, where the model lacks nothing. Both are equally likely beforehand.
+    """
+    from scipy.special import fdtr  # noqa: PLC0415 (where it is needed)
+    from scipy.stats import f  # noqa: PLC0415
+
+    free = float(degrees.sum())
+    if laws.weights.size == 1 or free <= 0:
+        return laws
+    mean = left.sum(axis=1) / free
+    others = _others(laws, sizes)
+    weights = laws.weights * (fdtr(free, others, mean) + mean * f.pdf(mean, free, others))
+    # All are too great where parameters took up noise: the quick part alone has the say then.
+    if not weights.sum() > 0:
+        return laws
+    return dataclasses.replace(laws, weights=weights / weights.sum())
+
+
+def _others(laws: Laws, sizes: Floats) -> float:
+    """Return the degrees of freedom of what slow parts are divided by (Satterthwaite's)."""
+    return float(sizes.sum() ** 2 / np.sum(sizes**2 / laws.sizes))
+
+
+def _beyond(left: Floats, degrees: Floats, sizes: Floats, laws: Laws) -> tuple[float, float, float]:
+    """Return what runs leave beyond noise, its standard error, and the chance of so much."""
+    from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
+
+    number, free = float(sizes.sum()), float(degrees.sum())
+    if number == 0 or free <= 0:
+        return 0.0, 0.0, 1.0
+    total = left.sum(axis=1)
+    mean = float(laws.weights @ total)
+    scatter = 2 * number + 2 * float(np.sum(sizes**2 / laws.sizes))
+    stderr = math.sqrt(scatter + float(laws.weights @ (total - mean) ** 2))
+    chances = fdtrc(free, _others(laws, sizes), total / free)
+    return mean - free, stderr, float(laws.weights @ chances)

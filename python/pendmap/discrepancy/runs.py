@@ -35,7 +35,7 @@ class RunByRun:
         Cochran's Q over all parameters together, less its degrees of freedom, over its standard
         deviation: what the sum of squares would gain if each run had parameters of its own.
     chance : float
-        That noise alone makes it so great, Q being distributed as chi-squared.
+        That noise alone makes it so great.
     """
 
     coefficients: dict[str, list[tuple[float, float]]]
@@ -60,7 +60,7 @@ class RunByRun:
         return math.sqrt(between) / max(abs(mean), 1e-300)
 
 
-def run_by_run(evidence: Evidence, trial: Trial, level: float) -> RunByRun:
+def run_by_run(evidence: Evidence, trial: Trial) -> RunByRun:
     """Return what each run would have, to first order from the fit of all.
 
     Parameters
@@ -69,15 +69,12 @@ def run_by_run(evidence: Evidence, trial: Trial, level: float) -> RunByRun:
         The records.
     trial : Trial
         The fit.
-    level : float
-        Of the noise, as of :class:`pendmap.discrepancy.noise.Remainder`.
 
     References
     ----------
     Cochran (1954), Biometrics 10, 101.
     """
-    from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
-
+    noise = trial.remainder
     found = sensitivities(trial.fit, evidence.fitted, (), trial.fit.model)
     sizes = np.linalg.norm(found.columns, axis=0)
     columns = found.columns / np.where(sizes > 0, sizes, 1.0)
@@ -86,7 +83,7 @@ def run_by_run(evidence: Evidence, trial: Trial, level: float) -> RunByRun:
     for k in range(len(evidence.fitted)):
         own = columns[found.run == k]
         pull, information = own.T @ found.residual[found.run == k], own.T @ own
-        q += float(pull @ np.linalg.pinv(information, rcond=BLIND, hermitian=True) @ pull) / level
+        q += float(pull @ np.linalg.pinv(information, rcond=BLIND, hermitian=True) @ pull)
         degrees += _rank(information)
         for place, name in enumerate(found.names):
             seen = float(information[place, place])
@@ -95,9 +92,10 @@ def run_by_run(evidence: Evidence, trial: Trial, level: float) -> RunByRun:
                 wanted[name].append((value, math.inf))
                 continue
             step = float(pull[place]) / seen / sizes[place]
-            wanted[name].append((value + step, math.sqrt(level / seen) / sizes[place]))
-    uneven = (q - degrees) / math.sqrt(2 * degrees) if degrees > 0 else 0.0
-    return RunByRun(wanted, uneven, float(chi2.sf(q, degrees)) if degrees > 0 else 1.0)
+            wanted[name].append((value + step, math.sqrt(noise.level / seen) / sizes[place]))
+    degrees = max(degrees, 0)
+    uneven = (q / noise.level - degrees) / math.sqrt(2 * degrees) if degrees else 0.0
+    return RunByRun(wanted, uneven, noise.chance_of(q, degrees))
 
 
 def _rank(information: NDArray[np.float64]) -> int:

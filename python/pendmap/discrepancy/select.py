@@ -37,6 +37,10 @@ CHANCE: Final = 5e-4
 """Or the chance of what it gains, times how many were looked at: for several parameters at once the
 BIC asks for more than that."""
 
+DOUBT: Final = 0.01
+"""The same chance beside a fall of the BIC that suffices: of white noise that falls so far with far
+less, of noise whose colour is half known it may not."""
+
 REFITTED: Final = 4
 """So many candidates are refitted, those with the greatest scores."""
 
@@ -57,6 +61,9 @@ PAIRED: Final = 8
 
 ALIKE: Final = 1.5
 """Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
+
+LEAST_LEVEL: Final = 0.5
+"""Noise is not taken for less, of what its readings are stated to have, than this."""
 
 BEGUN: Final = 2
 """So often a search begins again from a better baseline."""
@@ -231,7 +238,11 @@ class Search:
 
     def level(self) -> float:
         """Return by what sums of squares are divided: the noise as the baseline leaves it."""
-        return max(self.base.trial.remainder.level, 0.5)
+        return max(self.base.trial.remainder.level, LEAST_LEVEL)
+
+    def chance_of(self, gain: float, count: int) -> float:
+        """Return the chance that noise alone makes the sum of squares fall by so much."""
+        return self.base.trial.remainder.chance_of(gain, count, LEAST_LEVEL)
 
     def _room(self, trial: Trial) -> int:
         return self.most - len([name for name in trial.names if name != ZERO])
@@ -295,14 +306,11 @@ class Search:
 
     def _gains(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects gain more than chance."""
-        from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
-
         level = self.level()
-        if rest.bic(level) - full.bic(level) >= GAIN:
-            return True
         looked = len(self.scores(rest).scores)
         more = full.adapted - rest.adapted
-        return bool(looked * chi2.sf((rest.chi2 - full.chi2) / level, more) < CHANCE)
+        chance = looked * self.chance_of(rest.chi2 - full.chi2, more)
+        return chance < (DOUBT if rest.bic(level) - full.bic(level) >= GAIN else CHANCE)
 
     def _note(
         self, current: Found, found: Found, scores: Scores, places: Sequence[int], *, good: bool

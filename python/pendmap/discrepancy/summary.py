@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.named import unphysical
@@ -31,6 +32,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
     """Return the JSON object of ``pendmap diagnose``, without the paths of files."""
     gap, judgement = found.gap, found.judgement
     fit, base = found.best.trial.fit, found.base.trial.fit
+    wider = math.sqrt(found.best.trial.widening)
     return {
         "experiment": str(found.evidence.experiment.path),
         "verdict": found.verdict,
@@ -102,7 +104,8 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "baseline": {name: e.value for name, e in base.estimates.items()},
         "unphysical": unphysical(fit),
         "parameters": {
-            name: {"value": e.value, "stderr": e.stderr} for name, e in fit.estimates.items()
+            name: {"value": e.value, "stderr": e.stderr and wider * e.stderr}
+            for name, e in fit.estimates.items()
         },
         "runs": {
             name: [{"value": value, "stderr": error} for value, error in pairs]

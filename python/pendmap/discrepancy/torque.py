@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.noise import Remainder
     from pendmap.discrepancy.trial import Trial
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
@@ -75,19 +76,21 @@ class Torque:
         rad/s^2, ``z`` their ratio, whether it is the torque along the motion. Empty where the
         records do not show it.
     gains : dict of (float, int)
-        For each what the sum of squares falls by, over the noise's level, if the torques of all its
-        bins are added to the model, and how many numbers that is.
+        For each what the sum of squares falls by if the torques of all its bins are added to the
+        model, and how many numbers that is.
+    remainder : Remainder
+        What the model leaves, and with it the noise.
     """
 
     rows: dict[str, list[dict[str, Any]]]
     gains: dict[str, tuple[float, int]]
+    remainder: Remainder
 
     @property
     def chance(self) -> float:
         """The chance that noise alone gains so much: the least of all, times how many there are."""
-        from scipy.stats import chi2  # noqa: PLC0415 (where it is needed)
-
-        tails = [float(chi2.sf(gain, count)) for gain, count in self.gains.values() if count]
+        gains = [(gain, count) for gain, count in self.gains.values() if count]
+        tails = [self.remainder.chance_of(gain, count) for gain, count in gains]
         return min(min(tails, default=1.0) * max(len(tails), 1), 1.0)
 
 
@@ -124,7 +127,7 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
             further[:, first : first + count], residual, name, edges[name], trial.remainder.level
         )
         first += count
-    return Torque(found, gains)
+    return Torque(found, gains, trial.remainder)
 
 
 def windows_of(
@@ -253,7 +256,7 @@ def _solved(
     inverse = (spread @ spread.T) / np.outer(scale, scale)
     pull = columns.T @ residual
     torque = inverse @ pull
-    gain = float(pull @ torque) / level
+    gain = float(pull @ torque)
     stderr = np.sqrt(level * np.diag(inverse))
     rows = [
         {

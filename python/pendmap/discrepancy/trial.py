@@ -89,17 +89,25 @@ class Trial:
         The effects that were added to the baseline.
     runs : tuple of FitRun
         What it was fitted to.
+    floors : tuple of float
+        Share of rounding in the variance of each run's noise.
     """
 
     fit: TrajectoryFit
     free: tuple[str, ...]
     chosen: tuple[Candidate, ...]
     runs: tuple[FitRun, ...]
+    floors: tuple[float, ...]
 
     @functools.cached_property
     def remainder(self) -> Remainder:
         """What it leaves."""
-        return remainder_of(self.fit, self.runs, len(self.fit.names))
+        return remainder_of(self.fit, self.runs, len(self.fit.names), self.floors)
+
+    @property
+    def widening(self) -> float:
+        """By how much variances exceed the fit's: coloured or strong noise, or what is left."""
+        return max(self.remainder.level, self.chi2 / max(self.fit.degrees, 1), 1.0)
 
     @property
     def chi2(self) -> float:
@@ -178,7 +186,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         least_gain=least_gain,
         growth=growth,
     )
-    return Trial(fit, tuple(free), tuple(chosen), evidence.fitted)
+    return Trial(fit, tuple(free), tuple(chosen), evidence.fitted, evidence.floors)
 
 
 def with_candidates(

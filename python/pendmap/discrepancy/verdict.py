@@ -132,7 +132,7 @@ def judge(
     left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
     form = form_of(
         search.scores(trial),
-        search.level(),
+        search.chance_of,
         torque=chance,
         slow=trial.remainder.chance,
         runs=runs.chance,

@@ -107,19 +107,20 @@ def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:
 
 def _parameters(found: Discrepancy) -> Table:
     before, after = (found.base.trial.fit.estimates, found.best.trial.fit.estimates)
+    wide, wider = (math.sqrt(f.trial.widening) for f in (found.base, found.best))
     new = own_parameters(effect.name for effect in found.effects)
     names = [n for n in before if n in after and "[" not in n and n not in new]
     rows = []
     for name in names:
         old, now = before[name], after[name]
         moved = now.value - old.value
-        error = now.stderr or 0.0
+        error = wider * (now.stderr or 0.0)
         rows.append(
             (
                 Name(name),
                 unit_of(name, found.definition),
-                _said(old),
-                _said(now),
+                _said(old, wide),
+                _said(now, wider),
                 f"{moved / error:+.2g}" if error and moved else "0",
             )
         )
@@ -127,8 +128,8 @@ def _parameters(found: Discrepancy) -> Table:
     return compared(found, Table(head, tuple(rows), words=("unit",)))
 
 
-def _said(estimate: Estimate) -> str:
-    error = estimate.stderr or 0.0
+def _said(estimate: Estimate, wider: float) -> str:
+    error = wider * (estimate.stderr or 0.0)
     if not (error and math.isfinite(error)):
         return f"{estimate.value:.5g}"
     return f"{written(estimate.value, error)} {PLUS} {error:.1g}"
@@ -218,7 +219,9 @@ def run_by_run(found: Discrepancy) -> Section:
     for size in sizes:
         pairs = found.runs.coefficients[size]
         spread = found.runs.spread(size)
-        estimate = found.nearest.trial.fit.estimates[size]
+        said = _said(
+            found.nearest.trial.fit.estimates[size], math.sqrt(found.nearest.trial.widening)
+        )
         label = unit_of(size, found.definition)
         shown = [(n, v, e) for n, (v, e) in zip(names, pairs, strict=True) if math.isfinite(e)]
         blind = [n for n, (_, e) in zip(names, pairs, strict=True) if not math.isfinite(e)]
@@ -231,7 +234,7 @@ def run_by_run(found: Discrepancy) -> Section:
             Paragraph(
                 (
                     Name(size),
-                    f": all runs together {_said(estimate)} {label}".rstrip() + ".",
+                    f": all runs together {said} {label}".rstrip() + ".",
                     differ if len(shown) > 1 else "",
                 )
             ),

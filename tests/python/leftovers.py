@@ -1,0 +1,69 @@
+"""Residuals of no fit: noise of a law that is known, beside a swing that was adapted."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import pendmap
+from pendmap.discrepancy.noise import Remainder, remainder_of
+from pendmap.identification.runs import FitRun
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+INTERVAL, W0 = 0.02, 6.0
+RUNS, SAMPLES = 4, 800
+COUNT = 1.0
+"""Counts are the unit of everything that is counted here."""
+
+
+def swing(samples: int = SAMPLES) -> Floats:
+    """Return an orthonormal basis of swings of one frequency, shape (2, samples)."""
+    waves = np.exp(1j * W0 * INTERVAL * np.arange(samples))
+    return np.asarray(np.linalg.qr(np.column_stack([waves.real, waves.imag]))[0].T, np.float64)
+
+
+def coloured(
+    rng: np.random.Generator, correlation: float, runs: int = RUNS, samples: int = SAMPLES
+) -> Floats:
+    """Return noise of unit variance, ``x[k] = rho x[k-1] + ...``, shape (runs, samples)."""
+    values = rng.standard_normal((runs, samples))
+    values[:, 1:] *= np.sqrt(1 - correlation**2)
+    for k in range(1, samples):
+        values[:, k] += correlation * values[:, k - 1]
+    return values
+
+
+def counted(rng: np.random.Generator, noise: Floats) -> Floats:
+    """Return what is left, beside swings of 300 counts, of noise in counts that is rounded."""
+    runs, samples = noise.shape
+    phases = W0 * INTERVAL * np.arange(samples) + rng.uniform(0, math.tau, (runs, 1))
+    motion = 300 * COUNT * np.sin(phases)
+    return np.asarray(COUNT * np.round((motion + noise) / COUNT) - motion, np.float64)
+
+
+def remainder(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> Remainder:
+    """Return what residuals hold beside the swing, which is fitted here.
+
+    ``floor`` is the variance of rounding, in the residuals' units squared.
+    """
+    samples = residuals.shape[1]
+    basis = swing(samples)
+    if fitted:
+        residuals = residuals - residuals @ basis.T @ basis
+    runs = [FitRun(INTERVAL * np.arange(samples), np.zeros(samples), 1.0) for _ in residuals]
+    curve = np.vstack([np.zeros(samples), W0 * basis[0]])
+    fit = SimpleNamespace(
+        white=residuals,
+        curves=[curve] * len(runs),
+        windows=[(k, 0, samples, 0.0, 0.0) for k in range(len(runs))],
+        estimates={},
+        model=pendmap.Rig(w0=W0),
+    )
+    return remainder_of(fit, runs, 0, [floor] * len(runs))  # type: ignore[arg-type]
