@@ -131,10 +131,10 @@ class Scores:
         alike = len(self.columns[one]) == len(self.columns[other])
         return not shaped and alike and self.likeness(one, other) > 1 - SAME
 
-    def pairs(self, places: Sequence[int]) -> list[tuple[float, int, int]]:
-        """Return the joint gains of all pairs among some candidates, the greatest first."""
-        found = [(self.together([a, b]), a, b) for a, b in itertools.combinations(places, 2)]
-        return sorted(found, reverse=True)
+    def best_pair(self, places: Sequence[int], leading: int) -> tuple[float, int, int]:
+        """Return the greatest joint gain of two candidates, one of them among the first."""
+        pairs = ((a, b) for n, a in enumerate(places[:leading]) for b in places[n + 1 :])
+        return max(((self.together([a, b]), a, b) for a, b in pairs), default=(0.0, 0, 0))
 
 
 def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]) -> Scores:

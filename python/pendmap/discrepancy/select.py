@@ -57,7 +57,8 @@ PATIENCE: Final = 0.5
 model must be better than the baseline."""
 
 PAIRED: Final = 8
-"""Pairs are looked for among so many candidates."""
+"""Pairs are looked for that have one of so many candidates: alone, what hides behind another shows
+little."""
 
 ALIKE: Final = 1.5
 """Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
@@ -280,10 +281,9 @@ class Search:
         self, scores: Scores, ranked: Sequence[int], level: float
     ) -> list[list[int]]:
         """Return the best pair, if it promises more than its members one after the other."""
-        pairs = scores.pairs([k for k in ranked[:PAIRED] if scores.scores[k].gain > 0])
-        if not pairs:
+        if not ranked:
             return []
-        gain, a, b = pairs[0]
+        gain, a, b = scores.best_pair(ranked, PAIRED)
         alone = max(scores.scores[a].gain, scores.scores[b].gain, scores.scores[ranked[0]].gain)
         return [[a, b]] if gain - alone > 2 * GATE * level else []
 
