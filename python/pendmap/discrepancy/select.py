@@ -142,6 +142,7 @@ class Search:
         self.attempts: list[Attempt] = []
         self.first: Scores | None = None
         self._begun = 0
+        self._steady: Found | None = None
         # What was computed once is not again: rivals are often candidates that were tried.
         self._scores: dict[Key, Scores] = {}
         self._refits = Refits(evidence)
@@ -151,13 +152,21 @@ class Search:
         """Forget everything but a better baseline."""
         self._begun += 1
         self.base = Found(base, tried(self.evidence, base))
-        self.attempts, self.first = [], None
+        self.attempts, self.first, self._steady = [], None, None
         self._scores, self._refits = {}, Refits(self.evidence)
         self.rests = Rests(self.evidence, base, self._refits)
 
     def run(self) -> Found:
         """Return the best model."""
-        path = [self.base]
+        path = self._path([self.base])
+        if len(path) == 1 and self._steady is not None:
+            # What led nowhere was only the best beginning by what was fitted.
+            path = self._path([self.base, self.settled(self._steady)])
+        best_found = path[-1]
+        return self._without_idle(best_found) if len(best_found.trial.chosen) > 1 else best_found
+
+    def _path(self, path: list[Found]) -> list[Found]:
+        """Return models from the baseline on, each with an effect or two more."""
         while self._room(path[-1].trial) > 0:
             following = self._following(path[-1])
             if following is None:
@@ -175,8 +184,7 @@ class Search:
         # What was worse on what was held back, for want of another effect, must be better with it.
         while len(path) > 1 and not self._holds(self.base, path[-1]):
             path.pop()
-        best_found = path[-1]
-        return self._without_idle(best_found) if len(best_found.trial.chosen) > 1 else best_found
+        return path
 
     def settled(self, found: Found) -> Found:
         """Return a fit with all the steps that it wants: candidates are given few."""
@@ -275,6 +283,9 @@ class Search:
             good = accepted is None and self.accepts(current, found)
             accepted = found if good else accepted
             self._note(current, found, scores, places, good=good)
+        if accepted is not None and not current.trial.chosen:
+            others = (found for found, _ in refitted if self._gains(current.trial, found.trial))
+            self._steady = next((found for found in others if self._holds(current, found)), None)
         return accepted
 
     def _promising_pairs(

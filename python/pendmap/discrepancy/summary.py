@@ -229,7 +229,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         f"{gap.held_out_after:.4g} after"
     )
     if judgement.standings:
-        yield f"Share of the held-out gap closed by what is nearest: {judgement.closed:.0%}"
+        yield f"Share of the gap closed by what is nearest: {judgement.closed:.0%}"
     for name, value in unphysical(found.best.trial.fit).items():
         yield f"{name} is {value:.3g}, unphysical: no pendulum feeds its own motion"
     for row in found.where[:3]:

@@ -27,7 +27,8 @@ SPREAD: Final = 0.5
 more is no effect that is alike in every run."""
 
 CLOSED: Final = 0.75
-"""Share of the gap on held-out data that effects must close to be named beside what is left."""
+"""Share of the gap, on what was fitted and on what was held back, that effects must close to be
+named beside what is left."""
 
 CHANCE: Final = 1e-3
 """Chance of what is left below which it is no chance: a tenth of the false alarms allowed."""
@@ -69,7 +70,7 @@ class Judgement:
         Sum of squares over degrees of freedom, and up to where chance and the doubt about the noise
         allow it: ``1 + 4 sqrt(2 / N + 4 r^2)``.
     closed : float
-        Share of the gap that the effects close on held-out data.
+        Share of the gap that the effects close, the lesser one of what was fitted and held back.
     uneven : float
         How differently the runs would have the parameters, over the standard error of that
         (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
@@ -161,7 +162,7 @@ def judge(
 
 
 def _closed(search: Search, best: Found) -> float:
-    """Return the share of the gap closed on what was held back.
+    """Return the share of the gap closed, the lesser one of what was fitted and held back.
 
     The gap is the sum of squares above that of noise, as the best model's spectrum shows it.
     """
@@ -174,6 +175,9 @@ def _closed(search: Search, best: Found) -> float:
     after = (best.held.chi2 - noise * best.held.degrees) / level
     # Noise alone scatters by this much: a gap below it cannot be divided.
     scatter = math.sqrt(2 * best.held.degrees)
+    fall = (search.base.trial.chi2 - best.trial.chi2) / level
+    left = max(best.trial.remainder.excess, 0.0)
+    fitted = fall / (fall + left) if fall > 0 else float(left == 0)
     if before < scatter:
-        return 1.0 if after < 2 * scatter else 0.0
-    return float(np.clip(1 - after / before, -1.0, 1.0))
+        return fitted if after < 2 * scatter else 0.0
+    return float(np.clip(min(1 - after / before, fitted), -1.0, 1.0))
