@@ -134,7 +134,7 @@ class Scores:
     def best_pair(self, places: Sequence[int], leading: int) -> tuple[float, int, int]:
         """Return the greatest joint gain of two candidates, one of them among the first."""
         pairs = ((a, b) for n, a in enumerate(places[:leading]) for b in places[n + 1 :])
-        return max(((self.together([a, b]), a, b) for a, b in pairs), default=(0.0, 0, 0))
+        return max((self.together([a, b]), a, b) for a, b in pairs)
 
 
 def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]) -> Scores:

@@ -60,6 +60,12 @@ PAIRED: Final = 8
 """Pairs are looked for that have one of so many candidates: alone, what hides behind another shows
 little."""
 
+BEGINNINGS: Final = 1
+"""So many more beginnings are followed where the best one does not lead to the end."""
+
+LEFT: Final = 1e-3
+"""Chance of what is left above which the end is reached."""
+
 ALIKE: Final = 1.5
 """Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
 
@@ -142,7 +148,6 @@ class Search:
         self.attempts: list[Attempt] = []
         self.first: Scores | None = None
         self._begun = 0
-        self._steady: Found | None = None
         # What was computed once is not again: rivals are often candidates that were tried.
         self._scores: dict[Key, Scores] = {}
         self._refits = Refits(evidence)
@@ -152,18 +157,40 @@ class Search:
         """Forget everything but a better baseline."""
         self._begun += 1
         self.base = Found(base, tried(self.evidence, base))
-        self.attempts, self.first, self._steady = [], None, None
+        self.attempts, self.first = [], None
         self._scores, self._refits = {}, Refits(self.evidence)
         self.rests = Rests(self.evidence, base, self._refits)
 
     def run(self) -> Found:
         """Return the best model."""
-        path = self._path([self.base])
-        if len(path) == 1 and self._steady is not None:
-            # What led nowhere was only the best beginning by what was fitted.
-            path = self._path([self.base, self.settled(self._steady)])
-        best_found = path[-1]
-        return self._without_idle(best_found) if len(best_found.trial.chosen) > 1 else best_found
+        best = self._path([self.base])[-1]
+        if not self._at_end(best):
+            for other in self._beginnings(best):
+                further = self._path([self.base, self.settled(other)])[-1]
+                best = min((best, further), key=lambda found: found.trial.bic(self.level()))
+                if self._at_end(best):
+                    break
+        return self._without_idle(best) if len(best.trial.chosen) > 1 else best
+
+    def _at_end(self, best: Found) -> bool:
+        """Whether a model leaves no more than chance, and is no beginning that led nowhere."""
+        tried = any(attempt.accepted for attempt in self.attempts)
+        return best.trial.remainder.chance > LEFT and bool(best.trial.chosen or not tried)
+
+    def _beginnings(self, best: Found) -> list[Found]:
+        """Return other beginnings than the one that led to a model: the best pair and effects."""
+        scores = self.scores(self.base.trial)
+        ranked = scores.best()
+        pairs = [scores.best_pair(ranked[:PAIRED], PAIRED)[1:]] if len(ranked) > 1 else []
+        begun = set(best.trial.names)
+        found = []
+        for places in [*pairs, *((k,) for k in ranked[:REFITTED])]:
+            names = {scores.scores[k].candidate.name for k in places}
+            other = None if names <= begun else self.refit(self.base.trial, scores, places)
+            if other and self._gains(self.base.trial, other.trial):
+                found.append(other)
+        found = [other for other in found if self._holds(self.base, other)]
+        return sorted(found, key=lambda other: other.trial.bic(self.level()))[:BEGINNINGS]
 
     def _path(self, path: list[Found]) -> list[Found]:
         """Return models from the baseline on, each with an effect or two more."""
@@ -283,16 +310,13 @@ class Search:
             good = accepted is None and self.accepts(current, found)
             accepted = found if good else accepted
             self._note(current, found, scores, places, good=good)
-        if accepted is not None and not current.trial.chosen:
-            others = (found for found, _ in refitted if self._gains(current.trial, found.trial))
-            self._steady = next((found for found in others if self._holds(current, found)), None)
         return accepted
 
     def _promising_pairs(
         self, scores: Scores, ranked: Sequence[int], level: float
     ) -> list[list[int]]:
         """Return the best pair, if it promises more than its members one after the other."""
-        if not ranked:
+        if len(ranked) < 2:  # noqa: PLR2004 (a pair)
             return []
         gain, a, b = scores.best_pair(ranked, PAIRED)
         alone = max(scores.scores[a].gain, scores.scores[b].gain, scores.scores[ranked[0]].gain)

@@ -22,11 +22,11 @@ __all__ = ["Judgement", "judge"]
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
-SPREAD: Final = 0.5
+SPREAD: Final = 0.3
 """How much an effect's size may differ from run to run, over its size, beyond what noise makes:
 more is no effect that is alike in every run."""
 
-CLOSED: Final = 0.75
+CLOSED: Final = 0.9
 """Share of the gap, on what was fitted and on what was held back, that effects must close to be
 named beside what is left."""
 
