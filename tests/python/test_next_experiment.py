@@ -67,10 +67,11 @@ def hidden(seed: int, *effects: str, **given: Any) -> tuple[Request, Experiment,
 
 
 def test_what_is_recommended_leaves_one_name() -> None:
-    """A drift of either friction, alike within minutes: the rig does what was recommended."""
+    """Drifts that are alike within minutes: the rig does what was recommended."""
     request, records, before = hidden(1000018, "viscous_drift", size=0.08, free=3)
     assert before.verdict == "ambiguous"
-    assert before.equivalent == [["viscous_drift", "coulomb_drift"]]
+    drifts = ["viscous_drift", "coulomb_drift", "natural_frequency_drift"]
+    assert before.equivalent == [drifts]
     outlook, best = before.advice.outlook, before.advice.best
     assert outlook is not None
     assert best is not None

@@ -174,8 +174,8 @@ class Search:
 
     def _at_end(self, best: Found) -> bool:
         """Whether a model leaves no more than chance, and is no beginning that led nowhere."""
-        tried = any(attempt.accepted for attempt in self.attempts)
-        return best.trial.remainder.chance > LEFT and bool(best.trial.chosen or not tried)
+        begun = any(attempt.accepted for attempt in self.attempts)
+        return best.trial.remainder.chance > LEFT and bool(best.trial.chosen or not begun)
 
     def _beginnings(self, best: Found) -> list[Found]:
         """Return other beginnings than the one that led to a model: the best pair and effects."""
