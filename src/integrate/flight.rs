@@ -33,7 +33,7 @@ const PAUSE: f64 = 1e-9;
 /// A piece of a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub enum Piece {
-    /// Moving, in one step: [`Flight::leap`].
+    /// Moving, in one step: `Flight::leap`.
     Leap,
     /// At rest between two times.
     Rest(f64, f64),

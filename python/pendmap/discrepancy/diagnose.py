@@ -15,6 +15,7 @@ from pendmap.discrepancy.functions import FunctionScore, divided, function_score
 from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.horizon import Forecast, forecasts_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
+from pendmap.discrepancy.physical import physical
 from pendmap.discrepancy.runs import RunByRun, run_by_run
 from pendmap.discrepancy.select import Attempt, Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
@@ -128,6 +129,11 @@ class Discrepancy(Readable):
     def adds(self) -> bool:
         """Whether the best model is another than the baseline."""
         return self.best is not self.base
+
+    @functools.cached_property
+    def usable(self) -> Found:
+        """The best model without negative damping, as a file can hold it."""
+        return physical(self.evidence, self.best)
 
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:

@@ -103,7 +103,7 @@ def evidence_of(experiment: Experiment) -> Evidence:
     Raises
     ------
     InputError
-        If no run has samples, nothing moves, or all are held back.
+        If no run has samples, nothing moves, a forced run has no drive, or all are held back.
     """
     runs = tuple(run for run in experiment.runs if not run.peaks_only)
     if not runs:
@@ -121,6 +121,12 @@ def evidence_of(experiment: Experiment) -> Evidence:
         raise InputError(
             f"{rated[0].name}: its angle is a velocity integrated, whose errors add up: allowed is"
             " a record with an angle"
+        )
+    adrift = [run for run in runs if run.kind == "forced" and not (run.drive or run.pivot)]
+    if adrift:
+        raise InputError(
+            f"{adrift[0].name}: is forced, and nothing says what drives it: allowed is a run with"
+            " drive or pivot"
         )
     readings = tuple(
         reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.discrepancy.candidates import own_name
+from pendmap.discrepancy.physical import unphysical
 from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
@@ -19,13 +20,9 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.verdict import Judgement
-    from pendmap.identification.fitting import TrajectoryFit
     from pendmap.model import Formula, Rig
 
-__all__ = ["Z95", "NamedEffect", "diagnosed_model", "named_effects", "unphysical"]
-
-OPPOSING: Final = ("c_over_m", "Tr")
-"""Coefficients of the damping and the friction that oppose the motion wherever it is."""
+__all__ = ["Z95", "NamedEffect", "diagnosed_model", "named_effects"]
 
 Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""
@@ -140,8 +137,9 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
 
     Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
     fitted, widened as those intervals are, ``[provenance]`` the records with their SHA-256, the
-    version, the command and the verdict. A negative damping is set to 0 in the model, which
-    ``[provenance]`` says.
+    version, the command and the verdict. A damping that the records make negative is 0 in the
+    model, the rest fitted again with it (:mod:`pendmap.discrepancy.physical`), and
+    ``[provenance]`` says what it was.
 
     Parameters
     ----------
@@ -150,10 +148,14 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     command : str
         How it was called.
     """
-    fit = found.best.trial.fit
+    usable = found.usable
+    fit = usable.trial.fit
     model = fit.model
-    covariance = found.best.trial.widening * fit.covariance
-    named = {effect.name: effect.effect for effect in found.effects}
+    covariance = usable.trial.widening * fit.covariance
+    claimed = found.effects
+    if claimed and usable is not found.best:
+        claimed = named_effects(found.evidence, usable, found.judgement)
+    named = {effect.name: effect.effect for effect in claimed}
     own = {own_name(name) for name in named} - {None}
     kept = tuple(e for e in model.effects if e.name not in named)
     runs = [found.evidence.runs[k] for k in dict.fromkeys(found.evidence.fitted_of)]
@@ -167,7 +169,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         "provenance": provenance(files, command)
         | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
     }
-    negative = unphysical(fit)
+    negative = unphysical(found.best.trial.fit)
     if negative:
         notes["provenance"]["unphysical"] = negative
     return dataclasses.replace(
@@ -179,14 +181,6 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         else (model.Omega or 1.0),
         notes=notes,
     )
-
-
-def unphysical(fit: TrajectoryFit) -> dict[str, float]:
-    """Return the coefficients of damping and friction that a fit made negative, with their values.
-
-    No pendulum has them: a negative one feeds the motion. They make up for what the model lacks.
-    """
-    return {n: fit[n] for n in OPPOSING if n in fit.estimates and fit[n] < 0}
 
 
 def _called(name: str, named: dict[str, Effect]) -> str:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.discrepancy.named import unphysical
+from pendmap.discrepancy.physical import unphysical
 from pendmap.records.summary import findings_said
 
 if TYPE_CHECKING:
@@ -23,6 +23,18 @@ SAID: Final = {
     "ambiguous": "ambiguous: these records do not tell the effects of a class apart",
     "unknown": "unknown: something is missing that no effect of the library explains",
 }
+
+PLACES: Final[dict[str, str]] = {
+    "angle": "at an angle of",
+    "velocity": "at a velocity of",
+    "amplitude": "at an amplitude of",
+    "drive_phase": "at a phase of the drive of",
+    "lab_time": "at a time in the laboratory of",
+}
+"""Where a torque is missing, in words."""
+
+WHERE: Final = 3
+"""Places of a residual torque that are told."""
 
 RANKED: Final = 8
 """Candidates that the table of scores shows."""
@@ -229,13 +241,18 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         f"{gap.held_out_after:.4g} after"
     )
     if judgement.standings:
-        yield f"Share of the gap closed by what is nearest: {judgement.closed:.0%}"
+        yield f"Share of the squared gap closed by what is nearest: {judgement.closed:.0%}"
     for name, value in unphysical(found.best.trial.fit).items():
-        yield f"{name} is {value:.3g}, unphysical: no pendulum feeds its own motion"
-    for row in found.where[:3]:
+        yield (
+            f"{name} is {value:.3g}, unphysical: no pendulum feeds its own motion; the model file "
+            f"has 0 there and the rest fitted again, residual {found.usable.trial.fit.rms:.4g} rad"
+        )
+    # Of each thing that it may go by the clearest place: neighbours say the same.
+    clearest = {row["over"]: row for row in reversed(found.where)}
+    for row in sorted(clearest.values(), key=lambda row: -abs(row["z"]))[:WHERE]:
         what = "torque along the motion" if row["along_motion"] else "torque"
         yield (
-            f"Where: {what} of {row['torque']:.3g} rad/s^2 lacks at {row['over']} "
+            f"Where: a {what} of {row['torque']:.3g} rad/s^2 is missing {PLACES[row['over']]} "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
         )
     for score in found.functions:
@@ -244,4 +261,4 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             f"it, G = {score.gain:.1f}; {score.left:.1f} beside the effects found"
         )
     yield f"Next: {found.advice.next_experiment}"
-    yield from findings_said(found.evidence.experiment)
+    yield from findings_said(found.evidence.experiment, *found.evidence.runs)

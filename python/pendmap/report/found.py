@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.named import unphysical
-from pendmap.discrepancy.rivals import ALIKE
+from pendmap.discrepancy.physical import unphysical
 from pendmap.discrepancy.select import GATE
 from pendmap.discrepancy.strength import strength_of
 from pendmap.discrepancy.summary import ranking_table
@@ -204,7 +203,7 @@ def _why(rival: Rival) -> str:
     if rival.contains:
         return "has it as a special case and gains no more"
     if rival.alike:
-        return f"not told apart: behind by less than {ALIKE:g}"
+        return f"not told apart: behind by less than {rival.margin:.3g}"
     return "refitted, explains less" if rival.refitted else "scored, explains less"
 
 
@@ -239,12 +238,18 @@ def run_by_run(found: Discrepancy) -> Section:
                 )
             ),
             Table(
-                ("run", f"value ({label})" if label else "value", "standard error"),
+                (
+                    "run",
+                    f"value ({label})" if label else "value",
+                    "standard error, the others held",
+                ),
                 tuple((Name(n), written(v, e), f"{e:.2g}") for n, v, e in shown),
             ),
         ]
         if blind:
             blocks.append(Paragraph(("It does not show in ", *joined(blind), ".")))
     if sizes:
-        blocks.append(Picture("runs", "Each run's own value, with bars of 95 %."))
+        blocks.append(
+            Picture("runs", "Each run's own value, the other parameters held, with bars of 95 %.")
+        )
     return Section("Run by run", tuple(blocks))

@@ -30,14 +30,6 @@ SAID: Final = {
 RARE: Final = 1e-9
 """Probabilities below this say no more than that."""
 
-PLACES: Final[dict[str, str]] = {
-    "angle": "at an angle of",
-    "velocity": "at a velocity of",
-    "amplitude": "at an amplitude of",
-    "drive_phase": "at a phase of the drive of",
-    "lab_time": "at a time in the laboratory of",
-}
-
 
 def verdict(found: Discrepancy) -> Section:
     """Return the verdict with its probability, and what it rests on."""

@@ -119,7 +119,7 @@ def lead(found: Discrepancy) -> Parts:
     if found.verdict == "partial":
         verb = "They close" if len(found.effects) > 1 else "It closes"
         end = f", and something more. {verb} {share(closed)} of the squared gap, {to}; {noise}."
-        return (Strong("The model lacks"), " ", *names, end)
+        return (Strong("What the model lacks is nearly"), " ", *names, end)
     near: Parts = ()
     if nearest:
         verb = "close" if len(nearest) > 1 else "closes"
