@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.discrepancy.summary import PLACES
 from pendmap.discrepancy.torque import STANDS_OUT
 from pendmap.discrepancy.verdict import CHANCE
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
