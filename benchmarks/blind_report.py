@@ -14,6 +14,7 @@ import numpy as np
 
 from blind_answer import family
 from blind_difficulty import CLEAR
+from pendmap.model.effects import library
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -66,8 +67,14 @@ def sizes(row: Row) -> list[int]:
 
 
 def right(row: Row) -> bool:
-    """Whether as many effects are claimed as are hidden, each by name or in its class."""
-    return sound(row) and len(row["named"]) == len(true_names(row))
+    """Whether as many effects are claimed as are hidden, each by name or in its class.
+
+    Two that are each other's exact equals are one effect to these records: one class with both.
+    """
+    hidden = true_names(row)
+    if len(hidden) > 1 and set(hidden) <= set(row["equals"]):
+        return len(row["named"]) == 1 and set(hidden) <= classes(row)[0]
+    return sound(row) and len(row["named"]) == len(hidden)
 
 
 def sound(row: Row) -> bool:
@@ -196,12 +203,16 @@ def reserved(row: Row) -> bool:
 
 
 def of_family(row: Row) -> bool:
-    """Whether the strongest effect that is claimed may be of the family of what is hidden."""
+    """Whether the strongest effect that is claimed may be of the family of what is hidden.
+
+    What is hidden has the families of its exact equals too: no record tells which it is.
+    """
     if not row["named"]:
         return False
+    kin = {family(name) for name in row["equals"] if name in library()} | set(row["families"])
     gains = [standing["gain"] for standing in row["standings"]]
     own = classes(row)[int(np.argmax(gains))]
-    return any(family(name) in row["families"] for name in own)
+    return any(family(name) in kin for name in own)
 
 
 def _parameters(rows: Iterable[Row]) -> tuple[list[bool], list[float]]:
