@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import os
@@ -15,12 +16,13 @@ import click
 from pendmap.cli.options import check_view
 from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
 from pendmap.cli.types import OutputFile, ReportFile, Whole
+from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from pendmap.discrepancy import Discrepancy
-    from pendmap.model import Rig
+    from pendmap.model import Formula, Rig
 
 __all__ = ["command"]
 
@@ -37,7 +39,10 @@ NAME = "diagnose"
     help="Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
 )
 @click.option(
-    "--max-effects", type=Whole(0, 6), default=3, help="Effects added at most.  [default: 3]"
+    "--max-effects",
+    type=Whole(0, 6),
+    default=3,
+    help="Effects added at most, 0 to 6.  [default: 3]",
 )
 @click.option(
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
@@ -90,13 +95,13 @@ def command(  # noqa: PLR0913 (an option each)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.discrepancy import diagnose
     from pendmap.model import load_formulas
-    from pendmap.model.effects import definition
     from pendmap.records import read_experiment
 
     own = [] if effects_path is None else load_formulas(effects_path)
-    for name in without:
-        if name not in {formula.name for formula in own}:
-            definition(name)
+    with _named(str(effects_path)):
+        _check_candidates(own)
+    with _named("--without"):
+        _check_known(without, own)
     if not (out or plot or report or rerun or view or as_json):
         plot, report, rerun = (_own(suffix) for suffix in (".png", ".html", ".rrd"))
     if view:
@@ -127,6 +132,29 @@ def command(  # noqa: PLR0913 (an option each)
         click.echo("Written: " + ", ".join(written))
     if view and rerun is not None:
         open_recording(rerun)
+
+
+@contextlib.contextmanager
+def _named(where: str) -> Iterator[None]:
+    """Say where it was that something is not allowed."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _check_candidates(own: Sequence[Formula]) -> None:
+    from pendmap.discrepancy.candidates import checked_own
+
+    checked_own(own)
+
+
+def _check_known(names: Sequence[str], own: Sequence[Formula]) -> None:
+    from pendmap.model.effects import definition
+
+    for name in names:
+        if name not in {formula.name for formula in own}:
+            definition(name)
 
 
 def _own(suffix: str) -> Path:
