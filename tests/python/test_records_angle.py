@@ -55,27 +55,6 @@ def test_a_gauge_is_turned_back(tmp_path: Path, quarters: int) -> None:
     np.testing.assert_allclose(run.theta, theta, atol=1e-5)
 
 
-def test_outliers_are_marked_and_nothing_else(tmp_path: Path) -> None:
-    time, theta = clean()
-    at = np.random.default_rng(3).choice(np.arange(20, 1980), 20, replace=False)
-    theta[at] += np.random.default_rng(4).choice([-1, 1], 20) * 0.4
-    run = read(tmp_path, text((time, theta)))
-    assert set(np.flatnonzero(~run.trusted)) == set(at)
-    np.testing.assert_allclose(run.theta, theta, atol=1e-6)
-
-
-def test_outliers_of_the_virtual_rig_do_not_spoil_its_noise(tmp_path: Path) -> None:
-    time, theta, _ = motion(duration=40.0)
-    rng = np.random.default_rng(8)
-    readings = noisy(theta, 0.002)
-    false = rng.random(time.size) < 0.01
-    readings[false] += rng.uniform(0.2, math.pi, int(false.sum()))
-    run = read(tmp_path, text((time, readings)))
-    assert np.mean(run.trusted[~false]) > 0.995
-    assert np.mean(~run.trusted[false]) > 0.95
-    assert pendmap.noise_floor(run).sigma == pytest.approx(0.00205, rel=0.06)
-
-
 def test_missed_counts_are_found_where_they_are(tmp_path: Path) -> None:
     time, theta = clean()
     run = read(tmp_path, text((time, theta + 30 * COUNT * (time > 12))))

@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records.false_ends import false_ends
 from pendmap.records.local_fit import POINTS, local_fit
 from pendmap.records.noise import DEGREES
 from pendmap.records.robust import broad_scale, normal_scale
 from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
+    _Group = slice | NDArray[np.intp]
 
-__all__ = ["find", "find_spikes"]
+__all__ = ["MOST_SPIKES", "SIDE", "SPIKE", "find"]
 
 SPIKE: Final = 10.0
 """Local standard deviations of a residual that are looked into. White noise reaches 6 once in
@@ -48,6 +48,9 @@ SIDE: Final = 10
 
 TOGETHER: Final = 6
 """False samples that may stand together and be told from the motion."""
+
+STEPS: Final = 10
+"""Of the weights, until what is far has none."""
 
 CLEAR: Final = 7.0
 """Standard errors that make a jump."""
@@ -76,38 +79,6 @@ class _Jump:
     error: float
 
 
-def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[tuple[int, int]]) -> None:
-    """Mark readings of another kind that are far from their neighbours, and say so.
-
-    An accelerometer may jump, where friction turns round; what does not come back is not looked
-    into. It does jump where a hand lets go or takes hold, at the ends of the ``free`` swings
-    (first place and the one after the last), and outside of them nothing is fitted.
-    """
-    from scipy.ndimage import maximum_filter1d
-
-    if work.time.size < 2 * POINTS:
-        return
-    fit = local_fit(work.time, values)
-    size = np.abs(fit.residual)
-    if size.size < POINTS:
-        return
-    # What is false shows in every window that it is part of, most in its own.
-    highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
-    at = fit.middle[(size > 2 * SPIKE * broad_scale(size)) & (size >= highest)]
-    inside = np.zeros(values.size, bool)
-    for low, high in free:
-        begin = low + POINTS if low else 0
-        inside[begin : high if high == values.size else high - POINTS] = True
-    at = at[inside[at]]
-    if not at.size or at.size > MOST_SPIKES * values.size:
-        return
-    near = np.array([np.median(values[max(k - SIDE, 0) : k + SIDE + 1]) for k in at])
-    worst = float(np.max(np.abs(values[at] - near)))
-    work.trusted[at] = False
-    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} {unit}: not for fitting"
-    work.say("outliers", text, at=at)
-
-
 def find(work: Work) -> None:
     """Mark outliers; mend jumps by whole counts, of others keep the longest part; and say so."""
     if work.time.size < 2 * POINTS:
@@ -116,30 +87,58 @@ def find(work: Work) -> None:
     bad = ~work.trusted
     if bad.all():
         return
-    theta[bad] = np.interp(work.time[bad], work.time[~bad], theta[~bad])
+    _bridge(work.time, theta, bad)
     false, jumps = np.zeros(theta.size, bool), list[_Jump]()
     # Around what is clipped or frozen already the motion has corners of its own.
-    seen = np.convolve(bad, np.ones(2 * SIDE + 1), "same") > 0.5
+    corner = np.convolve(bad, np.ones(2 * SIDE + 1), "same") > 0.5
+    seen = corner.copy()
     for _ in range(PASSES):
         at, scale = _suspects(work, theta)
         at, scale = at[~seen[at]], scale[~seen[at]]
-        if not at.size:
-            break
         if at.size + np.count_nonzero(false) > MOST_SPIKES * theta.size:
             text = f"more than {100 * MOST_SPIKES:.0f} % of the samples contradict their neighbours"
             work.say("not-smooth", text)
             return
-        for k, sigma in zip(at.tolist(), scale.tolist(), strict=True):
-            group, jump = _judge(work.time, theta, k, sigma, work.count)
+        told = _told(work, theta, at, scale)
+        if not told:
+            break
+        for k, group, jump in told:
+            seen[k] = True
             false[group] = True
             if jump is not None:
                 jumps.append(jump)
                 theta[jump.at :] -= jump.size
-            seen[k] = True
-        if not false.all():
-            theta[false] = np.interp(work.time[false], work.time[~false], theta[~false])
+        _bridge(work.time, theta, false)
+    false |= ~corner & false_ends(work.time, theta, ~(bad | false), SPIKE, work.count)
+    _bridge(work.time, theta, false)
     _outliers(work, theta, false, jumps)
     _moved(work, sorted(jumps, key=lambda jump: jump.at))
+
+
+def _bridge(time: Floats, theta: Floats, false: NDArray[np.bool_]) -> None:
+    """Put straight lines where samples are false."""
+    if not false.all():
+        theta[false] = np.interp(time[false], time[~false], theta[~false])
+
+
+def _told(
+    work: Work, theta: Floats, at: NDArray[np.intp], scale: Floats
+) -> list[tuple[int, _Group, _Jump | None]]:
+    """Return suspects with what is false around them, those that can be told already.
+
+    What is not told beside another false sample is looked at again once that one is mended; so is
+    a jump, which some outliers together may look like.
+    """
+    verdicts = [
+        (k, *_judge(work.time, theta, k, sigma, work.count))
+        for k, sigma in zip(at.tolist(), scale.tolist(), strict=True)
+    ]
+    spikes = np.array([k for k, group, jump in verdicts if jump is None and theta[group].size])
+    return [
+        (k, group, jump)
+        for k, group, jump in verdicts
+        if (k in spikes if jump is None else not np.any(np.abs(spikes - k) <= 2 * SIDE))
+    ]
 
 
 def _suspects(work: Work, theta: Floats) -> tuple[NDArray[np.intp], Floats]:
@@ -171,7 +170,7 @@ def _degree(time: Floats, theta: Floats) -> tuple[int, int]:
 
 def _judge(
     time: Floats, theta: Floats, k: int, sigma: float, count: float
-) -> tuple[slice | NDArray[np.intp], _Jump | None]:
+) -> tuple[_Group, _Jump | None]:
     """Return which samples around ``k`` are false, and the jump there, if there is one."""
     low, high = max(k - SIDE, 0), min(k + SIDE + 1, theta.size)
     t, part = time[low:high] - time[k], theta[low:high] - theta[k]
@@ -184,6 +183,11 @@ def _judge(
     if not odd.size:
         return slice(0), None
     first, last = int(odd[0]), int(odd[-1])
+    # The other half of an outlier that stands just beyond.
+    while first > 0 and away[first - 1] > limit:
+        first -= 1
+    while last + 1 < away.size and away[last + 1] > limit:
+        last += 1
     group = slice(low + first + 1, low + last + 1)
     before, after = slice(0, first + 1), slice(last + 1, part.size)
     if min(first + 1, part.size - last - 1) < 4:
@@ -196,8 +200,9 @@ def _judge(
     jumped = np.concatenate([np.zeros(first + 1), np.ones(part.size - last - 1)])
     columns = np.column_stack([np.vander(x, 4), jumped])
     values = np.concatenate([part[before], part[after]])
-    answer = np.linalg.lstsq(columns, values, rcond=None)[0]
-    rest = float(np.sqrt(np.mean((values - columns @ answer) ** 2)))
+    # By least absolute distances: other false samples may be near.
+    answer = _least_absolute(columns, values)
+    rest = normal_scale(values - columns @ answer)
     gain = math.sqrt(float(np.linalg.pinv(columns.T @ columns)[-1, -1]))
     error = gain * max(sigma, rest, count / math.sqrt(12))
     size = float(answer[-1])
@@ -205,22 +210,30 @@ def _judge(
         return group, _Jump(low + last + 1, size, error)
     # Between two outliers there may be samples that are sound.
     inner = slice(first + 1, last + 1)
-    bridged = np.abs(part[inner] - np.vander(t[inner] / width, 4) @ answer[:-1])
-    return low + first + 1 + np.flatnonzero(bridged > 5 * error / gain + count), None
+    off = np.abs(_smooth(t, part))
+    far = 5 * max(sigma, normal_scale(off), count / math.sqrt(12)) + count
+    return low + first + 1 + np.flatnonzero(off[inner] > far), None
 
 
 def _smooth(x: Floats, y: Floats) -> Floats:
     """Return what ``y`` is away from the cubic of least absolute distances."""
     columns = np.vander(x / max(float(np.max(np.abs(x))), 1e-300), 4)
+    return y - columns @ _least_absolute(columns, y)
+
+
+def _least_absolute(columns: Floats, y: Floats) -> Floats:
+    """Return the coefficients of least absolute distances, by weighting squares again and again."""
     weights = np.ones(y.size)
-    away = y
-    for _ in range(10):
+    answer = np.zeros(columns.shape[1])
+    for _ in range(STEPS):
         weighted = columns * weights[:, None]
-        answer = np.linalg.lstsq(weighted.T @ columns, weighted.T @ y, rcond=None)[0]
-        away = y - columns @ answer
-        weights = 1 / np.maximum(np.abs(away), 1e-6 * float(np.max(np.abs(away))) + 1e-300)
+        answer = np.asarray(
+            np.linalg.lstsq(weighted.T @ columns, weighted.T @ y, rcond=None)[0], np.float64
+        )
+        away = np.abs(y - columns @ answer)
+        weights = 1 / np.maximum(away, 1e-6 * float(np.max(away)) + 1e-300)
         weights /= float(np.max(weights))
-    return away
+    return answer
 
 
 def _outliers(work: Work, theta: Floats, false: NDArray[np.bool_], jumps: list[_Jump]) -> None:

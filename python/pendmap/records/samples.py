@@ -12,6 +12,7 @@ from pendmap.records import false_samples
 from pendmap.records.gyroscope import angle_of_rate
 from pendmap.records.noise import noise_of
 from pendmap.records.runs_of import equal_runs
+from pendmap.records.spikes import find_spikes
 from pendmap.records.steps import step_of
 from pendmap.records.swinging import swinging
 from pendmap.words import counted
@@ -44,13 +45,13 @@ def check(work: Work) -> None:
         # What may be false is the acceleration: the angle made of it has corners of its own.
         readings = work.extra["acceleration"]
         moves = swinging(work.time, readings, noise_of(work.time, readings).sigma)
-        false_samples.find_spikes(work, readings, work.made_of.unit, moves.free)
+        find_spikes(work, readings, work.made_of.unit, moves.free)
         return
     if work.integrated:
         rate = work.extra["velocity"]
         read = dataclasses.replace(work, theta=rate, count=step_of(rate))
         _clipped(read, "rad/s")
-        false_samples.find_spikes(work, rate, "rad/s", [(0, rate.size)])
+        find_spikes(work, rate, "rad/s", [(0, rate.size)])
         work.theta = angle_of_rate(work.time, rate, work.trusted)
         return
     work.seen = step_of(work.theta)
