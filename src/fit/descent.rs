@@ -13,6 +13,12 @@ const FIRST_DAMPING: f64 = 1e-4;
 const GROWTH: f64 = 8.0;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e8;
+/// Times that a descent may go up to come down elsewhere ...
+const CROSSINGS: usize = 2;
+/// ... in so many steps ...
+const UPHILL: usize = 3;
+/// ... and to so many times the sum of squares.
+const STEEP: f64 = 100.0;
 
 /// A point of the search.
 #[derive(Clone, Debug)]
@@ -86,7 +92,7 @@ pub fn descend(
     limit: Limit,
     cancel: &AtomicBool,
 ) -> Result<Outcome, Error> {
-    let (mut damping, mut steps) = (0.0, 0);
+    let (mut damping, mut steps, mut crossings) = (0.0, 0, CROSSINGS);
     loop {
         if cancel.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
@@ -101,11 +107,19 @@ pub fn descend(
             }
             return Ok(Outcome { steps: steps + 1, converged: true });
         }
-        if steps == limit.steps {
+        if steps >= limit.steps {
             return Ok(Outcome { steps, converged: false });
         }
         steps += 1;
-        match point.moved(problem, &step) {
+        let next = point.moved(problem, &step);
+        let across = match &next {
+            Some(high) if damping == 0.0 && high.normal.chi2 >= chi2 && crossings > 0 => {
+                crossings -= 1;
+                across(problem, high, held, chi2, &mut steps)
+            }
+            _ => None,
+        };
+        match across.or(next) {
             Some(next) if next.normal.chi2 < chi2 => {
                 let fair = chi2 - next.normal.chi2 > 0.25 * step.gain;
                 *point = next;
@@ -124,4 +138,30 @@ pub fn descend(
             }
         }
     }
+}
+
+/// Whole steps, from where one has led up, until they lead below `chi2`.
+///
+/// Out of a valley that is narrow and bent the way leads over its side, where steps that only lead
+/// down creep along the bottom (the watchdog of Chamberlain, Powell, Lemarechal & Pedersen 1982,
+/// Mathematical Programming Studies 16, 1).
+fn across(
+    problem: &Problem,
+    high: &Point,
+    held: &[usize],
+    chi2: f64,
+    steps: &mut usize,
+) -> Option<Point> {
+    let mut point = high.clone();
+    for _ in 0..UPHILL {
+        if point.normal.chi2 > STEEP * chi2 {
+            return None;
+        }
+        *steps += 1;
+        point = point.moved(problem, &point.normal.step(0.0, held))?;
+        if point.normal.chi2 < chi2 {
+            return Some(point);
+        }
+    }
+    None
 }

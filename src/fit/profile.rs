@@ -16,7 +16,7 @@ use super::problem::Problem;
 use crate::error::Error;
 
 /// Steps toward one end.
-const MOST_STEPS: usize = 25;
+const MOST_STEPS: usize = 40;
 /// How near the sum of squares comes to the level, over the level.
 const NEAR: f64 = 0.01;
 
@@ -85,7 +85,8 @@ fn end(
             continue;
         };
         point = next;
-        shrink = 1.0;
+        // Along a bent ridge what was too far once soon is again.
+        shrink = (2.0 * shrink).min(1.0);
     }
     f64::NAN
 }

@@ -42,8 +42,8 @@ impl HarmonicDrive {
 
 /// The pivot's acceleration over gravity, with all that effects have added to the harmonic drive.
 ///
-/// Upward `p cos(a) + second cos(2 a + second_phase)` and, toward positive theta,
-/// `lateral cos(a + lateral_phase)`, where `a = omega tau + phase + chirp tau^2 / 2`.
+/// Upward `p cos(a) + second p cos(2 a + second_phase)` and, toward positive theta,
+/// `lateral p cos(a + lateral_phase)`, where `a = omega tau + phase + chirp tau^2 / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion<R> {
     /// Amplitude of the harmonic drive.
@@ -52,11 +52,11 @@ pub struct Motion<R> {
     pub omega: R,
     /// Its phase at `tau = 0`, rad.
     pub phase: R,
-    /// Amplitude at twice the frequency.
+    /// Amplitude at twice the frequency, over `p`.
     pub second: R,
     /// Its phase against the drive, rad.
     pub second_phase: R,
-    /// Amplitude of the sideways acceleration.
+    /// Amplitude of the sideways acceleration, over `p`.
     pub lateral: R,
     /// Its phase against the drive, rad.
     pub lateral_phase: R,
@@ -72,14 +72,14 @@ impl<R: Real> Motion<R> {
             return self.p * cosine(self.omega * tau + self.phase) + tau.like(1.0);
         }
         let angle = self.angle(tau);
-        let first = self.p * cosine(angle) + tau.like(1.0);
-        self.second * cosine(angle.scale(2.0) + self.second_phase) + first
+        let second = self.second * cosine(angle.scale(2.0) + self.second_phase);
+        self.p * (cosine(angle) + second) + tau.like(1.0)
     }
 
     /// The sideways acceleration.
     #[inline(always)]
     pub fn sideways(&self, tau: R) -> R {
-        self.lateral * cosine(self.angle(tau) + self.lateral_phase)
+        self.p * self.lateral * cosine(self.angle(tau) + self.lateral_phase)
     }
 
     #[inline(always)]

@@ -440,7 +440,6 @@ impl Equation<f64> {
     /// Whether nothing changes with the drive's phase: the pivot rests.
     #[must_use]
     pub fn is_autonomous(&self) -> bool {
-        let motion = &self.motion;
-        motion.p == 0.0 && motion.second == 0.0 && motion.lateral == 0.0 && !self.asks_for_phase()
+        self.motion.p == 0.0 && !self.asks_for_phase()
     }
 }

@@ -196,7 +196,7 @@ impl Pendulum {
             further += share;
             own += if drifts { share } else { 0.0 };
         }
-        own + further * (motion.p.abs() + motion.second.abs()) + motion.lateral.abs()
+        own + motion.p.abs() * (further * (1.0 + motion.second.abs()) + motion.lateral.abs())
     }
 
     /// The unit of "periods": `2 pi / omega`, or `2 pi` without drive.

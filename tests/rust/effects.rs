@@ -145,11 +145,11 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
         ("drive_amplitude", [e]) => up = drive(p * (1.0 + e), omega, phase),
         ("drive_phase", [d]) => up = drive(p, omega, phase + d),
         ("drive_frequency", [e]) => up = drive(p, omega * (1.0 + e), phase),
-        ("drive_second_harmonic", [amplitude, psi]) => {
-            up += amplitude * (2.0 * (omega * t + phase) + psi).cos();
+        ("drive_second_harmonic", [e, psi]) => {
+            up += e * p * (2.0 * (omega * t + phase) + psi).cos();
         }
-        ("lateral_drive", [amplitude, psi]) => {
-            side = amplitude * (omega * t + phase + psi).cos();
+        ("lateral_drive", [e, psi]) => {
+            side = e * p * (omega * t + phase + psi).cos();
         }
         ("asymmetric_coulomb", [d]) => own = -d * sign.abs(),
         ("rough_spot", [f, th0, w]) => {

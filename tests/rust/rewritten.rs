@@ -24,7 +24,6 @@ pub fn term(kind: Kind) -> Option<&'static str> {
         "magnet" => "-amplitude*(wrap(theta)/width)*exp(-wrap(theta)^2/(2*width^2))",
         "elastic_restoring" => "-k*theta",
         "natural_frequency_drift" => "-r*t*w0^2*(1 + a)*sin(theta)",
-        "lateral_drive" => "-w0^2*amplitude*cos(phase + psi)*cos(theta)",
         _ => return None,
     })
 }

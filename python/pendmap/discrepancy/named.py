@@ -11,6 +11,7 @@ import numpy as np
 from pendmap.discrepancy.candidates import own_name
 from pendmap.discrepancy.physical import unphysical
 from pendmap.identification.conversion import interval
+from pendmap.identification.fitting import fit_runs
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.diagnose import Discrepancy
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
+    from pendmap.discrepancy.trial import Trial
     from pendmap.discrepancy.verdict import Judgement
     from pendmap.model import Formula, Rig
 
@@ -80,14 +82,14 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
     Parameters
     ----------
     evidence : Evidence
-        The records.
+        The records, for intervals from the profile of the likelihood.
     best : Found
         The model.
     judgement : Judgement
         Its standing.
     """
-    del evidence
     widening = math.sqrt(best.trial.widening)
+    profiled = _profiled(evidence, best.trial)
     named = []
     for standing in judgement.standings:
         candidate = standing.candidate
@@ -98,6 +100,7 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
             for n, error in errors.items()
             if math.isfinite(half := Z95 * widening * error)
         }
+        ci95 |= profiled.get(candidate.name, {})
         named.append(
             NamedEffect(
                 candidate.name,
@@ -109,6 +112,45 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
             )
         )
     return tuple(named)
+
+
+def _profiled(evidence: Evidence, trial: Trial) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return the intervals, from the profile of the likelihood, of effects with a shape.
+
+    Size and shape are found along a bent ridge: a warming of half the time constant does nearly
+    the same with another size. Elsewhere the covariance says the same for less.
+    """
+    wanted = {
+        f"{c.name}.{name}": (c.name, name)
+        for c in trial.chosen
+        if c.adapted and c.phase is None
+        for name in (c.size, *c.shape)
+    }
+    names = [name for name in wanted if name in trial.fit.names and name not in trial.fit.mixed]
+    if not names or not trial.fit.converged:
+        return {}
+    found = fit_runs(
+        evidence.fitted,
+        trial.fit.model,
+        trial.free,
+        start=trial.start,
+        windows=trial.fit.windows,
+        profiled=names,
+    )
+    wider = math.sqrt(trial.widening / found.widening)
+    intervals: dict[str, dict[str, tuple[float, float]]] = {}
+    for key in names:
+        effect, name = wanted[key]
+        value = found[key]
+        half = Z95 * math.sqrt(trial.widening) * (trial.fit.estimates[key].stderr or math.inf)
+        # Where the ridge folds back there may be no end to be found: the covariance has one.
+        low, high = (
+            value + wider * (end - value) if math.isfinite(end) else value + side * half
+            for end, side in zip(found.ends[key], (-1, 1), strict=True)
+        )
+        if math.isfinite(low) and math.isfinite(high):
+            intervals.setdefault(effect, {})[name] = low, high
+    return intervals
 
 
 def _values(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:

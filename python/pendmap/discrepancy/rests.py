@@ -20,6 +20,10 @@ __all__ = ["Rests"]
 LESS_STEPS: Final = 16
 """Steps of a fit without one of the effects: beyond them a model that is wrong only creeps."""
 
+NEAR: Final = 0.1
+"""Part of all that was gained: an effect without which less is lost may be idle, and what stays is
+fitted to the end."""
+
 
 class Rests:
     """Fits without one of the effects that were added; what was computed once is not again.
@@ -66,10 +70,26 @@ class Rests:
             rest = min((rest, known), key=lambda t: t.chi2)
         elif not rest.fit.converged:
             rest = self._refits.unslipped(rest)
+        if not rest.fit.converged and rest.chi2 - trial.chi2 < NEAR * (self.base.chi2 - trial.chi2):
+            rest = self._settled(rest)
         if rest.chi2 <= self.base.chi2:
             return rest
         # It can do all that the baseline does: it was lost, and begins again from there.
         return min((rest, self._from_base(trial, chosen)), key=lambda t: t.chi2)
+
+    def _settled(self, rest: Trial) -> Trial:
+        """Return a fit with all the steps that it wants."""
+        try:
+            return fitted(
+                self._evidence,
+                rest.fit.model,
+                rest.free,
+                rest.chosen,
+                start=rest.start,
+                windows=rest.fit.windows,
+            )
+        except InputError:
+            return rest
 
     def _from_base(self, trial: Trial, chosen: tuple[Candidate, ...]) -> Trial:
         """Fit some of a trial's effects from the baseline, where they are nearly nothing."""

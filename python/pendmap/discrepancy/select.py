@@ -170,7 +170,7 @@ class Search:
                 best = min((best, further), key=lambda found: found.trial.bic(self.level()))
                 if self._at_end(best):
                     break
-        return self._without_idle(best) if len(best.trial.chosen) > 1 else best
+        return self.settled(self._without_idle(best) if len(best.trial.chosen) > 1 else best)
 
     def _at_end(self, best: Found) -> bool:
         """Whether a model leaves no more than chance, and is no beginning that led nowhere."""
@@ -227,6 +227,8 @@ class Search:
                 start=trial.start,
                 windows=trial.fit.windows,
             )
+            if not full.fit.converged:
+                full = self._refits.unslipped(full, lost=True)
             return Found(full, tried(self.evidence, full))
         except InputError:
             return found

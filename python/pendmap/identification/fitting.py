@@ -45,6 +45,8 @@ class TrajectoryFit:
         Of the free parameters, in SI; standard errors from the covariance, intervals from the
         profile of the likelihood, but for those that are ``mixed``. A name with ``[k]`` belongs to
         run ``k`` alone.
+    ends : mapping of str to (float, float)
+        The ends of their intervals, one of which may not have been found: no number.
     names : tuple of str
         The free parameters, in the order of the covariance.
     covariance : ndarray of float, shape (k, k)
@@ -84,6 +86,7 @@ class TrajectoryFit:
     """
 
     estimates: Mapping[str, Estimate]
+    ends: Mapping[str, tuple[float, float]]
     names: tuple[str, ...]
     covariance: NDArray[np.float64]
     chi2: float
@@ -280,13 +283,16 @@ def _result(
     }
     profiled = [k for k in chosen if k not in unknown.mixed]
     for k, ends in zip(profiled, found["intervals"], strict=True):
-        both = (unknown.given([*bare[:k], end, *bare[k + 1 :]])[k] for end in ends)
-        low, high = sorted(float(end) for end in both)  # the unit of a bias may be negative
+        both = [float(unknown.given([*bare[:k], end, *bare[k + 1 :]])[k]) for end in ends]
+        # The unit of a bias may be negative; an end that was not found is no number.
+        low = next((end for end in both if end < values[k]), math.nan)
+        high = next((end for end in both if end > values[k]), math.nan)
         intervals[k] = low, high
-    estimates = {}
+    estimates, ends = {}, {}
     for k, name in enumerate(unknown.names):
         low, high = intervals.get(k, (math.nan, math.nan))
         known = math.isfinite(low) and math.isfinite(high)
+        ends[name] = low, high
         estimates[name] = Estimate(float(values[k]), errors[k], (low, high) if known else None)
     curves, residuals, squares = [], [], 0.0
     for curve in found["runs"]:
@@ -295,6 +301,7 @@ def _result(
         squares += float(np.nansum(residuals[-1] ** 2))
     return TrajectoryFit(
         estimates=estimates,
+        ends=ends,
         names=tuple(estimates),
         covariance=covariance,
         chi2=found["chi2"],

@@ -11,15 +11,15 @@ impl Law for DriveSecondHarmonic {
         name: "drive_second_harmonic",
         group: Group::Drive,
         action: Action::FurtherDrive,
-        formula: "a = p cos(x) + amplitude cos(2 x + phase), x the drive's phase",
+        formula: "a = p cos(x) + e p cos(2 x + phase), x the drive's phase",
         parameters: &[
             Parameter {
-                name: "amplitude",
+                name: "e",
                 unit: "1",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
                 typical: [1e-3, 0.3],
-                meaning: "acceleration at twice the frequency over gravity",
+                meaning: "amplitude at twice the frequency over that of the drive",
             },
             Parameter {
                 name: "phase",
@@ -34,7 +34,7 @@ impl Law for DriveSecondHarmonic {
         mappable: Mappable::Yes,
     };
 
-    fn drive<R: Real>([amplitude, phase, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
-        (motion.second, motion.second_phase) = (*amplitude, *phase);
+    fn drive<R: Real>([e, phase, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+        (motion.second, motion.second_phase) = (*e, *phase);
     }
 }

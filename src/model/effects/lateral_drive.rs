@@ -11,15 +11,15 @@ impl Law for LateralDrive {
         name: "lateral_drive",
         group: Group::Drive,
         action: Action::FurtherDrive,
-        formula: "-amplitude cos(x + phase) cos(theta), x the drive's phase",
+        formula: "-e p cos(x + phase) cos(theta), x the drive's phase",
         parameters: &[
             Parameter {
-                name: "amplitude",
+                name: "e",
                 unit: "1",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
                 typical: [1e-3, 0.3],
-                meaning: "acceleration toward positive theta over gravity",
+                meaning: "amplitude toward positive theta over that of the drive",
             },
             Parameter {
                 name: "phase",
@@ -34,11 +34,11 @@ impl Law for LateralDrive {
         mappable: Mappable::Yes,
     };
 
-    fn drive<R: Real>([amplitude, phase, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
-        (motion.lateral, motion.lateral_phase) = (*amplitude, *phase);
+    fn drive<R: Real>([e, phase, ..]: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+        (motion.lateral, motion.lateral_phase) = (*e, *phase);
     }
 
-    fn keeps_mirror([amplitude, ..]: &[f64; MOST_PARAMETERS]) -> bool {
-        *amplitude == 0.0
+    fn keeps_mirror([e, ..]: &[f64; MOST_PARAMETERS]) -> bool {
+        *e == 0.0
     }
 }
