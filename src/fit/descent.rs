@@ -50,14 +50,15 @@ impl Point {
     /// The point a step further; none where it cannot be.
     #[must_use]
     pub fn moved(&self, problem: &Problem, step: &Step) -> Option<Self> {
-        let values: Vec<f64> = self.values.iter().zip(&step.values).map(|(a, b)| a + b).collect();
+        let all = || problem.ways.iter().zip(self.values.iter().zip(&step.values));
+        let part = all().map(|(way, (value, by))| way.part(*value, *by)).fold(1.0, f64::min);
+        let values = all().map(|(way, (value, by))| way.gone(*value, part * by)).collect();
         let mut windows = self.windows.clone();
         for (window, step) in windows.iter_mut().zip(&step.starts) {
-            window.start[0] += step[0];
-            window.start[1] += step[1];
+            window.start[0] += part * step[0];
+            window.start[1] += part * step[1];
         }
-        let normal = Normal::at(problem, &values, &windows)?;
-        Some(Self { values, windows, normal })
+        Self::new(problem, values, windows).ok()
     }
 }
 

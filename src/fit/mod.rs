@@ -6,6 +6,7 @@
 //! - [`counted`]: what readings rounded to counts say
 //! - [`linear`]: residuals of a window and their derivatives
 //! - [`normal`]: the equations of all windows, their initial states eliminated
+//! - [`way`]: how parameters go along a step, straight or in ratios
 //! - [`descent`]: Gauss-Newton steps with Levenberg's and Marquardt's damping
 //! - [`stages`]: from short windows to long ones
 //! - [`profile`]: intervals from the profile of the likelihood
@@ -22,6 +23,7 @@ pub mod problem;
 pub mod profile;
 pub mod rod_sensor;
 pub mod stages;
+pub mod way;
 pub mod window;
 
 pub use problem::{Counts, Free, Problem, Record, Slot};

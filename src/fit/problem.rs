@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::counted::surplus;
 use super::rod_sensor::RodSensor;
+use super::way::Way;
 use crate::error::Error;
 use crate::integrate::course::greatest_rate;
 use crate::lanes::Path;
@@ -104,6 +105,8 @@ pub struct Problem {
     pub records: Vec<Record>,
     /// The free parameters.
     pub free: Vec<Free>,
+    /// How each of them goes along a step.
+    pub ways: Vec<Way>,
     /// The error allowed to a step of the integrator.
     pub tolerance: f64,
     /// The instruction set that derivatives are computed with.
@@ -180,7 +183,8 @@ impl Problem {
                 }
             }
         }
-        let problem = Self { records, free, tolerance, path: Path::choose()? };
+        let ways = free.iter().map(|one| Way::of(one, &free, &records)).collect();
+        let problem = Self { records, free, ways, tolerance, path: Path::choose()? };
         for index in 0..problem.records.len() {
             let count = problem.columns(index).reading.len();
             if count > MOST_READINGS {

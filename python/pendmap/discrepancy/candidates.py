@@ -89,6 +89,12 @@ class Candidate:
         ]
 
     @property
+    def places(self) -> list[str]:
+        """The parameters of its shape that are places, on either side of the rest."""
+        entries = self.definition["parameters"]
+        return [e["name"] for e in entries if e["name"] in self.shape and e["typical"][0] < 0]
+
+    @property
     def count(self) -> int:
         """How many numbers are adapted to data when it is chosen."""
         return len(self.free) + len(self.shape)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pendmap.discrepancy.candidates import own_name
+from pendmap.discrepancy.intervals import Z95, mirrored, profiles
 from pendmap.discrepancy.physical import unphysical
 from pendmap.identification.conversion import interval
-from pendmap.identification.fitting import fit_runs
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
 
@@ -20,14 +20,10 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.diagnose import Discrepancy
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
-    from pendmap.discrepancy.trial import Trial
     from pendmap.discrepancy.verdict import Judgement
     from pendmap.model import Formula, Rig
 
-__all__ = ["Z95", "NamedEffect", "diagnosed_model", "named_effects"]
-
-Z95: Final = 1.959963984540054
-"""The 97.5 % point of the standard normal distribution."""
+__all__ = ["NamedEffect", "diagnosed_model", "named_effects"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +45,8 @@ class NamedEffect:
         Whether its form may be only nearly right.
     formula : Formula, optional
         Where it is the user's own.
+    elsewhere : mapping of str to float
+        Another place, on the other side of the rest, where it would do as well.
     """
 
     name: str
@@ -57,6 +55,7 @@ class NamedEffect:
     probability: float
     approximate: bool
     formula: Formula | None = None
+    elsewhere: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def definition(self) -> dict[str, Any]:
@@ -89,7 +88,8 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
         Its standing.
     """
     widening = math.sqrt(best.trial.widening)
-    profiled = _profiled(evidence, best.trial)
+    profiled = profiles(evidence, best.trial)
+    elsewhere = mirrored(evidence, best.trial)
     named = []
     for standing in judgement.standings:
         candidate = standing.candidate
@@ -109,48 +109,10 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
                 standing.share * judgement.complete,
                 judgement.approximate,
                 candidate.formula,
+                elsewhere.get(candidate.name, {}),
             )
         )
     return tuple(named)
-
-
-def _profiled(evidence: Evidence, trial: Trial) -> dict[str, dict[str, tuple[float, float]]]:
-    """Return the intervals, from the profile of the likelihood, of effects with a shape.
-
-    Size and shape are found along a bent ridge: a warming of half the time constant does nearly
-    the same with another size. Elsewhere the covariance says the same for less.
-    """
-    wanted = {
-        f"{c.name}.{name}": (c.name, name)
-        for c in trial.chosen
-        if c.adapted and c.phase is None
-        for name in (c.size, *c.shape)
-    }
-    names = [name for name in wanted if name in trial.fit.names and name not in trial.fit.mixed]
-    if not names or not trial.fit.converged:
-        return {}
-    found = fit_runs(
-        evidence.fitted,
-        trial.fit.model,
-        trial.free,
-        start=trial.start,
-        windows=trial.fit.windows,
-        profiled=names,
-    )
-    wider = math.sqrt(trial.widening / found.widening)
-    intervals: dict[str, dict[str, tuple[float, float]]] = {}
-    for key in names:
-        effect, name = wanted[key]
-        value = found[key]
-        half = Z95 * math.sqrt(trial.widening) * (trial.fit.estimates[key].stderr or math.inf)
-        # Where the ridge folds back there may be no end to be found: the covariance has one.
-        low, high = (
-            value + wider * (end - value) if math.isfinite(end) else value + side * half
-            for end, side in zip(found.ends[key], (-1, 1), strict=True)
-        )
-        if math.isfinite(low) and math.isfinite(high):
-            intervals.setdefault(effect, {})[name] = low, high
-    return intervals
 
 
 def _values(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:

@@ -18,8 +18,8 @@ import numpy as np
 
 from pendmap.discrepancy.ahead import Prospects
 from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.discrepancy.intervals import Z95
 from pendmap.discrepancy.menu import menu_of
-from pendmap.discrepancy.named import Z95
 from pendmap.discrepancy.outlook import Outlook, Prospect, one_left, wrong_name
 
 if TYPE_CHECKING:

@@ -55,6 +55,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 "ci95": {name: list(bounds) for name, bounds in effect.ci95.items()},
                 "probability": effect.probability,
                 "approximate": effect.approximate,
+                "elsewhere": effect.elsewhere,
             }
             for effect in found.effects
         ],
@@ -231,6 +232,8 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         )
         nearly = ", with reserve: what is missing may be like it only" if effect.approximate else ""
         yield f"  {effect.name}: {values}; probability {effect.probability:.3f}{nearly}"
+        for name, value in effect.elsewhere.items():
+            yield f"    or {name} = {value:.4g}, which does as well: the sides are not told apart"
     for names in found.equivalent:
         yield f"  not told apart here: {', '.join(names)}"
     if found.verdict == "unknown" and found.nearest.trial.names:

@@ -66,7 +66,12 @@ def added(found: Discrepancy) -> Section:
             where = "drive" if entry["group"] == "drive" else "sensor"
             blocks.append(Paragraph((f"In the {where}: ", Name(entry["formula"]), ".")))
     blocks.append(
-        Items(tuple((*values(effect), *_strength(found, effect)) for effect in found.effects))
+        Items(
+            tuple(
+                (*values(effect), *_elsewhere(effect), *_strength(found, effect))
+                for effect in found.effects
+            )
+        )
     )
     blocks += [Paragraph("How the other parameters moved:"), _parameters(found)]
     return Section("What was added", (*blocks, *_unphysical(found)))
@@ -75,6 +80,12 @@ def added(found: Discrepancy) -> Section:
 def _signed(term: str) -> str:
     sign, rest = (term[0], term[1:]) if term.startswith(("-", "+")) else ("+", term)
     return f"{sign} {rest.strip()}"
+
+
+def _elsewhere(effect: NamedEffect) -> Iterator[str]:
+    """Yield at which other place an effect would do as well."""
+    for name, value in effect.elsewhere.items():
+        yield f". With {name} = {value:.4g} it does as well: the sides are not told apart here"
 
 
 def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:

@@ -1,0 +1,74 @@
+"""How well an effect's shape is known: ends of intervals along a bent ridge, the side of a place."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import pytest
+
+from hidden import diagnosed
+from pendmap.discrepancy.trial import fitted
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pendmap.discrepancy import Discrepancy
+
+
+def _risen(found: Discrepancy, effect: str, parameter: str, value: float) -> float:
+    """By how much the least sum of squares rises with a parameter held, over that of noise."""
+    trial = found.best.trial
+    key = f"{effect}.{parameter}"
+    model = trial.fit.model
+    effects = tuple(
+        dataclasses.replace(e, parameters={**e.parameters, parameter: value})
+        if e.name == effect
+        else e
+        for e in model.effects
+    )
+    held = fitted(
+        found.evidence,
+        dataclasses.replace(model, effects=effects),
+        [name for name in trial.free if name != key],
+        trial.chosen,
+        start={name: v for name, v in trial.start.items() if name != key},
+        windows=trial.fit.windows,
+        steps=100,
+    )
+    return (held.chi2 - trial.chi2) / trial.widening
+
+
+@pytest.mark.parametrize(
+    ("effect", "shape"), [("magnet", "width"), ("viscous_warm_up", "tau"), ("rough_spot", "w")]
+)
+def test_at_the_ends_of_an_interval_the_likelihood_has_fallen(
+    effect: str, shape: str, tmp_path: Path
+) -> None:
+    found, truth = diagnosed(tmp_path, effect, forced=0, size=0.3, seed=5)
+    (named,) = found.effects
+    assert named.name == effect
+    low, high = named.ci95[shape]
+    assert low < named.parameters[shape] < high
+    for end in (low, high):
+        assert _risen(found, effect, shape, end) == pytest.approx(3.84, rel=0.1)
+    wide = high - low
+    assert low - wide < truth[effect][shape] < high + wide
+
+
+def test_a_place_that_may_be_on_either_side_is_given_twice(tmp_path: Path) -> None:
+    found, truth = diagnosed(tmp_path, "rough_spot", forced=0, size=0.3, noise=0.2)
+    (named,) = found.effects
+    assert named.name == "rough_spot"
+    there, other = named.parameters["th0"], named.elsewhere["th0"]
+    assert there * other < 0
+    th0 = truth["rough_spot"]["th0"]
+    low, high = named.ci95["th0"]
+    assert min(abs(there - th0), abs(other - th0)) < 2 * (high - low)
+
+
+def test_a_place_that_is_known_is_given_once(tmp_path: Path) -> None:
+    found, truth = diagnosed(tmp_path, "rough_spot", size=1.0)
+    (named,) = found.effects
+    assert named.elsewhere == {}
+    assert named.parameters["th0"] * truth["rough_spot"]["th0"] > 0
