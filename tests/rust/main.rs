@@ -27,6 +27,7 @@ mod fit;
 mod fit_counts;
 mod fit_derivatives;
 mod fit_records;
+mod fit_way;
 mod formulas;
 mod free_decay;
 mod friction;
