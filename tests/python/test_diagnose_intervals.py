@@ -1,4 +1,4 @@
-"""How well an effect's shape is known: ends of intervals along a bent ridge, the side of a place."""
+"""How well the shape of an effect is known: intervals along a bent ridge, the side of a place."""
 
 from __future__ import annotations
 
