@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::normal::{Normal, Step};
 use super::problem::Problem;
+use super::way::Way;
 use super::window::Window;
 use crate::error::Error;
 
@@ -13,12 +14,6 @@ const FIRST_DAMPING: f64 = 1e-4;
 const GROWTH: f64 = 8.0;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e8;
-/// Times that a descent may go up to come down elsewhere ...
-const CROSSINGS: usize = 2;
-/// ... in so many steps ...
-const UPHILL: usize = 3;
-/// ... and to so many times the sum of squares.
-const STEEP: f64 = 100.0;
 
 /// A point of the search.
 #[derive(Clone, Debug)]
@@ -50,15 +45,48 @@ impl Point {
     /// The point a step further; none where it cannot be.
     #[must_use]
     pub fn moved(&self, problem: &Problem, step: &Step) -> Option<Self> {
-        let all = || problem.ways.iter().zip(self.values.iter().zip(&step.values));
-        let part = all().map(|(way, (value, by))| way.part(*value, *by)).fold(1.0, f64::min);
-        let values = all().map(|(way, (value, by))| way.gone(*value, part * by)).collect();
+        self.gone(problem, step, |_| Way::Straight)
+    }
+
+    /// The same with sizes and widths gone in ratios; none where there are no widths.
+    fn moved_in_ratios(&self, problem: &Problem, step: &Step) -> Option<Self> {
+        let any = problem.ways.contains(&Way::Width);
+        any.then(|| self.gone(problem, step, |place| problem.ways[place])).flatten()
+    }
+
+    fn gone(&self, problem: &Problem, step: &Step, way: impl Fn(usize) -> Way) -> Option<Self> {
+        let all = || self.values.iter().zip(&step.values).enumerate();
+        let part = all().map(|(k, (value, by))| way(k).part(*value, *by)).fold(1.0, f64::min);
+        let values = all().map(|(k, (value, by))| way(k).gone(*value, part * by)).collect();
         let mut windows = self.windows.clone();
         for (window, step) in windows.iter_mut().zip(&step.starts) {
             window.start[0] += part * step[0];
             window.start[1] += part * step[1];
         }
         Self::new(problem, values, windows).ok()
+    }
+
+    /// The point a step further if it is lower, straight or in ratios: the way that led down last
+    /// is tried first. Whether both were tried, and the last of them.
+    fn lower(&self, problem: &Problem, step: &Step, ratios: &mut bool) -> (bool, Option<Self>) {
+        let chi2 = self.normal.chi2;
+        let go = |ratios: bool| {
+            let next = if ratios {
+                self.moved_in_ratios(problem, step)
+            } else {
+                self.moved(problem, step)
+            };
+            next.filter(|next| next.normal.chi2 < chi2)
+        };
+        if let Some(next) = go(*ratios) {
+            return (false, Some(next));
+        }
+        if !problem.ways.contains(&Way::Width) {
+            return (false, None);
+        }
+        let next = go(!*ratios);
+        *ratios ^= next.is_some();
+        (true, next)
     }
 }
 
@@ -93,7 +121,7 @@ pub fn descend(
     limit: Limit,
     cancel: &AtomicBool,
 ) -> Result<Outcome, Error> {
-    let (mut damping, mut steps, mut crossings) = (0.0, 0, CROSSINGS);
+    let (mut damping, mut steps, mut ratios) = (0.0, 0, false);
     loop {
         if cancel.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
@@ -112,16 +140,10 @@ pub fn descend(
             return Ok(Outcome { steps, converged: false });
         }
         steps += 1;
-        let next = point.moved(problem, &step);
-        let across = match &next {
-            Some(high) if damping == 0.0 && high.normal.chi2 >= chi2 && crossings > 0 => {
-                crossings -= 1;
-                across(problem, high, held, chi2, &mut steps)
-            }
-            _ => None,
-        };
-        match across.or(next) {
-            Some(next) if next.normal.chi2 < chi2 => {
+        let (both, next) = point.lower(problem, &step, &mut ratios);
+        steps += usize::from(both);
+        match next {
+            Some(next) => {
                 let fair = chi2 - next.normal.chi2 > 0.25 * step.gain;
                 *point = next;
                 if fair {
@@ -129,7 +151,7 @@ pub fn descend(
                         if damping > FIRST_DAMPING { damping / (GROWTH * GROWTH) } else { 0.0 };
                 }
             }
-            _ => {
+            None => {
                 damping = (damping * GROWTH).max(FIRST_DAMPING);
                 // At a kink, as where a half swing more or less is made before the last stop, the
                 // sum of squares has a least value without being flat.
@@ -139,30 +161,4 @@ pub fn descend(
             }
         }
     }
-}
-
-/// Whole steps, from where one has led up, until they lead below `chi2`.
-///
-/// Out of a valley that is narrow and bent the way leads over its side, where steps that only lead
-/// down creep along the bottom (the watchdog of Chamberlain, Powell, Lemarechal & Pedersen 1982,
-/// Mathematical Programming Studies 16, 1).
-fn across(
-    problem: &Problem,
-    high: &Point,
-    held: &[usize],
-    chi2: f64,
-    steps: &mut usize,
-) -> Option<Point> {
-    let mut point = high.clone();
-    for _ in 0..UPHILL {
-        if point.normal.chi2 > STEEP * chi2 {
-            return None;
-        }
-        *steps += 1;
-        point = point.moved(problem, &point.normal.step(0.0, held))?;
-        if point.normal.chi2 < chi2 {
-            return Some(point);
-        }
-    }
-    None
 }

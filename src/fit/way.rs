@@ -4,7 +4,8 @@
 //! and its width: the sum of squares has a valley along which one is halved while the other doubles.
 //! That valley is straight in the logarithms alone; a step to the values `x + d`, which leads far up
 //! its side, leads along its bottom as `x exp(d / x)`. To first order the two are the same, so that
-//! derivatives, errors and the end of the search are.
+//! derivatives, errors and the end of the search are. Where a size makes up for another one, as that
+//! of a drag for damping, the valley is straight as it is: both ways are tried.
 
 use super::problem::{Free, Record, Slot};
 
