@@ -12,6 +12,8 @@ use crate::error::Error;
 const FIRST_DAMPING: f64 = 1e-4;
 /// By how much it grows after a failure; it falls by the square of that.
 const GROWTH: f64 = 8.0;
+/// The part of what a step promised that it must gain for no other way to be tried.
+const KEPT: f64 = 0.75;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e8;
 
@@ -66,27 +68,18 @@ impl Point {
         Self::new(problem, values, windows).ok()
     }
 
-    /// The point a step further if it is lower, straight or in ratios: the way that led down last
-    /// is tried first. Whether both were tried, and the last of them.
-    fn lower(&self, problem: &Problem, step: &Step, ratios: &mut bool) -> (bool, Option<Self>) {
+    /// The point a step further if it is lower, and how many were tried: straight, and in ratios too
+    /// where that leads less far down than it promised.
+    fn lower(&self, problem: &Problem, step: &Step) -> (usize, Option<Self>) {
         let chi2 = self.normal.chi2;
-        let go = |ratios: bool| {
-            let next = if ratios {
-                self.moved_in_ratios(problem, step)
-            } else {
-                self.moved(problem, step)
-            };
-            next.filter(|next| next.normal.chi2 < chi2)
-        };
-        if let Some(next) = go(*ratios) {
-            return (false, Some(next));
+        let straight = self.moved(problem, step).filter(|next| next.normal.chi2 < chi2);
+        let kept = straight.as_ref().is_some_and(|p| chi2 - p.normal.chi2 > KEPT * step.gain);
+        if kept || !problem.ways.contains(&Way::Width) {
+            return (1, straight);
         }
-        if !problem.ways.contains(&Way::Width) {
-            return (false, None);
-        }
-        let next = go(!*ratios);
-        *ratios ^= next.is_some();
-        (true, next)
+        let best = straight.as_ref().map_or(chi2, |point| point.normal.chi2);
+        let bent = self.moved_in_ratios(problem, step).filter(|next| next.normal.chi2 < best);
+        (2, bent.or(straight))
     }
 }
 
@@ -121,7 +114,7 @@ pub fn descend(
     limit: Limit,
     cancel: &AtomicBool,
 ) -> Result<Outcome, Error> {
-    let (mut damping, mut steps, mut ratios) = (0.0, 0, false);
+    let (mut damping, mut steps) = (0.0, 0);
     loop {
         if cancel.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
@@ -139,9 +132,8 @@ pub fn descend(
         if steps >= limit.steps {
             return Ok(Outcome { steps, converged: false });
         }
-        steps += 1;
-        let (both, next) = point.lower(problem, &step, &mut ratios);
-        steps += usize::from(both);
+        let (tried, next) = point.lower(problem, &step);
+        steps += tried;
         match next {
             Some(next) => {
                 let fair = chi2 - next.normal.chi2 > 0.25 * step.gain;
