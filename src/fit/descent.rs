@@ -134,22 +134,18 @@ pub fn descend(
         }
         let (tried, next) = point.lower(problem, &step);
         steps += tried;
-        match next {
-            Some(next) => {
-                let fair = chi2 - next.normal.chi2 > 0.25 * step.gain;
-                *point = next;
-                if fair {
-                    damping =
-                        if damping > FIRST_DAMPING { damping / (GROWTH * GROWTH) } else { 0.0 };
-                }
+        if let Some(next) = next {
+            let fair = chi2 - next.normal.chi2 > 0.25 * step.gain;
+            *point = next;
+            if fair {
+                damping = if damping > FIRST_DAMPING { damping / (GROWTH * GROWTH) } else { 0.0 };
             }
-            None => {
-                damping = (damping * GROWTH).max(FIRST_DAMPING);
-                // At a kink, as where a half swing more or less is made before the last stop, the
-                // sum of squares has a least value without being flat.
-                if step.gain <= limit.gain + limit.part * chi2 || damping > MOST_DAMPING {
-                    return Ok(Outcome { steps, converged: true });
-                }
+        } else {
+            damping = (damping * GROWTH).max(FIRST_DAMPING);
+            // At a kink, as where a half swing more or less is made before the last stop, the sum
+            // of squares has a least value without being flat.
+            if step.gain <= limit.gain + limit.part * chi2 || damping > MOST_DAMPING {
+                return Ok(Outcome { steps, converged: true });
             }
         }
     }
