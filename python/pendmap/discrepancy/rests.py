@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.candidates import Candidate, placed
 from pendmap.discrepancy.refit import KICK, Key, Refits, key_of
-from pendmap.discrepancy.trial import LITTLE, Trial, fitted, with_candidates
+from pendmap.discrepancy.trial import LITTLE, Trial, fitted, settled, with_candidates
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Rests:
             rest = min((rest, known), key=lambda t: t.chi2)
         elif not rest.fit.converged:
             rest = self._refits.unslipped(rest)
-        if not rest.fit.converged and rest.chi2 - trial.chi2 < NEAR * (self.base.chi2 - trial.chi2):
+        if rest.chi2 - trial.chi2 < NEAR * (self.base.chi2 - trial.chi2):
             rest = self._settled(rest)
         if rest.chi2 <= self.base.chi2:
             return rest
@@ -78,16 +78,8 @@ class Rests:
         return min((rest, self._from_base(trial, chosen)), key=lambda t: t.chi2)
 
     def _settled(self, rest: Trial) -> Trial:
-        """Return a fit with all the steps that it wants."""
         try:
-            return fitted(
-                self._evidence,
-                rest.fit.model,
-                rest.free,
-                rest.chosen,
-                start=rest.start,
-                windows=rest.fit.windows,
-            )
+            return settled(self._evidence, rest)
         except InputError:
             return rest
 

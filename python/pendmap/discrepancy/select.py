@@ -11,7 +11,7 @@ from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import Trial, fitted, tried
+from pendmap.discrepancy.trial import Trial, settled, tried
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -215,18 +215,10 @@ class Search:
 
     def settled(self, found: Found) -> Found:
         """Return a fit with all the steps that it wants: candidates are given few."""
-        trial = found.trial
-        if trial.fit.converged:
+        if found.trial.fit.converged:
             return found
         try:
-            full = fitted(
-                self.evidence,
-                trial.fit.model,
-                trial.free,
-                trial.chosen,
-                start=trial.start,
-                windows=trial.fit.windows,
-            )
+            full = settled(self.evidence, found.trial)
             if not full.fit.converged:
                 full = self._refits.unslipped(full, lost=True)
             return Found(full, tried(self.evidence, full))

@@ -29,6 +29,7 @@ __all__ = [
     "Trial",
     "fitted",
     "from_short_windows",
+    "settled",
     "tried",
     "with_candidates",
 ]
@@ -187,6 +188,20 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         growth=growth,
     )
     return Trial(fit, tuple(free), tuple(chosen), evidence.fitted, evidence.floors)
+
+
+def settled(evidence: Evidence, trial: Trial) -> Trial:
+    """Return a fit with all the steps that it wants; candidates are given few."""
+    if trial.fit.converged:
+        return trial
+    return fitted(
+        evidence,
+        trial.fit.model,
+        trial.free,
+        trial.chosen,
+        start=trial.start,
+        windows=trial.fit.windows,
+    )
 
 
 def with_candidates(
