@@ -14,6 +14,10 @@ const FIRST_DAMPING: f64 = 1e-4;
 const GROWTH: f64 = 8.0;
 /// The part of what a step promised that it must gain for no other way to be tried.
 const KEPT: f64 = 0.75;
+/// The most steps by which all else follows the widths.
+const FOLLOWED: usize = 2;
+/// The part of what a step promised that such a step has to promise.
+const FOLLOWED_GAIN: f64 = 0.1;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e8;
 
@@ -50,12 +54,6 @@ impl Point {
         self.gone(problem, step, |_| Way::Straight)
     }
 
-    /// The same with sizes and widths gone in ratios; none where there are no widths.
-    fn moved_in_ratios(&self, problem: &Problem, step: &Step) -> Option<Self> {
-        let any = problem.ways.contains(&Way::Width);
-        any.then(|| self.gone(problem, step, |place| problem.ways[place])).flatten()
-    }
-
     fn gone(&self, problem: &Problem, step: &Step, way: impl Fn(usize) -> Way) -> Option<Self> {
         let all = || self.values.iter().zip(&step.values).enumerate();
         let part = all().map(|(k, (value, by))| way(k).part(*value, *by)).fold(1.0, f64::min);
@@ -68,18 +66,41 @@ impl Point {
         Self::new(problem, values, windows).ok()
     }
 
-    /// The point a step further if it is lower, and how many were tried: straight, and in ratios too
-    /// where that leads less far down than it promised.
-    fn lower(&self, problem: &Problem, step: &Step) -> (usize, Option<Self>) {
+    /// The point a step further if it is lower, and how many were tried: straight; where that leads
+    /// less far down than it promised in ratios too, all else following the widths.
+    fn lower(&self, problem: &Problem, step: &Step, held: &[usize]) -> (usize, Option<Self>) {
         let chi2 = self.normal.chi2;
         let straight = self.moved(problem, step).filter(|next| next.normal.chi2 < chi2);
         let kept = straight.as_ref().is_some_and(|p| chi2 - p.normal.chi2 > KEPT * step.gain);
-        if kept || !problem.ways.contains(&Way::Width) {
+        let widths = || (0..problem.ways.len()).filter(|k| problem.ways[*k] == Way::Width);
+        if kept || widths().next().is_none() {
             return (1, straight);
         }
+        let Some(bent) = self.gone(problem, step, |place| problem.ways[place]) else {
+            return (2, straight);
+        };
+        let held: Vec<usize> = held.iter().copied().chain(widths()).collect();
+        let (followed, bent) = bent.followed(problem, &held, FOLLOWED_GAIN * step.gain);
         let best = straight.as_ref().map_or(chi2, |point| point.normal.chi2);
-        let bent = self.moved_in_ratios(problem, step).filter(|next| next.normal.chi2 < best);
-        (2, bent.or(straight))
+        (2 + followed, if bent.normal.chi2 < best { Some(bent) } else { straight })
+    }
+
+    /// The point to which all but `held` follows, and how many were tried, while steps gain `enough`.
+    ///
+    /// A step that is too long for the widths leads up only because sizes and initial states, which
+    /// go with them nearly linearly, are not yet those of the new widths.
+    fn followed(mut self, problem: &Problem, held: &[usize], enough: f64) -> (usize, Self) {
+        for tried in 0..FOLLOWED {
+            let step = self.normal.step(0.0, held);
+            if step.gain < enough {
+                return (tried, self);
+            }
+            match self.moved(problem, &step) {
+                Some(next) if next.normal.chi2 < self.normal.chi2 => self = next,
+                _ => return (tried + 1, self),
+            }
+        }
+        (FOLLOWED, self)
     }
 }
 
@@ -132,7 +153,7 @@ pub fn descend(
         if steps >= limit.steps {
             return Ok(Outcome { steps, converged: false });
         }
-        let (tried, next) = point.lower(problem, &step);
+        let (tried, next) = point.lower(problem, &step, held);
         steps += tried;
         if let Some(next) = next {
             let fair = chi2 - next.normal.chi2 > 0.25 * step.gain;

@@ -92,7 +92,7 @@ class Candidate:
     def places(self) -> list[str]:
         """The parameters of its shape that are places, on either side of the rest."""
         entries = self.definition["parameters"]
-        return [e["name"] for e in entries if e["name"] in self.shape and e["typical"][0] < 0]
+        return [e["name"] for e in entries if e["name"] in self.shape and _is_place(e)]
 
     @property
     def count(self) -> int:
@@ -208,16 +208,22 @@ def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
         return
     first, *others = shapes
     fixed = {e["name"]: math.sqrt(e["typical"][0] * e["typical"][1]) for e in others}
-    for value in _scan(*first["typical"], whole=_whole(first)):
+    for value in _scan(first):
         yield {first["name"]: float(value)} | fixed
 
 
-def _scan(low: float, high: float, *, whole: bool) -> NDArray[np.float64]:
-    if whole:
+def _scan(entry: Mapping[str, Any]) -> NDArray[np.float64]:
+    low, high = entry["typical"]
+    if _whole(entry):
         return np.arange(low, high + 0.5)
-    if low < 0:
-        return np.linspace(low, high, PLACES)  # a place on the circle
+    if _is_place(entry):
+        return np.linspace(low, high, PLACES)
     return np.geomspace(low, high, SCANNED)
+
+
+def _is_place(entry: Mapping[str, Any]) -> bool:
+    """Whether a shape is a place on the circle, on either side of the rest."""
+    return bool(entry["typical"][0] < 0)
 
 
 def _whole(entry: Mapping[str, Any]) -> bool:
