@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING
 import pytest
 
 from hidden import diagnosed
+from pendmap.discrepancy.sides import better_side
 from pendmap.discrepancy.trial import fitted
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from pendmap.discrepancy import Discrepancy
+    from pendmap.discrepancy.trial import Trial
 
 
-def _risen(found: Discrepancy, effect: str, parameter: str, value: float) -> float:
-    """By how much the least sum of squares rises with a parameter held, over that of noise."""
+def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> Trial:
+    """The model fitted again from another value of a parameter, held there or not."""
     trial = found.best.trial
-    key = f"{effect}.{parameter}"
+    effect, parameter = key.split(".")
     model = trial.fit.model
     effects = tuple(
         dataclasses.replace(e, parameters={**e.parameters, parameter: value})
@@ -27,16 +29,21 @@ def _risen(found: Discrepancy, effect: str, parameter: str, value: float) -> flo
         else e
         for e in model.effects
     )
-    held = fitted(
+    return fitted(
         found.evidence,
         dataclasses.replace(model, effects=effects),
-        [name for name in trial.free if name != key],
+        [name for name in trial.free if name != key or not held],
         trial.chosen,
-        start={name: v for name, v in trial.start.items() if name != key},
+        start={n: v for n, v in trial.start.items() if n != key} | ({} if held else {key: value}),
         windows=trial.fit.windows,
         steps=100,
     )
-    return (held.chi2 - trial.chi2) / trial.widening
+
+
+def _risen(found: Discrepancy, key: str, value: float) -> float:
+    """By how much the least sum of squares rises with a parameter held, over that of noise."""
+    trial = found.best.trial
+    return (_from(found, key, value, held=True).chi2 - trial.chi2) / trial.widening
 
 
 @pytest.mark.parametrize(
@@ -56,7 +63,7 @@ def test_at_the_ends_of_an_interval_the_likelihood_has_fallen(
     low, high = named.ci95[shape]
     assert low < named.parameters[shape] < high
     for end in (low, high):
-        assert _risen(found, effect, shape, end) == pytest.approx(3.84, rel=0.1)
+        assert _risen(found, f"{effect}.{shape}", end) == pytest.approx(3.84, rel=0.1)
     wide = high - low
     assert low - wide < truth[effect][shape] < high + wide
 
@@ -77,3 +84,12 @@ def test_a_place_that_is_known_is_given_once(tmp_path: Path) -> None:
     (named,) = found.effects
     assert named.elsewhere == {}
     assert named.parameters["th0"] * truth["rough_spot"]["th0"] > 0
+    # A fit that began on the other side stays there, until it is asked to change over.
+    key, best = "rough_spot.th0", found.best.trial
+    astray = _from(found, key, -named.parameters["th0"], held=False)
+    assert astray.chi2 > best.chi2 + 20
+    assert astray.fit[key] * named.parameters["th0"] < 0
+    back = better_side(found.evidence, astray)
+    assert back.chi2 == pytest.approx(best.chi2, abs=0.5)
+    assert back.fit[key] == pytest.approx(named.parameters["th0"], rel=1e-2)
+    assert better_side(found.evidence, best) is best

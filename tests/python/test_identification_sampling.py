@@ -14,6 +14,7 @@ from decays import Decay, decay, record
 from pendmap import read_experiment
 from pendmap.identification import find_peaks
 from pendmap.identification.reading import reading_of
+from pendmap.records.noise import noise_of
 from pendmap.records.resampled import measured
 
 if TYPE_CHECKING:
@@ -98,6 +99,25 @@ def test_a_run_that_goes_over_the_top_first(samples: float) -> None:
 def test_the_noise_of_few_samples_a_period_is_not_their_motion(samples: float) -> None:
     time, angle = record(WIDE, seconds=60, rate=samples / SMALL_PERIOD, noise_deg=0.1)
     assert reading_of(time, angle).sigma == pytest.approx(math.radians(0.1), rel=0.15)
+
+
+@pytest.mark.parametrize("noise_deg", [0.0, 0.3])
+@pytest.mark.parametrize("counts", [128, 256])
+def test_the_noise_of_coarse_counts_in_a_quick_rotation(counts: int, noise_deg: float) -> None:
+    # Three counts from sample to sample at 128: rounding errors of neighbours go with one another.
+    made = solve_ivp(
+        lambda _, y: [y[1], 1.5 - 0.1 * y[1] - 6.3**2 * math.sin(y[0])],
+        (0, 60), [0.0, 19.0], rtol=1e-9, atol=1e-10, dense_output=True,
+    )  # fmt: skip
+    time = np.arange(6000) / 100.0
+    count, sigma, ratios = math.tau / counts, math.radians(noise_deg), []
+    for seed in range(5):
+        rng = np.random.default_rng([seed, counts])
+        place = count * rng.random()
+        moved = made.sol(time)[0] + sigma * rng.standard_normal(time.size)
+        floor = noise_of(time, count * np.round((moved + place) / count) - place, count=count)
+        ratios.append(floor.sigma / math.hypot(sigma, count / math.sqrt(12)))
+    assert np.median(ratios) == pytest.approx(1, abs=0.05)
 
 
 def drawn(time: Floats, angle: Floats, ratio: int, made: str) -> tuple[Floats, Floats]:

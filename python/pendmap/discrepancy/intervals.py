@@ -1,26 +1,20 @@
-"""How well the shape of an effect is known: along a bent ridge, and on which side of the rest."""
+"""How well the shape of an effect is known, along a bent ridge."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.trial import fitted
-from pendmap.errors import InputError
 from pendmap.identification.fitting import fit_runs
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.trial import Trial
 
-__all__ = ["Z95", "mirrored", "profiles"]
+__all__ = ["Z95", "profiles"]
 
 Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""
-
-STEPS: Final = 25
-"""Steps of a fit from the other side."""
 
 
 def profiles(evidence: Evidence, trial: Trial) -> dict[str, dict[str, tuple[float, float]]]:
@@ -60,40 +54,3 @@ def profiles(evidence: Evidence, trial: Trial) -> dict[str, dict[str, tuple[floa
         if math.isfinite(low) and math.isfinite(high):
             intervals.setdefault(effect, {})[name] = low, high
     return intervals
-
-
-def mirrored(evidence: Evidence, trial: Trial) -> dict[str, dict[str, float]]:
-    """Return places on the other side of the rest where effects would do as well.
-
-    A pendulum that swings about its rest passes ``th0`` and ``-th0`` alike: from free decays a
-    rough spot's side is often not known.
-    """
-    found: dict[str, dict[str, float]] = {}
-    for candidate in trial.chosen:
-        for place in candidate.places:
-            key = f"{candidate.name}.{place}"
-            here = trial.fit.estimates[key]
-            effects = tuple(
-                dataclasses.replace(e, parameters={**e.parameters, place: -here.value})
-                if e.name == candidate.name
-                else e
-                for e in trial.fit.model.effects
-            )
-            try:
-                other = fitted(
-                    evidence,
-                    dataclasses.replace(trial.fit.model, effects=effects),
-                    trial.free,
-                    trial.chosen,
-                    start=trial.start | {key: -here.value},
-                    windows=trial.fit.windows,
-                    steps=STEPS,
-                )
-            except InputError:
-                continue  # there the motion is lost
-            there = other.fit.estimates[key].value
-            apart = abs(math.remainder(there - here.value, math.tau))
-            as_good = other.chi2 - trial.chi2 < Z95**2 * trial.widening
-            if as_good and apart > abs(here.value):
-                found.setdefault(candidate.name, {})[place] = there
-    return found

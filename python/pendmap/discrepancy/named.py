@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.discrepancy.candidates import own_name
-from pendmap.discrepancy.intervals import Z95, mirrored, profiles
+from pendmap.discrepancy.intervals import Z95, profiles
 from pendmap.discrepancy.physical import unphysical
+from pendmap.discrepancy.sides import elsewhere
 from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
@@ -89,7 +90,7 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
     """
     widening = math.sqrt(best.trial.widening)
     profiled = profiles(evidence, best.trial)
-    elsewhere = mirrored(evidence, best.trial)
+    others = elsewhere(evidence, best.trial)
     named = []
     for standing in judgement.standings:
         candidate = standing.candidate
@@ -109,7 +110,7 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
                 standing.share * judgement.complete,
                 judgement.approximate,
                 candidate.formula,
-                elsewhere.get(candidate.name, {}),
+                others.get(candidate.name, {}),
             )
         )
     return tuple(named)

@@ -11,6 +11,7 @@ from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests
 from pendmap.discrepancy.scores import Scores, scores_of
+from pendmap.discrepancy.sides import better_side
 from pendmap.discrepancy.trial import Trial, settled, tried
 from pendmap.errors import InputError
 
@@ -166,7 +167,7 @@ class Search:
         best = self._path([self.base])[-1]
         if not self._at_end(best):
             for other in self._beginnings(best):
-                further = self._path([self.base, self.settled(other)])[-1]
+                further = self._path([self.base, self._sided(other)])[-1]
                 best = min((best, further), key=lambda found: found.trial.bic(self.level()))
                 if self._at_end(best):
                     break
@@ -204,7 +205,7 @@ class Search:
                     self._begin_again(better)
                     path = [self.base]
                     continue
-            path.append(self.settled(following))
+            path.append(self._sided(following))
             best = path[-1].trial
             self.rests.keep(best)
             self.progress(len(best.chosen))
@@ -224,6 +225,12 @@ class Search:
             return Found(full, tried(self.evidence, full))
         except InputError:
             return found
+
+    def _sided(self, found: Found) -> Found:
+        """Return a settled fit, on the better side of the rest where an effect is at a place."""
+        found = self.settled(found)
+        other = better_side(self.evidence, found.trial)
+        return found if other is found.trial else Found(other, tried(self.evidence, other))
 
     def _better_base(self, found: Trial) -> Trial | None:
         """Return the baseline from where a further effect has led, if it is better there.

@@ -66,6 +66,9 @@ FURTHER: Final = 4
 """Strides beyond the shortest that are read too. From sample to sample a steady motion may pass
 almost whole counts: errors are then alike for long, but not at all strides."""
 
+STIFF: Final = 2.0
+"""So many times as far apart may samples be through which the highest degree goes."""
+
 DITHERED: Final = 0.55
 """Noise over count above which neighbouring readings err independently: sqrt(1/4 + 1/12) less
 some room, from where the error of a rounded sum is that of its parts to a percent."""
@@ -308,10 +311,12 @@ def _apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
     if np.count_nonzero(quick) < FEWEST:
         return None
     found = [_only(fit, quick)]
-    if fit is not nearest:
-        for longer in range(stride + 1, min(stride + FURTHER, most) + 1):
-            more = _clean(local_fit(time, theta, degree=6, points=11, stride=longer), bad, speed)
-            found.append(_only(more, np.abs(more.slope) >= slowest))
+    farthest = max(int(STIFF * FARTHEST / (swing * interval)), 1)
+    for longer in range(stride + 1, min(stride + FURTHER, farthest) + 1):
+        degree, points = DEGREES[1] if fit is not nearest and longer <= most else DEGREES[-1]
+        more = local_fit(time, theta, degree=degree, points=points, stride=longer)
+        more = _clean(more, bad, speed)
+        found.append(_only(more, np.abs(more.slope) >= slowest))
     return _pooled(found), slowest
 
 
