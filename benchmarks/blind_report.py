@@ -147,12 +147,12 @@ def figures(rows: list[Row]) -> list[list[str]]:
         ],
         ["both of a pair, G >= 100 and s G >= 25", "95 %", share(told(kind("two", STRONG)), right)],
         [
-            "withheld, G >= 100: no name, or reserved and of the family",
+            "withheld, G >= 100 and s G >= 25: no name, or reserved and of the family",
             "90 %",
             share(withheld, careful),
         ],
         [
-            "withheld, G >= 100: wrong name without reserve",
+            "withheld, G >= 100 and s G >= 25: wrong name without reserve",
             "at most 5 %",
             share(withheld, confidently_wrong),
         ],

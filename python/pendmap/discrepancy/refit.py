@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Final
 
+from pendmap.discrepancy.sides import better_side
 from pendmap.discrepancy.trial import (
     ASTRAY,
     CLEAN,
@@ -109,6 +110,7 @@ class Refits:
         else:
             short = trial.chi2 - found.chi2 < SHORT * promised and not found.fit.converged
             found = self.unslipped(found, lost=short)
+        found = better_side(self.evidence, found)
         try:
             return Found(found, tried(self.evidence, found))
         except InputError:
@@ -132,6 +134,11 @@ class Refits:
             return from_short_windows(self.evidence, found)
         except InputError:
             return found  # from short windows on the motion is lost
+
+    def again(self, found: Found) -> Found:
+        """Return what was found, or the same from short windows on if that is better."""
+        other = self.unslipped(found.trial, lost=True)
+        return found if other is found.trial else Found(other, tried(self.evidence, other))
 
     def _fit(
         self,

@@ -11,7 +11,6 @@ from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.sides import better_side
 from pendmap.discrepancy.trial import Trial, settled, tried
 from pendmap.errors import InputError
 
@@ -60,6 +59,10 @@ model must be better than the baseline."""
 PAIRED: Final = 8
 """Pairs are looked for that have one of so many candidates: alone, what hides behind another shows
 little."""
+
+SIMPLER: Final = 0.02
+"""A rival with fewer parameters that does less by so small a part is fitted from short windows too:
+in a window that was lost on the way it does less than it could."""
 
 BEGINNINGS: Final = 1
 """So many more beginnings are followed where the best one does not lead to the end."""
@@ -167,7 +170,7 @@ class Search:
         best = self._path([self.base])[-1]
         if not self._at_end(best):
             for other in self._beginnings(best):
-                further = self._path([self.base, self._sided(other)])[-1]
+                further = self._path([self.base, self.settled(other)])[-1]
                 best = min((best, further), key=lambda found: found.trial.bic(self.level()))
                 if self._at_end(best):
                     break
@@ -205,7 +208,7 @@ class Search:
                     self._begin_again(better)
                     path = [self.base]
                     continue
-            path.append(self._sided(following))
+            path.append(self.settled(following))
             best = path[-1].trial
             self.rests.keep(best)
             self.progress(len(best.chosen))
@@ -225,12 +228,6 @@ class Search:
             return Found(full, tried(self.evidence, full))
         except InputError:
             return found
-
-    def _sided(self, found: Found) -> Found:
-        """Return a settled fit, on the better side of the rest where an effect is at a place."""
-        found = self.settled(found)
-        other = better_side(self.evidence, found.trial)
-        return found if other is found.trial else Found(other, tried(self.evidence, other))
 
     def _better_base(self, found: Trial) -> Trial | None:
         """Return the baseline from where a further effect has led, if it is better there.
@@ -385,11 +382,15 @@ class Search:
                 for k in scores.best()
                 if scores.scores[k].candidate.name != candidate.name
             }
+            near = SIMPLER * (rest.chi2 - best.trial.chi2)
             reach = max(NEARLY[0] * level, NEARLY[1] * (rest.chi2 - best.trial.chi2))
             for k in sorted(promised, key=lambda k: -promised[k])[:2]:
                 if promised[k] < own - reach:
                     break
                 other = self.refit(rest, scores, [k])
+                fewer = scores.scores[k].candidate.count < candidate.count
+                if other and fewer and other.trial.chi2 - best.trial.chi2 < near:
+                    other = self._refits.again(other)
                 if other is None or other.held.chi2 > best.held.chi2 + LOSS * level:
                     continue  # better where it was fitted alone
                 if other.trial.bic(level) < best.trial.bic(level) - 1:

@@ -21,15 +21,18 @@ if TYPE_CHECKING:
 
 __all__ = ["better_side", "elsewhere"]
 
+FEW_STEPS: Final = 6
+"""Steps of a fit from the other side that is to be better: there nearly all is as it was."""
+
 STEPS: Final = 25
-"""Steps of a fit from the other side."""
+"""Steps of one that is to be as good."""
 
 
 def better_side(evidence: Evidence, trial: Trial) -> Trial:
     """Return a fit with places on the other side of the rest, where that is better."""
     for candidate in trial.chosen:
         for place in candidate.places:
-            other = _beyond(evidence, trial, candidate, place)
+            other = _beyond(evidence, trial, candidate, place, FEW_STEPS)
             if other is not None and other.chi2 < trial.chi2:
                 trial = other
     return trial
@@ -40,7 +43,7 @@ def elsewhere(evidence: Evidence, trial: Trial) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     for candidate in trial.chosen:
         for place in candidate.places:
-            other = _beyond(evidence, trial, candidate, place)
+            other = _beyond(evidence, trial, candidate, place, STEPS)
             if other is None:
                 continue
             key = f"{candidate.name}.{place}"
@@ -52,7 +55,9 @@ def elsewhere(evidence: Evidence, trial: Trial) -> dict[str, dict[str, float]]:
     return found
 
 
-def _beyond(evidence: Evidence, trial: Trial, candidate: Candidate, place: str) -> Trial | None:
+def _beyond(
+    evidence: Evidence, trial: Trial, candidate: Candidate, place: str, steps: int
+) -> Trial | None:
     """Return the fit from the other side of the rest; none where the motion is lost."""
     key = f"{candidate.name}.{place}"
     there = -trial.fit.estimates[key].value
@@ -70,7 +75,7 @@ def _beyond(evidence: Evidence, trial: Trial, candidate: Candidate, place: str) 
             trial.chosen,
             start=trial.start | {key: there},
             windows=trial.fit.windows,
-            steps=STEPS,
+            steps=steps,
         )
     except InputError:
         return None
