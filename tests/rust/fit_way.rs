@@ -43,9 +43,9 @@ fn searched(problem: &Problem, steps: usize) -> (Point, Outcome) {
 #[test]
 fn a_rough_spot_is_found_from_another_width() {
     let spot = [0.0012, 0.49, 0.34];
-    // From farther off all else has to follow the widths: straight steps creep from there.
     let near = [(0.0024, 0.58, 0.14), (0.0009, 0.42, 0.48), (0.002, 0.49, 0.2)];
-    for (force, place, width) in near.into_iter().chain([(1e-6, 0.34, 0.54), (1e-6, 0.58, 0.14)]) {
+    let far = [(0.0012, 0.44, 0.12), (0.002, 0.62, 0.12), (0.0008, 0.58, 0.54)];
+    for (force, place, width) in near.into_iter().chain(far) {
         let problem = rough(spot, &PLACES, &[0.0026, force, place, width]);
         let (point, outcome) = searched(&problem, 25);
         assert!(outcome.converged, "{width}: {:?}", point.values);
