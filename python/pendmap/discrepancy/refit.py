@@ -135,11 +135,6 @@ class Refits:
         except InputError:
             return found  # from short windows on the motion is lost
 
-    def again(self, found: Found) -> Found:
-        """Return what was found, or the same from short windows on if that is better."""
-        other = self.unslipped(found.trial, lost=True)
-        return found if other is found.trial else Found(other, tried(self.evidence, other))
-
     def _fit(
         self,
         trial: Trial,

@@ -15,7 +15,13 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.scores import Score
     from pendmap.model import Rig
 
-__all__ = ["Rests"]
+__all__ = ["Rests", "consistent"]
+
+ALIKE: Final = 1.5
+"""Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
+
+FAINT: Final = 5.0
+"""Standard errors within which what stays follows the covariance when an effect is dropped."""
 
 LESS_STEPS: Final = 16
 """Steps of a fit without one of the effects: beyond them a model that is wrong only creeps."""
@@ -63,7 +69,7 @@ class Rests:
         Where much is missing a fit that begins at a good model's windows may be lost.
         """
         known = self._refits.known(self.base, chosen)
-        if known is not None and known.fit.converged:
+        if known is not None and known.fit.converged and consistent(known, trial, dropped):
             return known
         rest = self.fit_without(trial, dropped, chosen)
         if known is not None:
@@ -133,6 +139,16 @@ class Rests:
             return None
 
 
+def consistent(rest: Trial, trial: Trial, candidate: Candidate) -> bool:
+    """Whether an effect gains no more than its size over its standard error says (Wald's test).
+
+    Where the fit without it is in the wrong valley it gains far more.
+    """
+    size = trial.fit.estimates[candidate.free[0]]
+    fall = rest.chi2 - trial.chi2
+    return bool(size.stderr and fall < ALIKE * (size.value / size.stderr) ** 2)
+
+
 def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:
     """Return a trial's model without an effect, what is free of it, and where it stands."""
     gone = {*dropped.free, *dropped.adapted}
@@ -141,4 +157,21 @@ def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str
     effects = tuple(e for e in model.effects if e.name != dropped.name)
     model = dataclasses.replace(model, effects=effects, **own)
     free = [name for name in trial.free if name not in gone]
-    return model, free, {name: value for name, value in trial.start.items() if name not in gone}
+    start = trial.start
+    if (faint := _faint(trial, dropped)) is not None:
+        # What it took up goes where the covariance says: without that the motion may be lost.
+        column = trial.fit.covariance[:, faint]
+        share = start[trial.fit.names[faint]] / column[faint]
+        start = {n: start[n] - share * c for n, c in zip(trial.fit.names, column, strict=True)}
+    return model, free, {name: value for name, value in start.items() if name not in gone}
+
+
+def _faint(trial: Trial, dropped: Candidate) -> int | None:
+    """Return where the size of an effect stands that is little beside its standard error."""
+    size = dropped.free[0]
+    if size not in trial.fit.names or dropped.phase is not None:
+        return None
+    error = trial.fit.estimates[size].stderr
+    if not error or abs(trial.start[size]) > FAINT * error:
+        return None
+    return trial.fit.names.index(size)

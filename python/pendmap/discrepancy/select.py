@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
-from pendmap.discrepancy.rests import Rests
+from pendmap.discrepancy.rests import Rests, consistent
 from pendmap.discrepancy.scores import Scores, scores_of
 from pendmap.discrepancy.trial import Trial, settled, tried
 from pendmap.errors import InputError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.scores import Score
     from pendmap.model import Formula
 
 __all__ = ["GATE", "Attempt", "Search"]
@@ -53,25 +54,24 @@ SCATTER: Final = 3.0
 fitted gains ``f G``, give or take ``2 sqrt(f G)``, of ``f`` times as many samples held back."""
 
 PATIENCE: Final = 0.5
-"""Of what is expected there as much may be lost while another effect is missing too: in the end the
-model must be better than the baseline."""
+"""Of what is expected there as much may be lost while another effect is missing too."""
+
+AT_LAST: Final = 0.1
+"""And in the end: where phases of the drive are adapted to what was held back, that says little."""
 
 PAIRED: Final = 8
 """Pairs are looked for that have one of so many candidates: alone, what hides behind another shows
 little."""
 
 SIMPLER: Final = 0.02
-"""A rival with fewer parameters that does less by so small a part is fitted from short windows too:
-in a window that was lost on the way it does less than it could."""
+"""A rival with fewer parameters that does less by so small a part is fitted from the other's motion
+too: where a window was lost on its own way it does less than it could."""
 
 BEGINNINGS: Final = 1
 """So many more beginnings are followed where the best one does not lead to the end."""
 
 LEFT: Final = 1e-3
 """Chance of what is left above which the end is reached."""
-
-ALIKE: Final = 1.5
-"""Wald's test and the fall of a sum of squares differ by this factor where all is not linear."""
 
 LEAST_LEVEL: Final = 0.5
 """Noise is not taken for less, of what its readings are stated to have, than this."""
@@ -174,7 +174,7 @@ class Search:
                 best = min((best, further), key=lambda found: found.trial.bic(self.level()))
                 if self._at_end(best):
                     break
-        return self.settled(self._without_idle(best) if len(best.trial.chosen) > 1 else best)
+        return self.settled(self._without_idle(best) if best.trial.chosen else best)
 
     def _at_end(self, best: Found) -> bool:
         """Whether a model leaves no more than chance, and is no beginning that led nowhere."""
@@ -213,7 +213,7 @@ class Search:
             self.rests.keep(best)
             self.progress(len(best.chosen))
         # What was worse on what was held back, for want of another effect, must be better with it.
-        while len(path) > 1 and not self._holds(self.base, path[-1]):
+        while len(path) > 1 and not self._holds(self.base, path[-1], AT_LAST):
             path.pop()
         return path
 
@@ -235,7 +235,9 @@ class Search:
         A search may end in the wrong valley, out of which an effect leads that has nothing to do
         with the pendulum.
         """
-        if self._consistent(found):
+        first = found.chosen[0]
+        alone = len(found.chosen) == 1 and not first.adapted
+        if alone and consistent(self.base.trial, found, first):
             return None
         rest = found
         try:
@@ -245,17 +247,6 @@ class Search:
         except InputError:
             return None
         return rest if rest.chi2 < self.base.trial.chi2 - GATE * self.level() else None
-
-    def _consistent(self, found: Trial) -> bool:
-        """Whether an effect gained what its size over its standard error says (Wald's test).
-
-        Where the baseline is in the wrong valley it has gained far more.
-        """
-        if len(found.chosen) > 1 or found.chosen[0].adapted:
-            return False
-        size = found.fit.estimates[found.chosen[0].free[0]]
-        fall = self.base.trial.chi2 - found.chi2
-        return bool(size.stderr and fall < ALIKE * (size.value / size.stderr) ** 2)
 
     def pool(self, trial: Trial) -> list[list[Candidate]]:
         """Return the candidates that a trial's model does not have yet."""
@@ -362,6 +353,13 @@ class Search:
             )
         )
 
+    def _instead(self, best: Found, dropped: Candidate, score: Score, found: Found) -> Found:
+        """Return a rival in an effect's place as it was found, or from the motion it had."""
+        other = self.rests.instead(best.trial, dropped, score)
+        if other is None or other.chi2 >= found.trial.chi2:
+            return found
+        return Found(other, tried(self.evidence, other))
+
     def _without_idle(self, best: Found) -> Found:
         """Drop effects that a later one made idle, and exchange those that another one beats."""
         level = self.level()
@@ -390,7 +388,7 @@ class Search:
                 other = self.refit(rest, scores, [k])
                 fewer = scores.scores[k].candidate.count < candidate.count
                 if other and fewer and other.trial.chi2 - best.trial.chi2 < near:
-                    other = self._refits.again(other)
+                    other = self._instead(best, candidate, scores.scores[k], other)
                 if other is None or other.held.chi2 > best.held.chi2 + LOSS * level:
                     continue  # better where it was fitted alone
                 if other.trial.bic(level) < best.trial.bic(level) - 1:

@@ -44,6 +44,10 @@ claimed, unless what is in doubt is little beside one of them."""
 LITTLE: Final = 0.1
 """Part of the greatest effect's gain that all others together are, if the doubt is about those."""
 
+SHARED: Final = 0.45
+"""The same part where all together leave something: effects that have to share the work, and do not
+do it even so, are a form made up of others, and none of them is claimed."""
+
 SURE: Final = 0.9
 """Probability that names are right below which they are given with reserve."""
 
@@ -150,7 +154,9 @@ def judge(
         verdict = "unknown" if rest else "none"
     elif not faint and (rest or sure < DOUBTFUL):
         gains = sorted(standing.gain for standing in standings)
-        clear = rest or (len(gains) > 1 and sum(gains[:-1]) < LITTLE * gains[-1])
+        others = sum(gains[:-1])
+        alone = len(gains) == 1 or others < SHARED * gains[-1]
+        clear = alone if rest else 0 < others < LITTLE * gains[-1]
         verdict = "partial" if clear and closed >= CLOSED and spread <= SPREAD else "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
