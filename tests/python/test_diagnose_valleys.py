@@ -1,0 +1,104 @@
+"""Experiments on whose records fits lose their way: another side, a lost window, a bent valley.
+
+Each was called something else, or was many standard errors off, before fits found back.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from hidden import diagnosed
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
+
+
+@pytest.mark.parametrize(
+    ("effects", "given"),
+    [
+        # On one side of the rest a friction that depends on the load made up for the wrong side.
+        (
+            ["rough_spot"],
+            MIXED | {"seed": 1970971373, "size": 0.971, "noise": 0.208, "counts": 4096},
+        ),
+        # The steady drift was a warming of 180 years: its own fit had lost the end of a run.
+        (
+            ["viscous_drift", "rough_spot"],
+            MIXED
+            | {
+                "seed": 1006634931,
+                "size": 0.8111507497987244,
+                "noise": 0.21590349695667901,
+                "counts": 8192,
+            },
+        ),
+        # A power of 3.004 in the place of the cube.
+        (
+            ["cubic_damping"],
+            MIXED
+            | {
+                "seed": 923496461,
+                "size": 0.6991996159060826,
+                "noise": 0.11338333801751667,
+                "counts": 2048,
+                "rate": 500.0,
+            },
+        ),
+        # Beside it a drift of nothing give or take nothing, without which the fit was lost.
+        (
+            ["viscous_warm_up"],
+            FREE
+            | {
+                "seed": 2109818056,
+                "size": 0.35135879395833886,
+                "noise": 0.16737536993889454,
+                "counts": 2048,
+                "rate": 500.0,
+            },
+        ),
+        # Seventeen standard errors off along the valley of size and width.
+        (
+            ["stribeck_friction"],
+            MIXED
+            | {
+                "seed": 1697828228,
+                "size": 0.30958802710356986,
+                "noise": 0.14649654326659584,
+                "counts": 8192,
+            },
+        ),
+    ],
+    ids=["side", "window", "power", "idle", "width"],
+)
+def test_what_is_hidden_is_named_alone_with_its_parameters(
+    effects: list[str], given: dict[str, Any], tmp_path: Path
+) -> None:
+    found, truth = diagnosed(tmp_path, *effects, **given)
+    assert found.verdict == "named"
+    assert sorted(effect.name for effect in found.effects) == sorted(effects)
+    for effect in found.effects:
+        for name, (low, high) in effect.ci95.items():
+            # Four standard errors.
+            error = (high - low) / 3.92
+            true = truth[effect.name][name]
+            assert low - 2.1 * error < true < high + 2.1 * error, (effect.name, name)
+
+
+def test_held_out_runs_that_say_little_do_not_take_an_effect_away(tmp_path: Path) -> None:
+    # Phases of the drive, adapted to the runs held out, take up what its frequency did there.
+    found, _ = diagnosed(
+        tmp_path,
+        "drive_frequency",
+        seed=605362845,
+        size=0.46370751706754837,
+        noise=0.06575130601676935,
+        counts=4096,
+        **MIXED,
+    )
+    assert found.verdict == "ambiguous"
+    (classed,) = found.equivalent
+    assert {"drive_frequency", "timebase"} <= set(classed)
