@@ -42,7 +42,7 @@ DOUBTFUL: Final = 0.5
 claimed, unless what is in doubt is little beside one of them."""
 
 LITTLE: Final = 0.1
-"""Part of the greatest effect's gain that all others together are, if the doubt is about those."""
+"""Part of the greatest effect's gain below which others close little of the gap."""
 
 SHARED: Final = 0.45
 """The same part where all together leave something: effects that have to share the work, and do not
@@ -79,8 +79,8 @@ class Judgement:
         How differently the runs would have the parameters, over the standard error of that
         (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
     spread : float
-        How much the effects' sizes differ from run to run beyond noise, over their size: the
-        greatest of all.
+        How much sizes differ from run to run beyond noise, over their size: the greatest of the
+        effects that close the gap.
     chance : float
         That noise alone would show such a torque over angle, velocity, amplitude, drive phase or
         time as is left.
@@ -145,8 +145,11 @@ def judge(
     # What an effect would take up that was too weak to be accepted is not unknown.
     rest = (form.chance if trial.chosen else form.unnamed) < CHANCE
     closed = _closed(search, best)
-    spread = max((runs.spread(c.free[0]) for c in trial.chosen), default=0.0)
     standings = tuple(standing_of(search, best, candidate) for candidate in trial.chosen)
+    # Of those that close the gap: what mends a little of one run may be in that run alone.
+    most = max((standing.gain for standing in standings), default=0.0)
+    closing = [s.candidate for s in standings if s.gain >= LITTLE * most]
+    spread = max((runs.spread(candidate.free[0]) for candidate in closing), default=0.0)
     sure = complete(form.chance, [s.gain for s in standings]) if standings else 1.0
     verdict: Verdict
     faint = sum(standing.gain for standing in standings) < FAINT and form.unnamed >= CHANCE
