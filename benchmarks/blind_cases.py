@@ -26,6 +26,10 @@ BASE = ("viscous_damping", "coulomb_friction")
 AGEING = {name for name, e in library().items() if "time in the laboratory" in e["formula"]}
 """What changes from run to run."""
 
+FOREIGN = {"added_mass:late"}
+"""Variants that are no form of the library's effect of their name, but another effect: a mass put
+on between two runs does nothing that one does which is there all along."""
+
 SPOILT = {"correlation": 0.5, "dropouts": 0.02, "outliers": 0.003, "jitter": 0.0005}
 """What records are spoilt with, one thing in each experiment that is."""
 
@@ -67,14 +71,14 @@ def draw(what: str, rng: np.random.Generator) -> Case:
     elif what == "two":
         effects = tuple(str(e) for e in rng.choice(usable, 2, replace=False))
     elif what == "withheld":
-        foreign = [n for n in known if ":" not in n and n not in library()]
+        foreign = [n for n in known if n in FOREIGN or (":" not in n and n not in library())]
+        foreign = [n for n in foreign if kind != "single" or n not in FOREIGN]
         foreign = [n for n in foreign if kind == "mixed" or not known[n]["needs"]]
         name = str(rng.choice(foreign if rng.random() < 0.5 else usable))  # noqa: PLR2004
         effects = (name,)
     elif what == "form":
-        effects = (
-            str(rng.choice([n for n in known if ":" in n and n.split(":")[0] in library()])),
-        )
+        variants = [n for n in known if ":" in n and n.split(":")[0] in library()]
+        effects = (str(rng.choice([n for n in variants if n not in FOREIGN])),)
     size = (
         1.0 if effects == ("none",) else float(np.exp(rng.uniform(math.log(0.08), math.log(1.2))))
     )
