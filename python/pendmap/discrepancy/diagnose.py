@@ -17,7 +17,7 @@ from pendmap.discrepancy.horizon import Forecast, forecasts_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
 from pendmap.discrepancy.physical import physical
 from pendmap.discrepancy.runs import RunByRun, run_by_run
-from pendmap.discrepancy.select import Attempt, Search
+from pendmap.discrepancy.select import Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
 from pendmap.model.effects import definition
@@ -26,6 +26,7 @@ from pendmap.notebook import Readable
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
+    from pendmap.discrepancy.attempts import Attempt
     from pendmap.discrepancy.functions import TorqueFunction
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.scores import Scores

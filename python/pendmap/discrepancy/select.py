@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.discrepancy.attempts import Attempt, attempt_of
 from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.discrepancy.exchange import LOSS, pruned
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests, consistent
 from pendmap.discrepancy.scores import Scores, scores_of
@@ -18,10 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
-    from pendmap.discrepancy.scores import Score
     from pendmap.model import Formula
 
-__all__ = ["GATE", "Attempt", "Search"]
+__all__ = ["GATE", "Search"]
 
 GATE: Final = 12.0
 """The least score of a candidate that is refitted: of all candidates together none passes 8.5
@@ -29,10 +29,6 @@ where nothing is missing."""
 
 GAIN: Final = 12.0
 """The least fall of the BIC for which an effect is accepted."""
-
-NEARLY: Final = (5.0, 0.3)
-"""A candidate whose score promises so much less than another has gained, or less by this part of
-it, is still fitted in its place: to first order it gains less than it may."""
 
 CHANCE: Final = 5e-4
 """Or the chance of what it gains, times how many were looked at: for several parameters at once the
@@ -44,10 +40,6 @@ less, of noise whose colour is half known it may not."""
 
 REFITTED: Final = 4
 """So many candidates are refitted, those with the greatest scores."""
-
-LOSS: Final = 4.0
-"""By so much a model may be worse on what was held back and still be accepted: two standard
-errors of what a parameter that is right, but not exact, does there."""
 
 SCATTER: Final = 3.0
 """And by so many standard errors less than is expected: an effect that gains ``G`` where it was
@@ -63,10 +55,6 @@ PAIRED: Final = 8
 """Pairs are looked for that have one of so many candidates: alone, what hides behind another shows
 little."""
 
-SIMPLER: Final = 0.02
-"""A rival with fewer parameters that does less by so small a part is fitted from the other's motion
-too: where a window was lost on its own way it does less than it could."""
-
 BEGINNINGS: Final = 1
 """So many more beginnings are followed where the best one does not lead to the end."""
 
@@ -81,37 +69,6 @@ BEGUN: Final = 2
 
 ZERO: Final = "encoder_offset"
 """Where the sensor reads zero says nothing of the pendulum: it does not count as an effect."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Attempt:
-    """A candidate that was refitted.
-
-    Parameters
-    ----------
-    names : tuple of str
-        The effects.
-    shape : dict of str to float
-        Of the first, without dimensions.
-    score : float
-        What was expected of it.
-    gain : float
-        By how much the BIC fell.
-    held_gain : float
-        The same of the sum of squares on what was held back.
-    accepted : bool
-        Whether it is in the model from there on.
-    stage : int
-        How many effects the model had before.
-    """
-
-    names: tuple[str, ...]
-    shape: dict[str, float]
-    score: float
-    gain: float
-    held_gain: float
-    accepted: bool
-    stage: int
 
 
 class Search:
@@ -174,7 +131,7 @@ class Search:
                 best = min((best, further), key=lambda found: found.trial.bic(self.level()))
                 if self._at_end(best):
                     break
-        return self.settled(self._without_idle(best) if best.trial.chosen else best)
+        return self.settled(pruned(self, best) if best.trial.chosen else best)
 
     def _at_end(self, best: Found) -> bool:
         """Whether a model leaves no more than chance, and is no beginning that led nowhere."""
@@ -191,7 +148,7 @@ class Search:
         for places in [*pairs, *((k,) for k in ranked[:REFITTED])]:
             names = {scores.scores[k].candidate.name for k in places}
             other = None if names <= begun else self.refit(self.base.trial, scores, places)
-            if other and self._gains(self.base.trial, other.trial):
+            if other and self.gains(self.base.trial, other.trial):
                 found.append(other)
         found = [other for other in found if self._holds(self.base, other)]
         return sorted(found, key=lambda other: other.trial.bic(self.level()))[:BEGINNINGS]
@@ -298,7 +255,9 @@ class Search:
         for found, places in refitted:
             good = accepted is None and self.accepts(current, found)
             accepted = found if good else accepted
-            self._note(current, found, scores, places, good=good)
+            self.attempts.append(
+                attempt_of(current, found, scores, places, level=level, accepted=good)
+            )
         return accepted
 
     def _promising_pairs(
@@ -317,7 +276,7 @@ class Search:
 
     def accepts(self, current: Found, found: Found) -> bool:
         """Whether a model is better than one with fewer effects, by more than chance."""
-        return self._gains(current.trial, found.trial) and self._holds(current, found, PATIENCE)
+        return self.gains(current.trial, found.trial) and self._holds(current, found, PATIENCE)
 
     def _holds(self, current: Found, found: Found, patience: float = 0.0) -> bool:
         """Whether a model is no worse on what was held back than a right one may be."""
@@ -328,70 +287,10 @@ class Search:
         scatter = SCATTER * 2 * math.sqrt(expected)
         return held >= min(expected - scatter, -patience * expected, 0.0) - LOSS
 
-    def _gains(self, rest: Trial, full: Trial) -> bool:
+    def gains(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects gain more than chance."""
         level = self.level()
         looked = len(self.scores(rest).scores)
         more = full.adapted - rest.adapted
         chance = looked * self.chance_of(rest.chi2 - full.chi2, more)
         return chance < (DOUBT if rest.bic(level) - full.bic(level) >= GAIN else CHANCE)
-
-    def _note(
-        self, current: Found, found: Found, scores: Scores, places: Sequence[int], *, good: bool
-    ) -> None:
-        level = self.level()
-        added = [scores.scores[k].candidate for k in places]
-        self.attempts.append(
-            Attempt(
-                tuple(candidate.name for candidate in added),
-                found.trial.shape_of(found.trial.chosen[-len(added)]),
-                scores.together(places) / level,
-                current.trial.bic(level) - found.trial.bic(level),
-                (current.held.chi2 - found.held.chi2) / level,
-                good,
-                len(current.trial.chosen),
-            )
-        )
-
-    def _instead(self, best: Found, dropped: Candidate, score: Score, found: Found) -> Found:
-        """Return a rival in an effect's place as it was found, or from the motion it had."""
-        other = self.rests.instead(best.trial, dropped, score)
-        if other is None or other.chi2 >= found.trial.chi2:
-            return found
-        return Found(other, tried(self.evidence, other))
-
-    def _without_idle(self, best: Found) -> Found:
-        """Drop effects that a later one made idle, and exchange those that another one beats."""
-        level = self.level()
-        for candidate in best.trial.chosen:
-            try:
-                rest = self.rests.less(best.trial, candidate)
-            except InputError:
-                continue  # without it there is no motion to speak of: it is not idle
-            if not self._gains(rest, best.trial):
-                shorter = Found(rest, tried(self.evidence, rest))
-                return self._without_idle(shorter) if len(rest.chosen) > 1 else shorter
-            scores = self.scores(rest)
-            penalty = level * math.log(max(rest.fit.samples / level, 2.0))
-            own = rest.chi2 - best.trial.chi2 - penalty * candidate.count
-            # What does as much with fewer parameters is better.
-            promised = {
-                k: scores.scores[k].gain - penalty * scores.scores[k].candidate.count
-                for k in scores.best()
-                if scores.scores[k].candidate.name != candidate.name
-            }
-            near = SIMPLER * (rest.chi2 - best.trial.chi2)
-            reach = max(NEARLY[0] * level, NEARLY[1] * (rest.chi2 - best.trial.chi2))
-            for k in sorted(promised, key=lambda k: -promised[k])[:2]:
-                if promised[k] < own - reach:
-                    break
-                other = self.refit(rest, scores, [k])
-                fewer = scores.scores[k].candidate.count < candidate.count
-                if other and fewer and other.trial.chi2 - best.trial.chi2 < near:
-                    other = self._instead(best, candidate, scores.scores[k], other)
-                if other is None or other.held.chi2 > best.held.chi2 + LOSS * level:
-                    continue  # better where it was fitted alone
-                if other.trial.bic(level) < best.trial.bic(level) - 1:
-                    self._note(Found(rest, best.held), other, scores, [k], good=True)
-                    return self._without_idle(other)
-        return best
