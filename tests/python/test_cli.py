@@ -15,6 +15,7 @@ import pytest
 
 import pendmap
 from conftest import COMMAND
+from interrupted import started
 from pendmap.cli.types import AXIS, NUMBER
 
 if TYPE_CHECKING:
@@ -254,10 +255,10 @@ def test_a_recording_needs_a_display_to_be_seen(pendmap_command: Run, tmp_path: 
 
 def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
     words = [str(COMMAND), "basins", "--p", "1.7", "--grid", "9000"]
-    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    time.sleep(2)
-    process.send_signal(signal.SIGINT)
-    _, stderr = process.communicate(timeout=20)
+    with started(words, cwd=tmp_path, stderr=subprocess.PIPE) as process:
+        time.sleep(2)
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=20)
     assert process.returncode == 130
     assert "Traceback" not in stderr
     assert "nothing was written" in stderr
@@ -269,11 +270,11 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
 )
 def test_ctrl_c_waits_for_the_file_being_written(tmp_path: Path, option: str, file: str) -> None:
     words = [str(COMMAND), "basins", "--p", "0.6", "--grid", "1500", option, file]
-    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    while process.poll() is None and not list(tmp_path.glob(".map*.part.*")):
-        time.sleep(0.001)
-    process.send_signal(signal.SIGINT)
-    _, stderr = process.communicate(timeout=30)
+    with started(words, cwd=tmp_path, stderr=subprocess.PIPE) as process:
+        while process.poll() is None and not list(tmp_path.glob(".map*.part.*")):
+            time.sleep(0.001)
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130
     assert f"interrupted, {file} written" in stderr
     assert [path.name for path in tmp_path.iterdir()] == [file]

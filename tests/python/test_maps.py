@@ -16,6 +16,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pendmap
+from interrupted import started
 from pendmap import Axis, Grid, InputError, Pendulum
 
 
@@ -233,13 +234,12 @@ def test_ctrl_c_raises_keyboard_interrupt() -> None:
         "except KeyboardInterrupt:\n"
         "    sys.exit(42)\n"
     )
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
-    assert process.stdout is not None
-    assert process.stdout.readline() == b"go\n"
-    time.sleep(0.7)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=20) == 42
-    process.stdout.close()
+    with started([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "go\n"
+        time.sleep(0.7)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 42
 
 
 def available_paths() -> list[str]:

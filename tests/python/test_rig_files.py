@@ -14,6 +14,7 @@ import pytest
 from matplotlib import rc_context
 
 from conftest import COMMAND
+from interrupted import started
 from pendmap import InputError, figures
 from pendmap.figures import runs as records
 from pendmap.figures import style
@@ -189,13 +190,13 @@ def test_what_is_there_is_replaced_only_if_asked(rig: Run, tmp_path: Path) -> No
 def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path, moment: str) -> None:
     runs = ["--free", "60"] if moment == "computing" else ["--rate", "2000"]
     words = [str(COMMAND), "rig", "hidden", *runs, "--out", "lab"]
-    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    if moment == "computing":
-        time.sleep(1.2)
-    while moment == "writing" and process.poll() is None and not list(tmp_path.glob(".lab*")):
-        time.sleep(0.001)
-    process.send_signal(signal.SIGINT)
-    _, stderr = process.communicate(timeout=30)
+    with started(words, cwd=tmp_path, stderr=subprocess.PIPE) as process:
+        if moment == "computing":
+            time.sleep(1.2)
+        while moment == "writing" and process.poll() is None and not list(tmp_path.glob(".lab*")):
+            time.sleep(0.001)
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "Traceback" not in stderr
     if moment == "computing":

@@ -1,0 +1,30 @@
+"""Processes that a test interrupts."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import subprocess
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+
+@contextlib.contextmanager
+def started(words: Sequence[str], **given: Any) -> Iterator[subprocess.Popen[str]]:  # noqa: ANN401
+    """Start a process that hears Ctrl-C, and does not outlive the test.
+
+    What a shell puts in the background ignores Ctrl-C, and all that it starts does as well.
+    """
+    process = subprocess.Popen(
+        words,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 (no threads)
+        **given,
+    )
+    with process:
+        try:
+            yield process
+        finally:
+            process.kill()
