@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from pendmap import cli
 
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).resolve().parent
 COMMAND = Path(sys.executable).with_name("pendmap")
+
+# No test fails for what else the machine does; files of one example are overwritten by the next.
+settings.register_profile(
+    "steady",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
+settings.load_profile("steady")
 
 
 @pytest.fixture(scope="session")

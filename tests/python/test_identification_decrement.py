@@ -25,7 +25,7 @@ WIDE = decay()
     first=st.floats(0.1, 0.3),
     parity=st.integers(0, 1),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_peaks_by_2_4_to_2_6_return_what_made_them(
     delta: float, theta_r: float, first: float, parity: int
 ) -> None:
@@ -47,7 +47,7 @@ def test_peaks_by_2_4_to_2_6_return_what_made_them(
 
 
 @given(zero=st.floats(-3e-3, 3e-3), theta_r=st.floats(5e-4, 5e-3), delta=st.floats(0.001, 0.01))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_repair_finds_the_zero_too(zero: float, theta_r: float, delta: float) -> None:
     made = decrement.recursion(0.2, delta, theta_r, 60)
     made = made[made > 0]

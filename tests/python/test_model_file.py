@@ -8,7 +8,7 @@ import tomllib
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models import EXAMPLE, written
@@ -77,9 +77,7 @@ def effects(draw: st.DrawFn) -> tuple[Effect, ...]:
     acting=effects(),
     notes=notes,
 )
-@settings(
-    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=80)
 def test_a_pendulum_reads_back_as_it_was_written(
     tmp_path: Path, numbers: dict[str, float], acting: tuple[Effect, ...], notes: dict[str, Any]
 ) -> None:
@@ -99,9 +97,7 @@ def test_a_pendulum_reads_back_as_it_was_written(
     acting=effects(),
     notes=notes,
 )
-@settings(
-    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=80)
 def test_a_rig_reads_back_as_it_was_written(
     tmp_path: Path, numbers: dict[str, float], acting: tuple[Effect, ...], notes: dict[str, Any]
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pendmap
@@ -101,12 +101,7 @@ def test_a_clean_record_has_nothing_odd(tmp_path: Path) -> None:
     assert run.trusted.all()
 
 
-QUIET = settings(
-    deadline=None,
-    max_examples=120,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+QUIET = settings(max_examples=120, derandomize=True)
 FIELDS = st.one_of(
     st.floats(width=64).map(repr),
     st.integers(-(10**20), 10**20).map(str),

@@ -73,7 +73,7 @@ def test_every_effect_of_the_library_converts_by_what_the_library_says(name: str
     lab_time=signed,
     q=signed,
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_there_and_back_is_the_same(w0: float, q: float, **numbers: float) -> None:
     effect = Effect("quadratic_drag", {"q": q}, ci95={"q": (q - 1, q + 1)})
     pendulum = Pendulum(**numbers, effects=(effect,))
