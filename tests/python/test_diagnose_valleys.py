@@ -102,3 +102,21 @@ def test_held_out_runs_that_say_little_do_not_take_an_effect_away(tmp_path: Path
     assert found.verdict == "ambiguous"
     (classed,) = found.equivalent
     assert {"drive_frequency", "timebase"} <= set(classed)
+
+
+def test_a_name_that_does_not_foretell_the_run_held_out_is_not_claimed(tmp_path: Path) -> None:
+    # What was fitted is explained by one drift of friction; the run held out has chi^2/N 1.9.
+    found, _ = diagnosed(
+        tmp_path,
+        "viscous_drift",
+        "viscous_warm_up",
+        seed=673542390,
+        size=1.176445072606374,
+        noise=0.088696557283522,
+        counts=2048,
+        **FREE,
+    )
+    assert found.judgement.ratio <= found.judgement.ratio_allowed
+    assert found.judgement.ratio_held > 1.3
+    assert found.verdict == "unknown"
+    assert not found.effects

@@ -112,6 +112,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             "chances": dict(judgement.form.chances),
             "further": judgement.form.further,
             "chi2_per_degree": judgement.ratio,
+            "chi2_per_degree_held_out": judgement.ratio_held,
             "allowed": judgement.ratio_allowed,
         },
         "baseline": {name: e.value for name, e in base.estimates.items()},

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.summary import PLACES
 from pendmap.discrepancy.torque import STANDS_OUT
-from pendmap.discrepancy.verdict import CHANCE
+from pendmap.discrepancy.verdict import CHANCE, FORECAST
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
 from pendmap.report.wording import chance, compared, joined, mrad, values
 
@@ -55,7 +55,8 @@ def _rests(found: Discrepancy) -> Iterator[Text]:
     form = judged.form
     yield (
         f"Chi-squared over degrees of freedom is {judged.ratio:.4g}; the doubt about the noise "
-        f"allows up to {judged.ratio_allowed:.4g}."
+        f"allows up to {judged.ratio_allowed:.4g}. On what was held out it is "
+        f"{judged.ratio_held:.4g}."
     )
     further = () if form.further is None else (" (", Name(form.further), " would take up most)")
     left: dict[str, tuple[str | Name, ...]] = {
@@ -68,7 +69,8 @@ def _rests(found: Discrepancy) -> Iterator[Text]:
         chance_of = _rare(form.chances[key])
         yield ("Noise alone would leave ", *words, f" with a probability {chance_of}.")
     yield (
-        f"Something is left where the least of these, times how many they are, is below {CHANCE:g}."
+        f"Something is left where the least of these, times how many they are, is below {CHANCE:g};"
+        f" with effects found, also where chi-squared on what was held out is above {FORECAST:g}."
     )
 
 
