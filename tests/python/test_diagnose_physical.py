@@ -9,9 +9,10 @@ import pytest
 from pendmap import virtual_rig
 from pendmap.discrepancy import diagnose
 from pendmap.discrepancy.evidence import evidence_of
+from pendmap.discrepancy.held import tried
 from pendmap.discrepancy.physical import physical, unphysical
 from pendmap.discrepancy.refit import Found
-from pendmap.discrepancy.trial import fitted, tried
+from pendmap.discrepancy.trial import fitted
 from pendmap.errors import InputError
 from pendmap.model import Effect, Rig
 from pendmap.records import read_experiment

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.attempts import attempt_of
+from pendmap.discrepancy.held import tried
 from pendmap.discrepancy.refit import Found
-from pendmap.discrepancy.trial import Trial, tried
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.candidates import Candidate
     from pendmap.discrepancy.scores import Scores
     from pendmap.discrepancy.select import Search
+    from pendmap.discrepancy.trial import Trial
 
 __all__ = ["LOSS", "pruned"]
 

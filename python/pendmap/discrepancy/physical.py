@@ -9,8 +9,9 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.discrepancy.held import tried
 from pendmap.discrepancy.refit import Found
-from pendmap.discrepancy.trial import GENTLE, fitted, tried
+from pendmap.discrepancy.trial import GENTLE, fitted
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:

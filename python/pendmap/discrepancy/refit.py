@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Final
 
+from pendmap.discrepancy.held import Held, tried
 from pendmap.discrepancy.sides import better_side
 from pendmap.discrepancy.trial import (
     ASTRAY,
     CLEAN,
-    Held,
     Trial,
     from_short_windows,
-    tried,
     with_candidates,
 )
 from pendmap.errors import InputError

@@ -9,10 +9,11 @@ from pendmap.discrepancy.attempts import Attempt, attempt_of
 from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.exchange import LOSS, pruned
+from pendmap.discrepancy.held import tried
 from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests, consistent
 from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.trial import Trial, settled, tried
+from pendmap.discrepancy.trial import Trial, settled
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""A model fitted to the evidence, and tried on what was held back."""
+"""A model fitted to the evidence."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ if TYPE_CHECKING:
 __all__ = [
     "ASTRAY",
     "CLEAN",
+    "FEW_STEPS",
     "GENTLE",
     "LITTLE",
-    "Held",
     "Trial",
     "fitted",
     "from_short_windows",
     "settled",
-    "tried",
     "with_candidates",
 ]
 
@@ -55,25 +54,6 @@ CLEAN: Final = 1.0
 
 FEW_STEPS: Final = 12
 """Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Held:
-    """A model on the records held back, its parameters as they were fitted to the others.
-
-    Parameters
-    ----------
-    chi2 : float
-        Sum of squared residuals over standard errors, initial states adapted.
-    degrees : int
-        Samples less what was adapted.
-    fit : TrajectoryFit
-        Curves and residuals.
-    """
-
-    chi2: float
-    degrees: int
-    fit: TrajectoryFit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -306,42 +286,3 @@ def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:
         growth=GENTLE,
     )
     return min((trial, again), key=lambda t: t.chi2)
-
-
-def tried(evidence: Evidence, trial: Trial) -> Held:
-    """Try a model on what was held back.
-
-    Whole runs have fresh initial states; stretches within a fitted run are passed through by the
-    motion that was fitted to the rest of it.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        The model.
-    """
-    model, free = trial.fit.model, trial.free
-    if not evidence.inside:
-        known = {name: value for name, value in trial.start.items() if "[" not in name}
-        fit = fit_runs(
-            evidence.held,
-            model,
-            free,
-            start=known,
-            profiled=(),
-            hold=True,
-            steps=FEW_STEPS,
-            least_gain=LITTLE,
-        )
-        adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
-        return Held(fit.chi2, max(fit.samples - adapted, 1), fit)
-    places = {of: k for k, of in enumerate(evidence.held_of)}
-    windows = tuple((places[w[0]], *w[1:]) for w in trial.fit.windows if w[0] in places)
-    known = {name: value for name, value in trial.start.items() if "[" not in name}
-    own = [name for name in free if name in known]
-    # No step: neither parameters nor states are adapted.
-    fit = fit_runs(
-        evidence.held, model, own, start=known, windows=windows, profiled=(), hold=True, steps=0
-    )
-    return Held(fit.chi2, max(fit.samples, 1), fit)
