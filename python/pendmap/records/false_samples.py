@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.records.false_ends import false_ends
+from pendmap.records.following import DEGREES
 from pendmap.records.local_fit import POINTS, local_fit
-from pendmap.records.noise import DEGREES
 from pendmap.records.robust import broad_scale, normal_scale
 from pendmap.words import counted, moment
 

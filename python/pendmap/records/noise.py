@@ -28,9 +28,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records.clean_fit import FEWEST, clean, only, rms, stderr
+from pendmap.records.following import apart, followed
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
 from pendmap.records.local_fit import LocalFit, local_fit
-from pendmap.records.robust import broad_scale
 from pendmap.records.steps import step_of
 from pendmap.records.still import still_noise
 
@@ -49,25 +50,12 @@ __all__ = [
     "noise_of",
 ]
 
-DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
-"""Degree and samples of the polynomials that are tried in turn."""
-
 EVERY: Final = 0.06
 """Radians of its own phase that a motion may pass between samples and be followed by a quartic:
 the next term, x^6/720 over nine samples, is then under 1e-8 of the amplitude."""
 
 LAG: Final = 0.25
 """Radians of phase over which a way is measured, where that is more than an interval."""
-
-FARTHEST: Final = 0.25
-"""Radians of phase between samples that are taken further apart because of coarse counts."""
-
-FURTHER: Final = 4
-"""Strides beyond the shortest that are read too. From sample to sample a steady motion may pass
-almost whole counts: errors are then alike for long, but not at all strides."""
-
-STIFF: Final = 2.0
-"""So many times as far apart may samples be through which the highest degree goes."""
 
 DITHERED: Final = 0.55
 """Noise over count above which neighbouring readings err independently: sqrt(1/4 + 1/12) less
@@ -76,25 +64,12 @@ some room, from where the error of a rounded sum is that of its parts to a perce
 CLEAR: Final = 4
 """Counts of way from which a speed is taken: rounding then changes it by a quarter at most."""
 
-FALSE: Final = 8.0
-"""Standard deviations beyond which a residual is an outlier. White noise stays below 6; that of
-real encoders has longer tails, which are part of it."""
-
-FEWEST: Final = 40
-"""Residuals that a standard deviation is taken from; half a dozen would be wrong by a third."""
-
-KINDS: Final = 16
-"""Kinds of speed, with equally many samples, that have outliers of their own."""
-
 FEW: Final = 0.3
 """Radians of its own phase between samples beyond which polynomials leave some of the motion: about
 20 samples a period. It is largest where the motion is quick, which looks like a clock's fault."""
 
 RANGES: Final = 4
 """Ranges of speed, with equally many samples."""
-
-LESS: Final = 1.02
-"""Ratio of two readings of the noise that counts as less: they aim at a few per cent."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -199,25 +174,25 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
     interval = float(np.median(np.diff(time)))
     swing, phase = fastest(time, theta, count)
     speed = speed_of(time, theta, phase)
-    first = _clean(local_fit(time, theta), bad, speed)
+    first = clean(local_fit(time, theta), bad, speed)
     if first.middle.size < FEWEST:
         return None
     fit = first
     if swing * interval > EVERY:
-        fit = _followed(time, theta, bad, speed, first)
-    next_fit = _clean(local_fit(time, theta, degree=6, points=11), bad, speed)
-    colour = _rms(first) / max(_rms(next_fit), 1e-300) if next_fit.middle.size >= FEWEST else 1.0
+        fit = followed(time, theta, bad, speed, first)
+    next_fit = clean(local_fit(time, theta, degree=6, points=11), bad, speed)
+    colour = rms(first) / max(rms(next_fit), 1e-300) if next_fit.middle.size >= FEWEST else 1.0
     least = count / math.sqrt(12)
     slowest = 0.0
-    if count and _rms(fit) < DITHERED * count:
+    if count and rms(fit) < DITHERED * count:
         nearest = fit if swing * interval > EVERY else None
-        apart = _apart(time, theta, bad, speed, count, interval, swing, nearest)
-        if apart is None:
+        far = apart(time, theta, bad, speed, count, interval, swing, nearest)
+        if far is None:
             still = still_noise(theta if bad.all() else theta[~bad], count)
             if still is not None:
                 return NoiseFloor(*still, colour=colour, samples=int(theta.size))
-            return NoiseFloor(max(least, _rms(fit)), least / 10, (), True, colour)  # noqa: FBT003
-        fit, slowest = apart
+            return NoiseFloor(max(least, rms(fit)), least / 10, (), True, colour)  # noqa: FBT003
+        fit, slowest = far
         law = None
     else:
         # A residual holds the noise of all its window, each with its own speed.
@@ -227,7 +202,7 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
             interval=interval,
         )  # fmt: skip
     few = phase * interval > FEW
-    sigma, error = _rms(fit), _stderr(fit)
+    sigma, error = rms(fit), stderr(fit)
     limited = sigma < least
     sigma = max(sigma, least)
     ranges = tuple(_ranges(fit, least, slowest))
@@ -261,120 +236,6 @@ def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
     return min(phase, math.pi / interval), min(max(swing, slowest), math.pi / interval)
 
 
-def _followed(
-    time: Floats, theta: Floats, bad: NDArray[np.bool_], speed: Floats, first: LocalFit
-) -> LocalFit:
-    """Return the fit of the lowest degree above which no degree leaves less."""
-    chosen = first
-    for degree, points in DEGREES[1:]:
-        higher = _clean(local_fit(time, theta, degree=degree, points=points), bad, speed)
-        if higher.middle.size < FEWEST:
-            break
-        if not _less(higher, chosen):
-            break
-        chosen = higher
-    return chosen
-
-
-def _less(fit: LocalFit, other: LocalFit) -> bool:
-    """Return whether a fit leaves less than another beyond its error: it follows the motion."""
-    enough = LESS + 2 * _stderr(fit) / max(_rms(fit), 1e-300)
-    return fit.middle.size >= FEWEST and _rms(other) > enough * _rms(fit)
-
-
-def _apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
-    time: Floats,
-    theta: Floats,
-    bad: NDArray[np.bool_],
-    speed: Floats,
-    count: float,
-    interval: float,
-    swing: float,
-    nearest: LocalFit | None,
-) -> tuple[LocalFit, float] | None:
-    """Return a fit of samples at least a count apart, and the slowest speed where they are.
-
-    Where sampling is slow against the motion, ``nearest`` is the fit of neighbours that follows it.
-    """
-    most = max(int(FARTHEST / (swing * interval)), 1)
-    stride = 1
-    while True:
-        # Even slower motion keeps neighbours within a count, whose errors are alike.
-        slowest = count / (stride * interval)
-        fit = _clean(local_fit(time, theta, degree=6, points=11, stride=stride), bad, speed)
-        if stride == 1 and nearest is not None and _less(nearest, fit):
-            fit = nearest
-        quick = np.abs(fit.slope) >= slowest
-        if np.count_nonzero(quick) >= max(FEWEST, quick.size // 3) or stride >= most:
-            break
-        stride = min(2 * stride, most)
-    if np.count_nonzero(quick) < FEWEST:
-        return None
-    found = [_only(fit, quick)]
-    farthest = max(int(STIFF * FARTHEST / (swing * interval)), 1)
-    for longer in range(stride + 1, min(stride + FURTHER, farthest) + 1):
-        degree, points = DEGREES[1] if fit is not nearest and longer <= most else DEGREES[-1]
-        more = local_fit(time, theta, degree=degree, points=points, stride=longer)
-        more = _clean(more, bad, speed)
-        found.append(_only(more, np.abs(more.slope) >= slowest))
-    return _pooled(found), slowest
-
-
-def _pooled(fits: list[LocalFit]) -> LocalFit:
-    """Return all residuals of several fits to the same samples, worth no more than those of one."""
-    middle, residual, slope = (
-        np.concatenate([getattr(fit, name) for fit in fits])
-        for name in ("middle", "residual", "slope")
-    )
-    worth = fits[0].sum_of_squares * middle.size / fits[0].middle.size
-    return dataclasses.replace(
-        fits[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
-    )
-
-
-def _clean(fit: LocalFit, bad: NDArray[np.bool_], speed: Floats) -> LocalFit:
-    """Leave out windows with samples that are not trusted, then those with outliers."""
-    fit = _only(fit, ~_near(bad, fit.neighbours)[fit.middle])
-    return _only(fit, ~_outlying(fit, speed)[fit.middle])
-
-
-def _outlying(fit: LocalFit, speed: Floats) -> NDArray[np.bool_]:
-    """Return which samples share a window with an outlier among residuals of similar speed."""
-    false = np.zeros(speed.size, bool)
-    sizes = np.abs(fit.residual)
-    whole = broad_scale(sizes)
-    order = np.argsort(speed[fit.middle], kind="stable")
-    for part in np.array_split(order, max(min(KINDS, order.size // (5 * FEWEST)), 1)):
-        # Noise that grows with speed is many times stronger at the quickest.
-        scale = max(whole, broad_scale(sizes[part]))
-        false[fit.middle[part[sizes[part] > FALSE * scale]]] = scale > 0
-    return _near(false, fit.neighbours)
-
-
-def _near(marked: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Return what is at most ``reach`` places from something marked."""
-    sums = np.concatenate([[0], np.cumsum(marked)])
-    place = np.arange(marked.size)
-    low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, marked.size)
-    near: NDArray[np.bool_] = sums[high] > sums[low]
-    return near
-
-
-def _only(fit: LocalFit, which: NDArray[np.bool_]) -> LocalFit:
-    return dataclasses.replace(
-        fit, middle=fit.middle[which], residual=fit.residual[which], slope=fit.slope[which]
-    )
-
-
-def _rms(fit: LocalFit) -> float:
-    return float(np.sqrt(np.mean(fit.residual**2)))
-
-
-def _stderr(fit: LocalFit) -> float:
-    """Standard error of the root mean square of residuals that share samples."""
-    return _rms(fit) * math.sqrt(fit.sum_of_squares / (2 * fit.middle.size))
-
-
 def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
     """Return the noise in ranges of speed; below ``slowest`` the count is all that is known."""
     speed = np.abs(fit.slope)
@@ -385,10 +246,8 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
         found.append(SpeedRange(0.0, slowest, least, least / 10, 0))
         edges[0] = slowest
     for low, high in itertools.pairwise(edges):
-        part = _only(fit, (speed >= low) & (speed <= high))
+        part = only(fit, (speed >= low) & (speed <= high))
         if part.middle.size:
-            sigma = max(_rms(part), least)
-            found.append(
-                SpeedRange(float(low), float(high), sigma, _stderr(part), part.middle.size)
-            )
+            sigma = max(rms(part), least)
+            found.append(SpeedRange(float(low), float(high), sigma, stderr(part), part.middle.size))
     return found

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records.following import FARTHEST
 from pendmap.records.local_fit import local_fit
-from pendmap.records.noise import DITHERED, FARTHEST, fastest
+from pendmap.records.noise import DITHERED, fastest
 from pendmap.records.robust import normal_scale
 from pendmap.records.steps import step_of
 from pendmap.words import counted
