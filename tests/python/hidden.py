@@ -23,13 +23,14 @@ def diagnosed(
     *effects: str,
     seed: int = 3,
     without: Sequence[str] = (),
+    max_effects: int = 3,
     **given: Any,  # noqa: ANN401 (what the rig is asked for)
 ) -> tuple[Discrepancy, dict[str, dict[str, float]]]:
     """Hide effects, diagnose the experiment, then read the truth: parameters by effect."""
     request = virtual_rig.Request("hidden", seed=seed, effects=effects or ("none",), **given)
     where = virtual_rig.places(folder / "hidden", replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
-    found = diagnose(read_experiment(where.experiment), without=without)
+    found = diagnose(read_experiment(where.experiment), max_effects=max_effects, without=without)
     truth = tomllib.loads(where.truth.read_text(encoding="utf-8"))
     return found, {e["name"]: e["parameters"] for e in truth.get("effect", [])}
 

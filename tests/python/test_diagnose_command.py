@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
+from bumpy import FILE
 from pendmap import Rig
+from recorded import clean
+from recorded import text as csv
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,6 +58,9 @@ def test_json_and_a_model_that_every_command_takes(
     low, high = effect["ci95"]["q"]
     assert low < effect["parameters"]["q"] < high
     assert found["detection_limits"]["bearing_harmonic"] > 0
+    # The model that it names is there; alone --json writes nothing else.
+    made = {path.name for path in tmp_path.iterdir()} - {"hidden", "hidden.truth.toml"}
+    assert made == {found["model"]} == {"diagnose.toml"}
     path = tmp_path / found["model"]
     content = tomllib.loads(path.read_text(encoding="utf-8"))
     assert content["effect"][0]["probability"] == effect["probability"]
@@ -94,6 +102,15 @@ def test_the_verdict_comes_first(hidden: str, pendmap_command: Run) -> None:
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("Verdict: named")
     assert "Written: found.toml" in run.stdout
+    # Numbers have the units that the report gives them.
+    assert re.search(
+        r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]; probability", run.stdout, re.MULTILINE
+    )
+    ranked = run.stdout.partition("candidate")[2].splitlines()
+    shapes = [line for line in ranked if " w = " in line]
+    assert shapes
+    assert all(re.search(r"th0 = \S+ rad, w = \S+ rad\b", line) for line in shapes)
+    assert re.search(r"^Share of the squared gap closed: \d+ %$", run.stdout, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -114,3 +131,80 @@ def test_bad_input_is_refused_on_one_line(
     assert run.returncode == 2
     assert "Traceback" not in run.stderr
     assert not list(tmp_path.glob("*.toml"))
+
+
+def test_help_says_what_json_alone_writes(pendmap_command: Run) -> None:
+    said = " ".join(pendmap_command("diagnose", "--help").stdout.split())
+    assert "One JSON object on stdout; alone, no file but the model." in said
+
+
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        (("lab", "--out", "lab/experiment.toml"), "--out"),
+        (("lab", "--out", "lab/../link.toml"), "--out"),
+        (("lab", "--model", "base.toml", "--out", "base.toml"), "--out"),
+        (("lab", "--model", "link.toml", "--out", "lab/experiment.toml"), "--out"),
+        (("lab", "--model", "diagnose.toml", "--json"), "--out"),
+        (("lab", "--effects", "own.toml", "--out", "./own.toml"), "--out"),
+        (("record.toml", "--out", "record.toml"), "--out"),
+        (("lab", "--report", "lab/run.md"), "--report"),
+        (("folder/report.html", "--report", "folder"), "--report"),
+        (("record.png", "--plot", "record.png"), "--plot"),
+        (("record.rrd", "--rerun", "record.rrd"), "--rerun"),
+    ],
+)
+def test_what_is_read_is_not_replaced(
+    words: tuple[str, ...], option: str, tmp_path: Path, pendmap_command: Run
+) -> None:
+    for name in ("lab", "folder"):
+        (tmp_path / name).mkdir()
+    record = csv(clean(duration=2.0))
+    for name in ("record.toml", "record.png", "record.rrd", "lab/run.md", "folder/report.html"):
+        (tmp_path / name).write_text(record, encoding="utf-8")
+    described = '[[run]]\nfile = "run.md"\n'
+    (tmp_path / "lab" / "experiment.toml").write_text(described, encoding="utf-8")
+    (tmp_path / "link.toml").symlink_to(tmp_path / "lab" / "experiment.toml")
+    for name in ("base.toml", "diagnose.toml"):
+        (tmp_path / name).write_text("[pendulum]\nw0 = 6.2\n", encoding="utf-8")
+    (tmp_path / "own.toml").write_text(FILE, encoding="utf-8")
+
+    def content() -> dict[Path, bytes]:
+        return {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+    before = content()
+    run = pendmap_command("diagnose", *words)
+    assert run.returncode == 2
+    assert f"Invalid value for '{option}'" in run.stderr
+    assert "is an input, which would be lost: allowed is another file" in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert content() == before
+
+
+def test_a_model_without_dimensions_is_refused_with_what_makes_it_one_in_si(
+    tmp_path: Path, pendmap_command: Run
+) -> None:
+    (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
+    (tmp_path / "record.csv").write_text(csv(clean(duration=2.0)), encoding="utf-8")
+    run = pendmap_command("diagnose", "record.csv", "--model", "bare.toml")
+    assert run.returncode == 2
+    assert "bare.toml: has no dimensions: allowed is a model in SI: in [pendulum] w0" in run.stderr
+    assert "from_toml" not in run.stderr
+    assert run.stderr.count("\n") == 1
+
+
+def test_a_wrong_unit_is_said_before_the_verdict(tmp_path: Path, pendmap_command: Run) -> None:
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    time, theta = clean(duration=10.0)
+    (lab / "run.csv").write_text(csv((time, np.degrees(theta))), encoding="utf-8")
+    described = (
+        '[columns]\nangle = { name = "theta_rad", unit = "rad" }\n[[run]]\nfile = "run.csv"\n'
+    )
+    (lab / "experiment.toml").write_text(described, encoding="utf-8")
+    run = pendmap_command("diagnose", "lab", "--out", "found.toml", "--max-effects", "0")
+    assert run.stdout.startswith("Warning: run: swings of ")
+    first, *others = run.stdout.splitlines()
+    assert first.endswith("the unit or the scale is wrong")
+    assert others[0].startswith("Verdict: ")
+    assert not any("the unit or the scale is wrong" in line for line in others)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import pytest
 from bumpy import BUMP, FILE, experiment, torque
 from pendmap import Formula, InputError, Rig, load_formulas, load_model
 from pendmap.discrepancy import TorqueFunction, diagnose
+from pendmap.discrepancy.functions import call_once
 from pendmap.discrepancy.summary import as_text
 from pendmap.records import read_experiment
 
@@ -64,6 +66,10 @@ def test_functions_are_scored_beside(tmp_path: Path) -> None:
     # No formula: nothing that the library has is named for the bump.
     found = diagnose(records, effects=functions)
     assert found.verdict not in {"none", "named"}
+    (share,) = (line for line in as_text(found) if line.startswith("Share"))
+    assert share.startswith("Share of the squared gap closed by what is nearest: ") is (
+        found.verdict == "unknown"
+    )
     table, slope = found.functions
     assert (table.name, slope.name) == ("table", "slope")
     assert table.size == pytest.approx(1.0, abs=0.3)
@@ -85,18 +91,30 @@ def test_functions_are_scored_beside(tmp_path: Path) -> None:
         (lambda *_: np.zeros(3), "fails with ValueError"),
         (lambda th, *_: th / 0.0, "allowed are finite numbers"),
         (lambda th: th, "fails with TypeError"),
+        (lambda th, _v, _t, _phase, own: own["sise"] * th, "fails with KeyError"),
+        (lambda th, *_: 1.0 if th > 0 else 0.0, "fails with ValueError"),
     ],
 )
 def test_a_function_s_faults_are_said_on_one_line(
-    function: Callable[..., Any], said: str, tmp_path: Path
+    function: Callable[..., Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     records = read_experiment(experiment(tmp_path / "records"))
+    # Before anything is fitted, which takes a while.
+    module = importlib.import_module("pendmap.discrepancy.diagnose")
+    monkeypatch.setattr(module, "baseline", pytest.fail)
     with (
         np.errstate(divide="ignore", invalid="ignore"),
         pytest.raises(InputError, match=said) as caught,
     ):
         diagnose(records, max_effects=0, effects=[TorqueFunction("mine", function)])
     assert str(caught.value).count("\n") == 0
+
+
+def test_what_a_function_has_no_value_for_between_readings_is_no_fault(tmp_path: Path) -> None:
+    records = read_experiment(experiment(tmp_path / "records"))
+    # Readings in counts stay: exactly 0 is no velocity, and no angle, of a motion.
+    function = TorqueFunction("mine", lambda th, v, *_: v / np.abs(v) + np.sin(th) / th)
+    call_once(records.runs, [function])
 
 
 def test_what_cannot_be_a_candidate_is_refused(tmp_path: Path) -> None:

@@ -92,3 +92,18 @@ def test_what_a_first_step_would_lose_is_found(tmp_path: Path) -> None:
     assert found.verdict != "unknown"
     assert "asymmetric_viscous" in _names(found)
     assert found.best.held.chi2 < found.base.held.chi2
+
+
+@pytest.mark.parametrize("most", [0, 1])
+def test_no_more_is_added_than_is_allowed(most: int, tmp_path: Path) -> None:
+    # Of a pair one half leaves much: the search looks for other beginnings, pairs among them.
+    pair = ("quadratic_drag", "bearing_harmonic")
+    given = {"size": 4.0, "noise": 0.1, "free": 3, "forced": 0}
+    found, _ = diagnosed(tmp_path, *pair, seed=1, max_effects=most, **given)
+    counted = [name for name in found.nearest.trial.names if name != "encoder_offset"]
+    assert len(counted) <= most
+    if not most:
+        assert found.nearest is found.best is found.base
+        assert found.attempts == ()
+        assert found.effects == ()
+        assert found.verdict == "unknown"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pendmap.discrepancy import diagnose
+from pendmap.discrepancy.physical import unphysical
 from pendmap.discrepancy.summary import as_json, as_text
 from pendmap.records import read_experiment
 
@@ -58,3 +59,22 @@ def test_what_is_left_is_said(name: str) -> None:
     for parameter in said["unphysical"]:
         assert fit[parameter] < 0
         assert any(parameter in line and "unphysical" in line for line in text.splitlines())
+
+
+@pytest.mark.parametrize("name", BY_HAND)
+def test_the_model_that_is_given_out_is_physical_and_nearly_as_good(name: str) -> None:
+    diagnosis = found(name)
+    fit = diagnosis.usable.trial.fit
+    assert not unphysical(fit)
+    assert fit.rms <= 1.1 * BY_HAND[name]
+    assert fit.rms < 0.2 * diagnosis.base.trial.fit.rms
+
+
+def test_damping_that_a_drift_takes_below_0_is_said() -> None:
+    diagnosis = found("cartpend_free_long")
+    assert "viscous_drift" in diagnosis.nearest.trial.names
+    fit = diagnosis.best.trial.fit
+    drift = next(e for e in fit.model.effects if e.name == "viscous_drift").parameters["r"]
+    # c/m + r t = 0.
+    expected = -fit["c_over_m"] / drift
+    assert diagnosis.below_zero == {"c_over_m": pytest.approx(expected, rel=0.06)}

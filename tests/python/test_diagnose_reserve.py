@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import pytest
@@ -9,7 +10,9 @@ import pytest
 import pendmap
 from hidden import diagnosed
 from pendmap.discrepancy.calibration import complete
-from pendmap.discrepancy.verdict import CHANCE, SURE
+from pendmap.discrepancy.candidates import candidates
+from pendmap.discrepancy.rivals import Standing
+from pendmap.discrepancy.verdict import CHANCE, SURE, closes_most
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -50,3 +53,30 @@ def test_what_two_others_do_together_is_given_with_reserve(seed: int, tmp_path: 
     )
     assert found.effects == () or all(effect.approximate for effect in found.effects)
     assert all(effect.probability < SURE for effect in found.effects)
+
+
+@pytest.mark.parametrize(
+    ("gains", "closed", "spread", "clear"),
+    [
+        # One does it nearly alone.
+        ([5000.0], 0.92, 0.2, True),
+        ([5000.0], 0.85, 0.0, False),
+        ([5000.0], 0.99, 0.4, False),
+        ([5000.0, 400.0], 0.92, 0.2, True),
+        # Several share it, well or not.
+        ([5000.0, 1500.0], 0.97, 0.05, True),
+        ([5000.0, 1500.0], 0.92, 0.05, False),
+        ([5000.0, 1500.0], 0.97, 0.2, False),
+        ([5000.0, 3000.0], 0.99, 0.0, False),
+        # Without one of them there is no motion to speak of.
+        ([math.inf], 0.99, 0.0, True),
+        ([math.inf, 5000.0], 0.99, 0.0, False),
+    ],
+)
+def test_what_is_partial(gains: list[float], closed: float, spread: float, clear: bool) -> None:  # noqa: FBT001 (a table)
+    drag = next(c for c, *_ in candidates((), driven=False) if c.name == "quadratic_drag")
+    standings = [Standing(drag, gain, ()) for gain in gains]
+    assert closes_most(standings, closed, spread, rest=True) is clear
+    # Where nothing is left beside it, one alone in doubt is not claimed, nor are several.
+    little = 0 < sum(sorted(gains)[:-1]) < 0.1 * max(gains) < math.inf
+    assert closes_most(standings, closed, spread, rest=False) is (clear and little)

@@ -111,6 +111,11 @@ def test_some_methods_and_an_effect(decay_file: Path, pendmap_command: Run) -> N
         (("compare", "absent.toml", "decay.csv"), "absent.toml: No such file"),
         (("compare", "bare.toml", "decay.csv"), "bare.toml: has no dimensions"),
         (("compare", "model.toml", "forced"), "no run is a free decay"),
+        (("compare", "bare.toml", "decay.csv"), "in SI: in [pendulum] w0 in rad/s, c_over_m ="),
+        (("compare", "model.png", "decay.csv", "--plot", "model.png"), "'model.png': is an input"),
+        (("identify", "forced", "--out", "forced/experiment.toml"), "is an input, which would"),
+        (("identify", "decay.toml", "--out", "decay.toml"), "'--out': 'decay.toml': is an input"),
+        (("look", "decay.png", "--plot", "./decay.png"), "'--plot': 'decay.png': is an input"),
     ],
 )
 def test_refused_on_one_line(
@@ -123,6 +128,9 @@ def test_refused_on_one_line(
     (tmp_path / "empty.csv").write_text("", encoding="utf-8")
     (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
     (tmp_path / "model.toml").write_text("[pendulum]\nw0 = 6.2\n", encoding="utf-8")
+    (tmp_path / "model.png").write_text("[pendulum]\nw0 = 6.2\n", encoding="utf-8")
+    for name in ("decay.toml", "decay.png"):
+        (tmp_path / name).write_bytes(decay_file.read_bytes())
     forced = tmp_path / "forced"
     forced.mkdir()
     (forced / "run_00.csv").write_bytes(decay_file.read_bytes())
@@ -130,12 +138,36 @@ def test_refused_on_one_line(
         '[[run]]\nfile = "run_00.csv"\nkind = "forced"\ndrive = { p = 0.2, Omega = 12.0 }\n',
         encoding="utf-8",
     )
-    before = sorted(path.name for path in tmp_path.rglob("*"))
+    before = {path: path.is_file() and path.read_bytes() for path in tmp_path.rglob("*")}
     run = pendmap_command(*words)
     assert run.returncode == 2
     assert complaint in run.stderr
     assert run.stderr.count("\n") == 1
-    assert sorted(path.name for path in tmp_path.rglob("*")) == before
+    after = {path: path.is_file() and path.read_bytes() for path in tmp_path.rglob("*")}
+    assert after == before
+
+
+@pytest.mark.parametrize(
+    "words", [("identify", "lab", "--method", "energy_balance"), ("compare", "model.toml", "lab")]
+)
+def test_a_wrong_unit_is_said_before_all_else(
+    words: tuple[str, ...], tmp_path: Path, pendmap_command: Run
+) -> None:
+    time, angle = record(decay(), seconds=20, seed=3)
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    table = np.stack([time, np.degrees(angle)], axis=1)
+    np.savetxt(lab / "run.csv", table, delimiter=",", header="t_s,theta", comments="")
+    (lab / "experiment.toml").write_text(
+        '[columns]\nangle = { name = "theta", unit = "rad" }\n[[run]]\nfile = "run.csv"\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "model.toml").write_text("[pendulum]\nw0 = 6.2\n", encoding="utf-8")
+    run = pendmap_command(*words)
+    first, *others = run.stdout.splitlines()
+    assert first.startswith("Warning: run: ")
+    assert first.endswith("the unit or the scale is wrong")
+    assert not any("the unit or the scale is wrong" in line for line in others)
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,8 @@ def test_what_is_typed_counts_instead_of_the_file(
         (("--model", "bare.toml", "--p", 2), "bare.toml: p without omega"),
         (("--model", "absent.toml"), "absent.toml: No such file"),
         (("--model", "."), ": Is a directory"),
+        (("--model", "model.nc", "--out", "model.nc"), "'--out': 'model.nc': is an input, which"),
+        (("--model", "a.zarr/model.toml", "--out", "a.zarr"), "'--out': 'a.zarr': is an input"),
     ],
 )
 def test_the_command_refuses_on_one_line(
@@ -121,8 +123,13 @@ def test_the_command_refuses_on_one_line(
 ) -> None:
     written(tmp_path, EXAMPLE)
     (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
+    (tmp_path / "a.zarr").mkdir()
+    for copy in ("model.nc", "a.zarr/model.toml"):
+        (tmp_path / copy).write_bytes((tmp_path / "model.toml").read_bytes())
+    before = sorted(tmp_path.rglob("*"))
     run = pendmap_command("simulate", *words)
     assert run.returncode == 2
     assert complaint in run.stderr
     assert run.stderr.count("\n") == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bare.toml", "model.toml"]
+    assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "model.nc").read_bytes() == (tmp_path / "model.toml").read_bytes()

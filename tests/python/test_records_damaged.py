@@ -49,6 +49,22 @@ def consistent(run: pendmap.Run) -> None:
     pendmap.noise_floor(run)
 
 
+@pytest.mark.parametrize("samples", range(3, 41))
+def test_short_records_are_read_or_refused_on_one_line(samples: int, tmp_path: Path) -> None:
+    time = np.arange(samples) / 25
+    swing = 0.5 * np.cos(6.2 * time)
+    false = swing + np.where(np.arange(samples) == samples // 2, 0.7, 0.0)
+    path = tmp_path / "record.csv"
+    for readings in (swing, false, np.zeros(samples), np.minimum(swing, 0.3)):
+        path.write_text(text((time, readings)), encoding="utf-8")
+        try:
+            (run,) = pendmap.read_experiment(path).runs
+        except pendmap.InputError as error:
+            one_line(str(error))
+        else:
+            consistent(run)
+
+
 def test_there_are_a_hundred_kinds() -> None:
     assert len(DAMAGES) + len(DESCRIPTIONS) >= 100
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import math
 import re
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from matplotlib import rc_context
 
 from hidden import once
 from pendmap import InputError, figures, report
+from pendmap.discrepancy import FunctionScore
 from pendmap.discrepancy.summary import as_json
 from pendmap.figures import discrepancy, style
 from pendmap.figures.report import FIGURES
@@ -28,6 +30,7 @@ from pendmap.report.document import (
     Strong,
     Table,
 )
+from pendmap.report.wording import chance, number, stated, within
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -144,9 +147,63 @@ def test_its_numbers_are_those_of_the_json() -> None:
         assert told[f"`{row['name']}`"][0] == f"`{row['name']}`"
         assert any(r[0] == f"`{row['name']}`" and f"{row['score']:.1f}" in r for r in rows)
     for name, limit in fields["detection_limits"].items():
-        assert told[f"`{name}`"][2].startswith(f"{limit:.2g}")
+        assert told[f"`{name}`"][2].startswith(number(limit, 2))
     for run, each in zip(found.evidence.fitted, fields["runs"]["quadratic_drag.q"], strict=True):
-        assert any(r[0] == f"`{run.name}`" and r[2] == f"{each['stderr']:.2g}" for r in rows)
+        assert any(r[0] == f"`{run.name}`" and r[2] == number(each["stderr"], 2) for r in rows)
+
+
+def test_numbers_are_written_alike_and_errors_with_two_digits() -> None:
+    assert [number(v, 2) for v in (0.00085, 6.3e-7, -190.4, 0.0, 1e-9, 3200.0)] == [
+        "0.00085",
+        "6.3 \N{MULTIPLICATION SIGN} 10⁻⁷",
+        "-190",
+        "0",
+        "10⁻⁹",
+        "3200",
+    ]
+    assert within(6.34e-7, 1.2e-7) == "6.3 \N{MULTIPLICATION SIGN} 10⁻⁷"
+    assert within(0.00020563, 2.3e-6) == "0.0002056"
+    assert stated(0.5292, 0.11) == "0.53 \N{PLUS-MINUS SIGN} 0.11"
+    assert stated(-8.349e-5, 1.9e-7) == (
+        "(-8.349 \N{PLUS-MINUS SIGN} 0.019) \N{MULTIPLICATION SIGN} 10⁻⁵"
+    )
+    assert [chance(p) for p in (0.00758, 0.129, 0.99537, 0.9999)] == [
+        "0.76 %",
+        "13 %",
+        "99.5 %",
+        "above 99.9 %",
+    ]
+
+
+def test_python_functions_that_were_tried_are_told() -> None:
+    scores = (
+        FunctionScore("table", 0.2, 0.013, 81.2, 0.4),
+        FunctionScore("flat", math.nan, math.nan, 0.0, 0.0),
+    )
+    text = report.as_markdown(
+        report.diagnosis(dataclasses.replace(once("quadratic_drag"), functions=scores)), {}
+    )
+    assert "| `table` | 0.200 \N{PLUS-MINUS SIGN} 0.013 | 81.2 | 0.4 |" in text
+    assert "| `flat` | does not show | 0 | 0 |" in text
+
+
+@pytest.mark.parametrize("size", [1.0, -1.0])
+def test_the_band_of_all_runs_is_the_interval_that_is_stated(size: float) -> None:
+    found = once("quadratic_drag")
+    (effect,) = found.effects
+    low, high = effect.ci95["q"]
+    if size < 0:
+        # As where a size below 0 is stated as one above it.
+        parameters = {"q": -effect.parameters["q"]}
+        turned = dataclasses.replace(effect, parameters=parameters, ci95={"q": (-high, -low)})
+        found = dataclasses.replace(found, effects=(turned,))
+    with rc_context(style.RC):
+        made = FIGURES["runs"](found, 60.0)
+    assert made is not None
+    (band,) = made.axes[0].patches
+    ends = band.get_window_extent().transformed(made.axes[0].transData.inverted())
+    power = 3 * math.floor(math.log10(effect.parameters["q"] * size * size) / 3)
+    assert (ends.y0, ends.y1) == pytest.approx((low / 10**power, high / 10**power), rel=1e-6)
 
 
 def mrad(value: float) -> str:
@@ -214,7 +271,8 @@ def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command
     run = pendmap_command("diagnose", "decay", "--report", "report", "--quiet")
     assert run.returncode == 0, run.stderr
     text = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
-    assert "Stretches were held back of `run_00`" in text
+    assert "Held out: stretches of `run_00`" in text
+    assert "runs.png" not in text
     assert "| forced |" not in text
 
 

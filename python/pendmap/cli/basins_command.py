@@ -53,8 +53,9 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     Writes basins.nc, basins.png and basins.rrd if no output is named. --json alone writes no file.
     --view writes the recording it opens: basins.rrd, or what --rerun names.
     """
+    file = given["model"]
     model = model_from(given)
-    outputs = Outputs.take(given, "basins")
+    outputs = Outputs.take(given, "basins", reads=[file])
     theta, velocity, count = (given.pop(name) for name in ("theta", "velocity", "grid"))
     if count is not None and (theta is not None or velocity is not None):
         raise click.UsageError("--grid: allowed alone; --theta and --velocity name their own cells")

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import click
 
+from pendmap.cli.inputs import keep_inputs
+from pendmap.cli.model_options import rig_from
 from pendmap.cli.show import plain, progress_bar, write_all, write_table
 from pendmap.cli.types import OutputFile
 
@@ -31,16 +33,14 @@ def command(*, model: Path, path: Path, plot: Path | None, as_json: bool, quiet:
     """
     if plot is None and not as_json:
         plot = OutputFile([".png"]).convert("compare.png", None, None)
-    from pendmap.errors import InputError
     from pendmap.identification import compare
     from pendmap.identification.compared import as_json as fields
     from pendmap.identification.compared import as_text, runs_table
-    from pendmap.model import Rig, load_model
-    from pendmap.records import read_experiment
+    from pendmap.records import files_of, read_experiment
+    from pendmap.records.summary import doubts_said
 
-    rig = load_model(model)
-    if not isinstance(rig, Rig):
-        raise InputError(f"{model}: has no dimensions: allowed is a model in SI, with its w0")
+    keep_inputs([model, *files_of(path)], {"--plot": [plot]})
+    rig = rig_from(model)
     with progress_bar("compare", shown=sys.stderr.isatty() and not quiet):
         comparison = compare(rig, read_experiment(path))
     written: list[str] = []
@@ -51,8 +51,12 @@ def command(*, model: Path, path: Path, plot: Path | None, as_json: bool, quiet:
     if as_json:
         click.echo(json.dumps(plain(fields(comparison) | {"model": str(model)}), allow_nan=False))
     elif not quiet:
+        doubts = list(doubts_said(comparison.experiment, *(one.run for one in comparison.runs)))
+        for line in doubts:
+            click.echo(line)
         write_table(*runs_table(comparison))
         for line in as_text(comparison):
-            click.echo(line)
+            if line not in doubts:
+                click.echo(line)
         if written:
             click.echo("Written: " + ", ".join(written))

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pendmap.cli.inputs import keep_inputs, report_files
+from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import check_view
 from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
 from pendmap.cli.types import OutputFile, ReportFile, Whole
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from pendmap.discrepancy import Discrepancy
-    from pendmap.model import Formula, Rig
+    from pendmap.model import Formula
 
 __all__ = ["command"]
 
@@ -66,7 +68,12 @@ NAME = "diagnose"
 )
 @click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd.")
 @click.option("--view", is_flag=True, help="Write the recording and open the viewer on it.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="One JSON object on stdout; alone, no file but the model.",
+)
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(  # noqa: PLR0913 (an option each)
     *,
@@ -95,7 +102,7 @@ def command(  # noqa: PLR0913 (an option each)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.discrepancy import diagnose
     from pendmap.model import load_formulas
-    from pendmap.records import read_experiment
+    from pendmap.records import files_of, read_experiment
 
     own = [] if effects_path is None else load_formulas(effects_path)
     with _named(str(effects_path)):
@@ -108,7 +115,16 @@ def command(  # noqa: PLR0913 (an option each)
         check_view()
         rerun = rerun or _own(".rrd")
     outputs = (out or _own(".toml"), plot, report, rerun)
-    model = None if model_path is None else _si(model_path)
+    keep_inputs(
+        [*files_of(path), model_path, effects_path],
+        {
+            "--out": [outputs[0]],
+            "--plot": [plot],
+            "--report": report_files(report),
+            "--rerun": [rerun],
+        },
+    )
+    model = None if model_path is None else rig_from(model_path)
     shown = sys.stderr.isatty() and not quiet
     with progress_bar("read", shown=shown):
         experiment = read_experiment(path)
@@ -160,12 +176,6 @@ def _check_known(names: Sequence[str], own: Sequence[Formula]) -> None:
 def _own(suffix: str) -> Path:
     """Return a file under the command's own name, where one can be written."""
     return OutputFile([suffix]).convert(f"{NAME}{suffix}", None, None)
-
-
-def _si(path: Path) -> Rig:
-    from pendmap.model import Rig
-
-    return Rig.from_toml(path)
 
 
 def _files(

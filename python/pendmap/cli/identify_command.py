@@ -53,11 +53,11 @@ def command(
     brackets: standard errors in the last digits. Writes identify.toml, a model for --model of every
     other command, identify.png and identify.rrd if no output is named. --json alone writes no file.
     """
-    outputs = Outputs.take(given, "identify", SUFFIX)
     from pendmap.errors import InputError
     from pendmap.identification import identified_model, identify_experiment
-    from pendmap.records import read_experiment
+    from pendmap.records import files_of, read_experiment
 
+    outputs = Outputs.take(given, "identify", SUFFIX, files_of(path))
     with progress_bar("read", shown=outputs.shows_progress):
         experiment = read_experiment(path)
     with progress_bar("identify", shown=outputs.shows_progress) as progress:
@@ -106,9 +106,14 @@ def _show(report: IdentificationReport, outputs: Outputs, model: Path | None = N
 
 def _say(report: IdentificationReport) -> None:
     from pendmap.identification.summary import as_text, methods_table, table1_table
+    from pendmap.records.summary import doubts_said
 
+    doubts = list(doubts_said(report.experiment, *report.runs))
+    for line in doubts:
+        click.echo(line)
     for head, rows in (methods_table(report), table1_table(report)):
         if rows:
             write_table(head, rows)
     for line in as_text(report):
-        click.echo(line)
+        if line not in doubts:
+            click.echo(line)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.show import plain, progress_bar
 from pendmap.cli.types import OutputFile
 from pendmap.files import held_interrupts
@@ -27,10 +28,11 @@ def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> Non
     Channels, rate, noise without a model, releases and rest, gaps, outliers, missed counts,
     units: what is certain is mended as it is read, and said. The files stay as they are.
     """
-    from pendmap.records import read_experiment
+    from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import as_json as fields
     from pendmap.records.summary import as_text
 
+    keep_inputs(files_of(path), {"--plot": [plot]})
     with progress_bar("read", shown=sys.stderr.isatty() and not quiet):
         experiment = read_experiment(path)
     if plot is not None:

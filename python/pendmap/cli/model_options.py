@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.types import NUMBER
+from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
 from pendmap.model.quantities import check
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     Command = Callable[..., Any]
 
-__all__ = ["model_from", "model_options"]
+__all__ = ["model_from", "model_options", "rig_from"]
 
 _BARE = {
     "gamma": "Viscous damping c/(m w0).",
@@ -81,3 +82,15 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     bare = {name: value for name, value in typed.items() if name in _BARE}
     base = dataclasses.replace(PRESETS[preset] if preset else Pendulum(), **bare)
     return base if model is None else load_model(model, typed)
+
+
+def rig_from(path: Path) -> Rig:
+    """Read a model file that must be in SI; refuse another with what makes it one."""
+    model = load_model(path)
+    if not isinstance(model, Rig):
+        raise InputError(
+            f"{path}: has no dimensions: allowed is a model in SI: in [pendulum] w0 in rad/s, "
+            "c_over_m = gamma w0 and Tr = theta_r w0^2 in the place of gamma and theta_r; pendmap "
+            "identify writes one"
+        )
+    return model

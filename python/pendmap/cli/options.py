@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.checks import MOST_THREADS
+from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.types import OutputFile, Whole
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
     Command = Callable[..., Any]
@@ -82,8 +83,17 @@ class Outputs:
     quiet: bool
 
     @classmethod
-    def take(cls, given: dict[str, Any], name: str, suffix: str = RESULTS[0]) -> Outputs:
-        """Take the output options out of ``given``; with none, three files ``name.*``."""
+    def take(
+        cls,
+        given: dict[str, Any],
+        name: str,
+        suffix: str = RESULTS[0],
+        reads: Iterable[Path | None] = (),
+    ) -> Outputs:
+        """Take the output options out of ``given``; with none, three files ``name.*``.
+
+        None of them may be one that the command ``reads``.
+        """
         fields = {field.name: given.pop(field.name) for field in dataclasses.fields(cls)}
         outputs = cls(**fields)
         asked = (outputs.out, outputs.plot, outputs.rerun, outputs.view, outputs.as_json)
@@ -97,6 +107,8 @@ class Outputs:
         if outputs.view and outputs.rerun is None:
             rrd = OutputFile([".rrd"]).convert(f"{name}.rrd", None, None)
             outputs = dataclasses.replace(outputs, rerun=rrd)
+        places = {"--out": outputs.out, "--plot": outputs.plot, "--rerun": outputs.rerun}
+        keep_inputs(reads, {option: [path] for option, path in places.items()})
         if outputs.view:
             check_view()
         return outputs

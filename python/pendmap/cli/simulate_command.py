@@ -43,8 +43,9 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     Writes simulate.nc, simulate.png and simulate.rrd if no output is named. --json alone writes no
     file. --view writes the recording it opens: simulate.rrd, or what --rerun names.
     """
+    file = given["model"]
     model = model_from(given)
-    outputs = Outputs.take(given, "simulate")
+    outputs = Outputs.take(given, "simulate", reads=[file])
 
     from pendmap.trajectory import simulate
 

@@ -141,14 +141,15 @@ def _power(value: float) -> str:
 
 def _interval(outlook: Outlook, best: Prospect) -> str:
     return (
-        f"The least sure is {outlook.about[0]}, known to +- {outlook.now:.2g} of its value (95 %): "
-        f"record {best.proposal.what}, for a predicted +- {best.value:.2g}."
+        f"The least sure is {outlook.about[0]}, known to +- {100 * outlook.now:.2g} % (95 %): "
+        f"record {best.proposal.what}, for a predicted +- {100 * best.value:.2g} %."
     )
 
 
 def _limits(outlook: Outlook, best: Prospect) -> str:
     names = ", ".join(outlook.about)
     return (
-        f"To see more, record {best.proposal.what}: half of all effects not found would then show "
-        f"at {best.value:.2g} of the size that shows now, or less; most gain {names}."
+        f"To see smaller effects, record {best.proposal.what}: for half of the effects not found "
+        f"the smallest size that shows falls to {100 * best.value:.2g} % of what it is now, or "
+        f"further; most for {names}."
     )

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.advice import Advice, advice_of
 from pendmap.discrepancy.baseline import baseline
+from pendmap.discrepancy.below_zero import below_zero
 from pendmap.discrepancy.candidates import checked_own
 from pendmap.discrepancy.cycles import Cycles, cycles_of
 from pendmap.discrepancy.evidence import Evidence, evidence_of
-from pendmap.discrepancy.functions import FunctionScore, divided, function_scores
+from pendmap.discrepancy.functions import FunctionScore, call_once, divided, function_scores
 from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.horizon import Forecast, forecasts_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
@@ -134,7 +135,12 @@ class Discrepancy(Readable):
     @functools.cached_property
     def usable(self) -> Found:
         """The best model without negative damping, as a file can hold it."""
-        return physical(self.evidence, self.best)
+        return physical(self.evidence, self.base, self.best, self.own)
+
+    @functools.cached_property
+    def below_zero(self) -> dict[str, float]:
+        """From which time in the laboratory on, s, damping or friction are below 0 by a drift."""
+        return below_zero(self.evidence, self.best)
 
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:
@@ -201,6 +207,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     report = progress or (lambda _done, _total: None)
     steps = max_effects + 3
     evidence = evidence_of(experiment)
+    call_once(evidence.runs, functions)
     begin = baseline(evidence, model)
     # Windows are as long as it could follow the runs.
     evidence = dataclasses.replace(evidence, fitted=begin.runs)

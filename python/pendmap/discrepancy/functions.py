@@ -21,20 +21,24 @@ from pendmap.discrepancy.torque import freed, responses, windows_of
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.trial import Trial
+    from pendmap.records import Run
 
     Floats = NDArray[np.float64]
 
-__all__ = ["FunctionScore", "TorqueFunction", "divided", "function_scores"]
+__all__ = ["FunctionScore", "TorqueFunction", "call_once", "divided", "function_scores"]
 
 
 UNSEEN: Final = 1e-4
 """A torque of which the fitted parameters follow all but this part does nothing of its own."""
+
+VISITED: Final = (0.05, 0.95)
+"""Quantiles of readings and their differences between which the motion surely is, for all noise."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,6 +149,40 @@ def divided(effects: object) -> tuple[list[TorqueFunction], list[Any]]:
         raise InputError(f"effects is {shown}: allowed is a list of Formula and TorqueFunction")
     functions = [effect for effect in effects if isinstance(effect, TorqueFunction)]
     return functions, [effect for effect in effects if not isinstance(effect, TorqueFunction)]
+
+
+def call_once(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
+    """Call functions where the pendulum was: what is wrong with them is said before any fit.
+
+    Angles and velocities that are exactly 0 are left out: a motion passes them between two
+    readings, where a reading in counts stays, and a function may be of no value there.
+
+    Parameters
+    ----------
+    runs : iterable of Run
+        The records.
+    functions : sequence of TorqueFunction
+        The candidates.
+
+    Raises
+    ------
+    InputError
+        As of :meth:`TorqueFunction.torque`.
+    """
+    for run in runs if functions else ():
+        time, theta = run.time[run.trusted], run.theta[run.trusted]
+        if time.size < 2:  # noqa: PLR2004 (a difference)
+            continue
+        velocity = np.gradient(theta, time)
+        theta, velocity = (np.clip(x, *np.quantile(x, VISITED)) for x in (theta, velocity))
+        phase = np.full(time.size, np.nan)
+        if run.drive is not None:
+            turned = (run.drive["Omega"] or 0.0) * time + (run.drive["phi"] or 0.0)
+            phase = np.angle(np.exp(1j * turned))
+        which = (theta != 0) & (velocity != 0)
+        place = {"velocity": velocity, "drive_phase": phase, "lab_time": run.lab_time_s + time}
+        for function in functions:
+            function.torque({name: x[which] for name, x in place.items()}, theta[which])
 
 
 def function_scores(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.verdict import Judgement
     from pendmap.model import Formula, Rig
 
-__all__ = ["NamedEffect", "diagnosed_model", "named_effects"]
+__all__ = ["NamedEffect", "diagnosed_model", "named_effects", "values_of"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,7 +86,7 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
     best : Found
         The model.
     judgement : Judgement
-        Its standing.
+        Its standing. Of effects that the model does not have nothing is returned.
     """
     widening = math.sqrt(best.trial.widening)
     profiled = profiles(evidence, best.trial)
@@ -94,7 +94,9 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
     named = []
     for standing in judgement.standings:
         candidate = standing.candidate
-        parameters, errors = _values(best, candidate)
+        if candidate.name not in best.trial.names:
+            continue
+        parameters, errors = values_of(best, candidate)
         mixed = best.trial.fit.mixed
         ci95 = {
             n: interval(parameters[n], half, mixed=f"{candidate.name}.{n}" in mixed)
@@ -116,7 +118,8 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
     return tuple(named)
 
 
-def _values(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:
+def values_of(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:
+    """Return an effect's parameters, sizes positive and phases within half a turn, and errors."""
     estimates = best.trial.fit.estimates
     own = own_name(candidate.name)
     if own is not None:

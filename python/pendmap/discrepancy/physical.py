@@ -11,17 +11,26 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.held import tried
 from pendmap.discrepancy.refit import Found
+from pendmap.discrepancy.select import Search
 from pendmap.discrepancy.trial import GENTLE, fitted
 from pendmap.errors import InputError
+from pendmap.model.effects import library
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.trial import Trial
     from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.model import Formula
 
 __all__ = ["physical", "unphysical"]
 
 OPPOSING: Final = ("c_over_m", "Tr")
 """Coefficients of the damping and the friction that oppose the motion wherever it is."""
+
+ASTRAY: Final = 1.5
+"""So many times the sum of squares is no longer the same explanation without the negative part."""
 
 
 def unphysical(fit: TrajectoryFit) -> dict[str, float]:
@@ -32,18 +41,39 @@ def unphysical(fit: TrajectoryFit) -> dict[str, float]:
     return {n: fit[n] for n in OPPOSING if n in fit.estimates and fit[n] < 0}
 
 
-def physical(evidence: Evidence, found: Found) -> Found:
-    """Return a model with its negative coefficients at 0, the others fitted again from there.
+def physical(evidence: Evidence, base: Found, found: Found, own: Collection[Formula] = ()) -> Found:
+    """Return a model with its negative coefficients at 0, the others fitted again.
+
+    From the model's own motion on, and where that leads far away from it, as a search among its
+    effects that begins at the baseline with the coefficient at 0: how an effect made up for the
+    negative one may have had little to do with what it is without.
 
     Parameters
     ----------
     evidence : Evidence
         The records.
+    base : Found
+        The model that the search began with.
     found : Found
         A model; where none of its coefficients is negative it is given back, and so it is where
-        with 0 no fit is found.
+        with 0 no fit is found. What is found may have fewer effects.
+    own : collection of Formula
+        Candidates of the user's own.
     """
-    trial = found.trial
+    if not unphysical(found.trial.fit):
+        return found
+    near = _at_zero(evidence, found.trial)
+    if near is None or near.chi2 > ASTRAY * found.trial.chi2:
+        far = _searched(evidence, base.trial, found.trial, own)
+        near = min((t for t in (near, far) if t is not None), key=lambda t: t.chi2, default=None)
+    try:
+        return found if near is None else Found(near, tried(evidence, near))
+    except InputError:
+        return found
+
+
+def _at_zero(evidence: Evidence, trial: Trial) -> Trial | None:
+    """Fit a model again with its negative coefficients at 0, from where the others are."""
     try:
         while negative := unphysical(trial.fit):
             zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
@@ -55,6 +85,33 @@ def physical(evidence: Evidence, found: Found) -> Found:
                 start={n: v for n, v in trial.start.items() if n not in negative},
                 growth=GENTLE,
             )
-        return found if trial is found.trial else Found(trial, tried(evidence, trial))
     except InputError:
-        return found
+        return None
+    return trial
+
+
+def _searched(
+    evidence: Evidence, base: Trial, trial: Trial, own: Collection[Formula]
+) -> Trial | None:
+    """Search among a model's effects from the baseline, its negative coefficients at 0."""
+    without = [name for name in library() if name not in trial.names]
+    formulas = [formula for formula in own if formula.name in trial.names]
+    zero: set[str] = set()
+    try:
+        while negative := set(unphysical(trial.fit)) - zero:
+            zero |= negative
+            zeros: dict[str, Any] = dict.fromkeys(zero, 0.0)
+            begin = fitted(
+                evidence,
+                dataclasses.replace(base.fit.model, **zeros),
+                [name for name in base.free if name not in zero],
+                start={n: v for n, v in base.start.items() if n not in zero},
+                growth=GENTLE,
+            )
+            again = Search(
+                evidence, begin, len(trial.names), without, lambda _found: None, own=formulas
+            )
+            trial = again.run().trial
+    except InputError:
+        return None
+    return trial

@@ -126,7 +126,7 @@ class Search:
     def run(self) -> Found:
         """Return the best model."""
         best = self._path([self.base])[-1]
-        if not self._at_end(best):
+        if self.most and not self._at_end(best):
             for other in self._beginnings(best):
                 further = self._path([self.base, self.settled(other)])[-1]
                 best = min((best, further), key=lambda found: found.trial.bic(self.level()))
@@ -148,7 +148,9 @@ class Search:
         found = []
         for places in [*pairs, *((k,) for k in ranked[:REFITTED])]:
             names = {scores.scores[k].candidate.name for k in places}
-            other = None if names <= begun else self.refit(self.base.trial, scores, places)
+            if names <= begun or len(names - {ZERO}) > self.most:
+                continue
+            other = self.refit(self.base.trial, scores, places)
             if other and self.gains(self.base.trial, other.trial):
                 found.append(other)
         found = [other for other in found if self._holds(self.base, other)]

@@ -6,8 +6,10 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.discrepancy.given_out import feeding, given_out
 from pendmap.discrepancy.physical import unphysical
-from pendmap.records.summary import findings_said
+from pendmap.model.unit_names import unit_of
+from pendmap.records.summary import doubts_said, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,6 +34,9 @@ PLACES: Final[dict[str, str]] = {
     "lab_time": "at a time in the laboratory of",
 }
 """Where a torque is missing, in words."""
+
+TORQUE: Final = unit_of("torque")
+"""A torque is one per moment of inertia."""
 
 WHERE: Final = 3
 """Places of a residual torque that are told."""
@@ -117,6 +122,8 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         },
         "baseline": {name: e.value for name, e in base.estimates.items()},
         "unphysical": unphysical(fit),
+        "below_zero": found.below_zero,
+        "model_file": {"rms": found.usable.trial.fit.rms, "parameters": given_out(found)},
         "parameters": {
             name: {"value": e.value, "stderr": e.stderr and wider * e.stderr}
             for name, e in fit.estimates.items()
@@ -208,7 +215,10 @@ def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
     rows = []
     for row in _ranking(found)[:RANKED]:
         tried = refitted.get(row["name"])
-        shape = ", ".join(f"{name} = {value:.3g}" for name, value in row["shape"].items())
+        shape = ", ".join(
+            f"{name} = {value:.3g} {_unit(found, row['name'], name)}".rstrip()
+            for name, value in row["shape"].items()
+        )
         rows.append(
             [
                 row["name"],
@@ -222,19 +232,25 @@ def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
 
 
 def as_text(found: Discrepancy) -> Iterator[str]:
-    """Yield the lines of a summary, the verdict first."""
+    """Yield the lines of a summary, the verdict first, but for doubts about a unit."""
+    runs = found.evidence.runs
+    yield from doubts_said(found.evidence.experiment, *runs)
     gap, judgement = found.gap, found.judgement
     yield f"Verdict: {SAID[found.verdict]}"
     for effect in found.effects:
+        units = {name: _unit(found, effect.name, name) for name in effect.parameters}
         values = ", ".join(
-            f"{name} = {value:.4g}"
+            f"{name} = {value:.4g} {units[name]}".rstrip()
             + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
             for name, value in effect.parameters.items()
         )
-        nearly = ", with reserve: what is missing may be like it only" if effect.approximate else ""
+        nearly = (
+            ", with reserve: what is missing may only resemble it" if effect.approximate else ""
+        )
         yield f"  {effect.name}: {values}; probability {effect.probability:.3f}{nearly}"
         for name, value in effect.elsewhere.items():
-            yield f"    or {name} = {value:.4g}, which does as well: the sides are not told apart"
+            said = f"{name} = {value:.4g} {units[name]}".rstrip()
+            yield f"    or {said}, which does as well: the sides are not told apart"
     for names in found.equivalent:
         yield f"  not told apart here: {', '.join(names)}"
     if found.verdict == "unknown" and found.nearest.trial.names:
@@ -245,18 +261,15 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         f"{gap.held_out_after:.4g} after"
     )
     if judgement.standings:
-        yield f"Share of the squared gap closed by what is nearest: {judgement.closed:.0%}"
-    for name, value in unphysical(found.best.trial.fit).items():
-        yield (
-            f"{name} is {value:.3g}, unphysical: no pendulum feeds its own motion; the model file "
-            f"has 0 there and the rest fitted again, residual {found.usable.trial.fit.rms:.4g} rad"
-        )
+        by = "" if found.effects else " by what is nearest"
+        yield f"Share of the squared gap closed{by}: {100 * judgement.closed:.0f} %"
+    yield from feeding(found)
     # Of each thing that it may go by the clearest place: neighbours say the same.
     clearest = {row["over"]: row for row in reversed(found.where)}
     for row in sorted(clearest.values(), key=lambda row: -abs(row["z"]))[:WHERE]:
         what = "torque along the motion" if row["along_motion"] else "torque"
         yield (
-            f"Where: a {what} of {row['torque']:.3g} rad/s^2 is missing {PLACES[row['over']]} "
+            f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing {PLACES[row['over']]} "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
         )
     for score in found.functions:
@@ -265,4 +278,9 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             f"it, G = {score.gain:.1f}; {score.left:.1f} beside the effects found"
         )
     yield f"Next: {found.advice.next_experiment}"
-    yield from findings_said(found.evidence.experiment, *found.evidence.runs)
+    yield from findings_said(found.evidence.experiment, *runs)
+
+
+def _unit(found: Discrepancy, effect: str, parameter: str) -> str:
+    """Return the unit of an effect's parameter; empty where it has none."""
+    return unit_of(f"{effect}.{parameter}", found.definition)

@@ -13,12 +13,14 @@ from pendmap.discrepancy.form import Form, form_of
 from pendmap.discrepancy.rivals import Standing, standing_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.runs import RunByRun
     from pendmap.discrepancy.select import Search
 
-__all__ = ["Judgement", "judge"]
+__all__ = ["Judgement", "closes_most", "judge"]
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
@@ -47,6 +49,12 @@ LITTLE: Final = 0.1
 SHARED: Final = 0.45
 """The same part where all together leave something: effects that have to share the work, and do not
 do it even so, are a form made up of others, and none of them is claimed."""
+
+SHARED_CLOSED: Final = 0.95
+"""Share of the gap that effects must close that share less of the work and leave something."""
+
+SHARED_SPREAD: Final = 0.1
+"""And how much their sizes may differ from run to run."""
 
 SURE: Final = 0.9
 """Probability that names are right below which they are given with reserve."""
@@ -167,11 +175,8 @@ def judge(
     if not trial.chosen:
         verdict = "unknown" if rest else "none"
     elif not faint and (rest or sure < DOUBTFUL):
-        gains = sorted(standing.gain for standing in standings)
-        others = sum(gains[:-1])
-        alone = len(gains) == 1 or others < SHARED * gains[-1]
-        clear = alone if rest else 0 < others < LITTLE * gains[-1]
-        verdict = "partial" if clear and closed >= CLOSED and spread <= SPREAD else "unknown"
+        most = closes_most(standings, closed, spread, rest=rest)
+        verdict = "partial" if most else "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
     else:
@@ -201,3 +206,25 @@ def _closed(search: Search, best: Found) -> float:
     if before < scatter:
         return fitted if after < 2 * scatter else 0.0
     return float(np.clip(min(1 - after / before, fitted), -1.0, 1.0))
+
+
+def closes_most(standings: Sequence[Standing], closed: float, spread: float, *, rest: bool) -> bool:
+    """Return whether effects that do not explain all are claimed for the most of it.
+
+    One does it nearly alone, or, where something is left beside all, several share it well.
+
+    Parameters
+    ----------
+    standings : sequence of Standing
+        The effects.
+    closed, spread : float
+        Share of the gap that they close, and how differently the runs would have the greatest.
+    rest : bool
+        Whether something is left; else the names are in doubt.
+    """
+    *others, most = sorted(standing.gain for standing in standings)
+    # Without which there is no motion to speak of is no measure of what the others do.
+    part = sum(others) / most if math.isfinite(most) else math.inf if others else 0.0
+    if part < LITTLE:
+        return (rest or part > 0) and closed >= CLOSED and spread <= SPREAD
+    return rest and part < SHARED and closed >= SHARED_CLOSED and spread <= SHARED_SPREAD

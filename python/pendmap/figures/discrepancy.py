@@ -9,41 +9,74 @@ from pendmap.figures import sheet as sheets
 from pendmap.figures.blocks import Box
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
     from pendmap.discrepancy import Discrepancy
 
 __all__ = ["figure"]
 
-SIZE: Final = (8.6, 12.0)
+SIZE: Final = (8.6, 12.76)
 """Width and height in inches."""
 
 
 def figure(found: Discrepancy, *, dpi: float) -> Figure:
     """Return the figure of a diagnosis; see :func:`pendmap.figures.draw_discrepancy`."""
     rms = found.gap
-    names = ", ".join(effect.name for effect in found.effects) or "no effect claimed"
     subtitle = (
         f"residual {1e3 * rms.before:.3g} mrad before, {1e3 * rms.after:.3g} after, noise "
         f"{1e3 * rms.noise_floor:.3g};   held out {1e3 * rms.held_out_before:.3g} before, "
         f"{1e3 * rms.held_out_after:.3g} after"
     )
-    made = sheets.headed(SIZE, dpi, f"{found.verdict}: {names}", subtitle, left=0.75)
-    gap.draw_residuals(made, Box(0.85, 8.7, 7.45, 2.38), found)
-    left, right = Box(0.85, 6.35, 7.45, 1.55).columns(2, 0.75)
+    made = sheets.headed(SIZE, dpi, _title(found), subtitle, left=0.75)
+    gap.draw_residuals(made, Box(0.85, 9.46, 7.45, 2.38), found)
+    left, right = Box(0.85, 7.11, 7.45, 1.55).columns(2, 0.75)
     gap.draw_by_run(left.panel(made), found)
     if found.forecasts:
-        axes = right.panel(made)
-        gap.draw_forecast(axes, found, max(found.forecasts, key=lambda f: f.starts))
-        axes.legend(loc="upper left", ncols=3, columnspacing=1.0, handlelength=1.4)
-    cells = Box(0.85, 3.75, 7.45, 1.6).columns(2, 0.75)
+        most = max(found.forecasts, key=lambda f: f.starts)
+        gap.draw_forecast(right.panel(made), found, most, legend=True)
+    cells = Box(0.85, 4.4, 7.45, 1.6).columns(2, 0.75)
     for box, over in zip(cells, ("angle", "velocity"), strict=True):
-        axes = box.panel(made)
-        lacking.draw_torque(axes, found, over)
-        axes.set_title(f"Torque that the model lacks, over {over}")
-    candidates.draw_ranking(sheets.place(made, 2.05, 0.6, 2.15, 2.3), found)
-    shown = candidates.shown_coefficients(found)
+        _torque(box, made, found, over)
+    candidates.draw_ranking(sheets.place(made, 2.05, 1.25, 2.15, 2.3), found)
+    shown = candidates.shown_coefficients(found)[:1]
+    last = Box(5.35, 1.25, 2.95, 2.3)
     if shown:
-        axes = sheets.place(made, 5.35, 0.6, 2.95, 2.3)
+        axes = last.panel(made)
         candidates.draw_coefficients(axes, found, shown[0])
+        _beneath(made, 4.6, candidates.coefficient_handles(found, shown))
+    else:
+        # One run has nothing to be compared with.
+        _torque(last, made, found, "amplitude")
+    _beneath(made, 0.4, candidates.ranking_handles(found))
     return made
+
+
+def _title(found: Discrepancy) -> str:
+    """Return the verdict with its names; of classes that are not told apart with all of them."""
+    alike = {names[0]: names for names in found.equivalent}
+    names = [effect.name for effect in found.effects]
+    if found.verdict == "ambiguous":
+        names = [" or ".join(alike.get(name, [name])) for name in names]
+    between = "; " if found.verdict == "ambiguous" else ", "
+    return f"{found.verdict}: {between.join(names) or 'no effect claimed'}"
+
+
+def _torque(box: Box, made: Figure, found: Discrepancy, over: str) -> None:
+    axes = box.panel(made)
+    lacking.draw_torque(axes, found, over)
+    axes.set_title(f"Torque that the model lacks, over {over}")
+
+
+def _beneath(made: Figure, left: float, handles: list[Artist]) -> None:
+    """Write what is drawn at the lower edge, so many inches from the left."""
+    whole = made.get_size_inches()
+    made.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(left / whole[0], 0.08 / whole[1]),
+        ncols=2,
+        borderpad=0,
+        borderaxespad=0,
+        columnspacing=1.2,
+    )

@@ -11,6 +11,8 @@ from pendmap.figures import blocks, sides, style
 from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -18,7 +20,16 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.horizon import Forecast
     from pendmap.figures.blocks import Box
 
-__all__ = ["AFTER", "BEFORE", "draw_by_run", "draw_forecast", "draw_residuals", "models", "short"]
+__all__ = [
+    "AFTER",
+    "BEFORE",
+    "draw_by_run",
+    "draw_forecast",
+    "draw_residuals",
+    "models",
+    "name_runs",
+    "short",
+]
 
 BEFORE, AFTER = look("before").colour, look("after").colour
 
@@ -31,10 +42,42 @@ PART: Final = 0.1
 WIDE: Final = 8.0
 """Ratio of the greatest residual to the least from which on they are drawn logarithmically."""
 
+NAME: Final = 0.18
+"""Inches of a line of words above what is drawn."""
+
+LONGEST: Final = 11
+"""Letters of a name that is turned: more do not fit beneath a panel."""
+
+BEGINNING: Final = 3
+"""Letters of a longer one that stay before the dots: numbers, which tell runs apart, come last."""
+
 
 def short(name: str) -> str:
-    """Return a run's name as there is room for it under an axis."""
-    return name.removesuffix(".csv")[-6:]
+    """Return a run's name as there is room for it under an axis, the middle left out."""
+    bare = name.removesuffix(".csv")
+    if len(bare) <= LONGEST:
+        return bare
+    return f"{bare[:BEGINNING]}\N{HORIZONTAL ELLIPSIS}{bare[BEGINNING + 1 - LONGEST :]}"
+
+
+def name_runs(axes: Axes, names: Sequence[str]) -> None:
+    """Write the names of runs beneath a panel: level where they have room, else turned."""
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    bare = [name.removesuffix(".csv") for name in names]
+    room = axes.get_window_extent().width / axes.figure.dpi / (len(names) + 0.2)
+    for level in (bare, list(map(_folded, bare))):
+        lines = "\n".join(level).split("\n")
+        if max(map(style.inches, lines)) + 0.1 <= room:
+            axes.set_xticks(range(len(names)), level)
+            return
+    axes.set_xticks(range(len(names)), list(map(short, names)), rotation=45, ha="right")
+
+
+def _folded(name: str) -> str:
+    """Return a name on two lines, divided behind the mark that is nearest to its middle."""
+    marks = [k for k, letter in enumerate(name[:-1], start=1) if letter in "_- ."]
+    at = min(marks, key=lambda k: abs(2 * k - len(name)), default=0)
+    return f"{name[:at]}\n{name[at:]}" if at else name
 
 
 def models(found: Discrepancy) -> list[tuple[str, str]]:
@@ -66,16 +109,34 @@ def draw_residuals(made: Figure, box: Box, found: Discrepancy) -> None:
                 residual = np.where(run.trusted, residual, math.nan)
             mean = _smoothed(residual, every)
             axes.plot(time, mean[: time.size], color=colour, lw=1.0, label=name)
-        axes.set_ylabel("mrad")
-        axes.text(0.008, 0.94, run.name, transform=axes.transAxes, va="top", fontsize=8.5, zorder=5)
+        sides.headroom(axes, NAME)
+        axes.annotate(
+            run.name,
+            (0.008, 1.0),
+            xycoords="axes fraction",
+            xytext=(0, -3),
+            textcoords="offset points",
+            va="top",
+            fontsize=8.5,
+        )
         if place == 0:
             axes.set_title("Record less model, means over a tenth of a swing")
-            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, borderaxespad=0)
+            axes.legend(
+                loc="lower right",
+                bbox_to_anchor=(1.0, 1.0),
+                ncols=3,
+                borderaxespad=0,
+                borderpad=0.3,
+            )
         axes.set_xlim(0 if time[0] >= 0 else float(time[0]), longest)
         if place == len(order) - 1:
-            axes.set_xlabel("time  (s)")
+            axes.set_xlabel("time (s)")
         else:
             axes.tick_params(labelbottom=False)
+    # One for all panels: each by itself is too low for it.
+    whole = made.get_size_inches()
+    at = ((box.left - 0.62) / whole[0], (box.bottom + box.height / 2) / whole[1])
+    made.text(*at, "residual (mrad)", rotation=90, va="center", ha="center")
 
 
 def _smoothed(residual: Any, every: int) -> Any:  # noqa: ANN401 (arrays)
@@ -111,17 +172,18 @@ def draw_by_run(axes: Axes, found: Discrepancy) -> None:
     every = every[np.isfinite(every)]
     low, high = float(every.min()), float(every.max())
     if high > WIDE * low:
-        sides.log_axis(axes, "y", (low / 1.4, 1.5 * high), "rms  (mrad)")
+        sides.log_axis(axes, "y", (low / 1.4, 1.5 * high), "rms (mrad)")
     else:
         axes.set_ylim(0, 1.15 * high)
-        axes.set_ylabel("rms  (mrad)", labelpad=2)
-    axes.set_xlim(-0.6, len(rows) - 0.4)
-    axes.set_xticks(places, [short(row.name) for row in rows], rotation=45, ha="right")
+        axes.set_ylabel("rms (mrad)", labelpad=2)
+    name_runs(axes, [row.name for row in rows])
     axes.set_title("Residual by run" + (", shaded: held out" if back else ""))
 
 
-def draw_forecast(axes: Axes, found: Discrepancy, forecast: Forecast) -> None:
-    """Draw the error of forecasts against their horizon, and the noise."""
+def draw_forecast(
+    axes: Axes, found: Discrepancy, forecast: Forecast, *, legend: bool = False
+) -> None:
+    """Draw the error of forecasts against their horizon, and the noise; names above the curves."""
     axes.axhline(1e3 * forecast.noise_floor, color=style.INK, lw=1.1, label="noise")
     errors = (forecast.before, forecast.after)
     for (name, colour), error in zip(models(found), errors, strict=False):
@@ -130,10 +192,13 @@ def draw_forecast(axes: Axes, found: Discrepancy, forecast: Forecast) -> None:
     every = every[np.isfinite(every)]
     low, high = float(every.min()), float(every.max())
     if high > WIDE * low:
-        sides.log_axis(axes, "y", (low / 1.4, 1.5 * high), "rms  (mrad)")
+        sides.log_axis(axes, "y", (low / 1.4, 1.5 * high), "rms (mrad)")
     else:
         axes.set_ylim(0, 1.15 * high)
-        axes.set_ylabel("rms  (mrad)", labelpad=2)
+        axes.set_ylabel("rms (mrad)", labelpad=2)
     axes.set_xlim(0, float(forecast.horizon[-1]))
-    axes.set_xlabel("time ahead  (s)")
+    axes.set_xlabel("time ahead (s)")
     axes.set_title(f"Error of forecasts, {forecast.kind} runs")
+    if legend:
+        sides.headroom(axes, NAME + 0.06)
+        axes.legend(loc="upper left", ncols=3, columnspacing=1.0, handlelength=1.4)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pendmap.figures import style
 from pendmap.figures.gap import models
-from pendmap.pictures.diagnosis import OVER_SAID
+from pendmap.pictures.diagnosis import ACCELERATION, OVER_SAID
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,6 +45,5 @@ def draw_torque(axes: Axes, found: Discrepancy, over: str) -> None:
         axes.set_xlim(min(row["from"] for row in rows), max(row["to"] for row in rows))
     axes.set_xlabel(OVER_SAID[over])
     along = rows and rows[0]["along_motion"]
-    axes.set_ylabel(
-        ("along the motion  " if along else "") + "(rad/s\N{SUPERSCRIPT TWO})", labelpad=2
-    )
+    said = "torque along\nthe motion" if along else "torque"
+    axes.set_ylabel(f"{said} ({ACCELERATION})", labelpad=2)

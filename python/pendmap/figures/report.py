@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import matplotlib as mpl
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from pendmap import report
-from pendmap.figures import blocks, candidates, gap, lacking, style
+from pendmap.figures import candidates, gap, lacking, style
 from pendmap.figures import sheet as sheets
 from pendmap.figures.blocks import Box
 from pendmap.figures.errors import draw_errors
@@ -36,7 +35,7 @@ DPI: Final = 110.0
 WIDTH: Final = 8.6
 """Inches of every figure."""
 
-LEFT, RIGHT, BELOW = 0.75, 0.2, 0.75
+LEFT, RIGHT, BELOW = 0.75, 0.2, 0.83
 """Inches beside and beneath the panels."""
 
 APART: Final = (0.75, 0.85)
@@ -63,8 +62,8 @@ def rms(found: Discrepancy, dpi: float) -> Figure:
     """Return the residual by run, and the error of forecasts of free and of forced runs."""
     forecasts = found.forecasts
     starts = " and ".join(f"{f.starts} {f.kind}" for f in forecasts)
-    said = f"forecasts from {starts} starts on what was held back" if forecasts else ""
-    made = _empty(3.6, dpi, "The gap", said)
+    said = f"forecasts from {starts} starts on what was held out" if forecasts else ""
+    made = _empty(3.68, dpi, "The gap", said)
     handles = [
         Line2D([], [], color=colour, lw=1.4, label=name, marker=mark, mfc=fill, ms=4.5)
         for (name, colour), mark, fill in zip(
@@ -87,14 +86,15 @@ def torque(found: Discrepancy, dpi: float) -> Figure | None:
         return None
     rows = -(-len(shown) // 2)
     high = 1.5
-    height = 0.75 + rows * high + (rows - 1) * APART[1] + 0.6
+    height = 0.8 + rows * high + (rows - 1) * APART[1] + 0.6
     made = _empty(height, dpi, "Torque that the model lacks", "per moment of inertia; bands: 95 %")
     handles = [Line2D([], [], color=c, lw=1.4, label=name) for name, c in gap.models(found)]
     made.legend(handles=handles, loc="upper right", ncols=2)
-    lines = Box(LEFT, 0.6, ROOM, rows * high + (rows - 1) * APART[1]).rows(
+    # Two lines beside a panel need more than one.
+    lines = Box(LEFT + 0.15, 0.6, ROOM - 0.15, rows * high + (rows - 1) * APART[1]).rows(
         [1.0] * rows, [APART[1]] * (rows - 1)
     )
-    cells = [cell for line in lines for cell in line.columns(2, APART[0])]
+    cells = [cell for line in lines for cell in line.columns(2, APART[0] + 0.15)]
     for cell, over in zip(cells, shown, strict=False):
         lacking.draw_torque(cell.panel(made), found, over)
     return made
@@ -125,6 +125,7 @@ def ranking(found: Discrepancy, dpi: float) -> Figure | None:
     if not found.scores.best():
         return None
     made = _empty(3.4, dpi, "Ranking", "what each effect of the library would explain by itself")
+    made.legend(handles=candidates.ranking_handles(found), loc="upper right", ncols=4)
     candidates.draw_ranking(Box(2.6, 0.55, 5.6, 1.95).panel(made), found)
     made.axes[0].set_title("")
     return made
@@ -135,10 +136,11 @@ def coefficients(found: Discrepancy, dpi: float) -> Figure | None:
     shown = candidates.shown_coefficients(found)
     if not shown:
         return None
-    made = _empty(3.3, dpi, "Run by run", "each run's own value, bars 95 %; grey: all together")
-    made.legend(handles=[Patch(color=blocks.NOISE, lw=0, label="all runs")], loc="upper right")
+    made = _empty(3.38, dpi, "Run by run", "bars and band: 95 %")
+    handles = candidates.coefficient_handles(found, shown)
+    made.legend(handles=handles, loc="upper right", ncols=len(handles), columnspacing=1.3)
     for cell, name in zip(
-        Box(LEFT, BELOW, ROOM, 1.55).columns(max(len(shown), 1), APART[0]), shown, strict=True
+        Box(LEFT, BELOW, ROOM, 1.55).columns(len(shown), APART[0]), shown, strict=True
     ):
         candidates.draw_coefficients(cell.panel(made), found, name)
     return made

@@ -225,7 +225,8 @@ def headed(
 ) -> Figure:
     """Return an empty figure of ``size`` inches with its title and subtitle.
 
-    A subtitle that is too long for one line becomes two, at its semicolon, and then smaller.
+    A subtitle that is too long for one line becomes two, at its semicolon, and then smaller; a
+    title becomes smaller.
     """
     width, height = size
     figure = Figure(figsize=size, dpi=dpi)
@@ -237,7 +238,8 @@ def headed(
     longest = max(style.inches(line, RC["font.size"]) for line in lines)
     font = RC["font.size"] * min(1.0, room / max(longest, 1e-3))
     left /= width
-    figure.text(left, 1 - 0.27 / height, title, fontsize=12, weight="bold", va="center")
+    bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
+    figure.text(left, 1 - 0.27 / height, title, fontsize=bold, weight="bold", va="center")
     for k, line in enumerate(lines):
         down = 0.50 + LINE * (k - 0.2 * (len(lines) - 1))
         figure.text(left, 1 - down / height, line, color=QUIET, va="center", fontsize=font)

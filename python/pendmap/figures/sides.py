@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-__all__ = ["angle_axis", "log_axis", "middle_axis", "signed_log_axis", "wide_axis"]
+__all__ = ["angle_axis", "headroom", "log_axis", "middle_axis", "signed_log_axis", "wide_axis"]
 
 MOSTLY: Final = 95
 """Percent of the curve nearest to 0 that its straight part holds."""
@@ -26,8 +26,9 @@ WIDE: Final = 2.0
 """Range of angles from which on multiples of pi are its labels, rad."""
 LABEL: Final = 0.42
 """Inches that a label beside a panel may have."""
-NARROW: Final = 5.0
-"""Times its straight part that an axis reaches at most without powers of ten."""
+NARROW: Final = 12.0
+"""Times its straight part that an axis reaches at most without powers of ten: so far what is small
+is still seen on a straight axis, which needs no explanation."""
 CLOSE: Final = 5.0
 """Ratio of its ends under which a logarithmic axis has equally spaced labels."""
 LINE: Final = 0.16
@@ -120,7 +121,8 @@ def signed_log_axis(
     """Give the height powers of ten on both sides of 0, straight around it.
 
     The straight part holds nearly all of the curve that stays nearest to 0: its noise makes no
-    towers there, and what is a thousand times farther off is seen too.
+    towers there, and what is a thousand times farther off is seen too. Dots mark where it ends, and
+    the axis' name says so: nobody sees it by the curves.
     """
     known = [each[np.isfinite(each)] for each in values]
     known = [each for each in known if np.any(each != 0)]
@@ -139,23 +141,51 @@ def signed_log_axis(
     ends = (min(1.5 * low, -1.2 * inner), max(1.5 * high, 1.2 * inner))
     axes.set_yscale("symlog", linthresh=inner, linscale=1.0)
     axes.set_ylim(*ends)
-    outer = max(-ends[0], ends[1])
-    powers = np.arange(round(math.log10(inner)), math.floor(math.log10(outer)) + 1)
-    to_inches = axes.transData
-    room = axes.get_window_extent().height / axes.figure.dpi
-    every = 1
-    while True:
-        sizes = [10.0**k for k in powers[::-1][::every][::-1]]
-        ticks = [*(-size for size in reversed(sizes)), 0.0, *sizes]
-        ticks = [tick for tick in ticks if ends[0] <= tick <= ends[1]]
-        places = to_inches.transform([(axes.get_xlim()[0], tick) for tick in ticks])[:, 1]
-        apart = float(np.diff(places).min()) / axes.figure.dpi if len(ticks) > 1 else room
-        if apart >= LINE or every > powers.size:
-            break
-        every += 1
+    ticks = next(some for some in _signed_ticks(inner, ends) if _apart(axes, some))
     axes.yaxis.set_ticks(ticks, [_power(tick) for tick in ticks])
     axes.yaxis.set_minor_locator(NullLocator())
+    for end in (-inner, inner):
+        axes.axhline(end, color=style.QUIET, lw=0.6, ls=":", zorder=0)
+    _say_bent(axes, name, f"beyond \N{PLUS-MINUS SIGN}{_power(inner)}")
+
+
+def _say_bent(axes: Axes, name: str, beyond: str) -> None:
+    """Name the height and where it is logarithmic: beside the panel, or above a low one."""
+    size = style.RC["xtick.labelsize"]
+    room = axes.get_window_extent().height / axes.figure.dpi
+    for said in (f"logarithmic {beyond}", f"log {beyond}"):
+        if style.inches(said, style.RC["font.size"]) <= room:
+            axes.set_ylabel(f"{name}\n{said}", labelpad=2)
+            return
     axes.set_ylabel(name, labelpad=2)
+    axes.set_title(f"logarithmic {beyond}", loc="right", fontsize=size, color=style.QUIET)
+
+
+def _signed_ticks(inner: float, ends: tuple[float, float]) -> Iterator[list[float]]:
+    """Sets of round numbers on both sides of 0 from where the powers begin, the fullest first."""
+    low, high = ends
+    first, last = round(math.log10(inner)), math.floor(math.log10(max(-low, high)))
+    for steps, every in (((1, 2, 5), 1), ((1, 3), 1), *(((1,), k) for k in range(1, 40))):
+        # From the greatest down: it says how far the axis reaches.
+        powers = range(last, first - 1, -every)
+        sizes = sorted(m * 10.0**k for k in powers for m in steps)
+        ticks = [*(-size for size in reversed(sizes)), 0.0, *sizes]
+        yield [tick for tick in ticks if low <= tick <= high]
+
+
+def _apart(axes: Axes, ticks: Sequence[float]) -> bool:
+    """Whether labels above one another have room."""
+    places = axes.transData.transform([(axes.get_xlim()[0], tick) for tick in ticks])[:, 1]
+    return len(ticks) < 2 or float(np.diff(places).min()) / axes.figure.dpi >= LINE  # noqa: PLR2004
+
+
+def headroom(axes: Axes, inches: float) -> None:
+    """Raise the upper end of the height so that ``inches`` stay free above what is drawn."""
+    share = inches * axes.figure.dpi / axes.get_window_extent().height
+    bent = axes.yaxis.get_transform()
+    low, high = bent.transform(np.array(axes.get_ylim()))
+    top = high + (high - low) * share / (1 - share)
+    axes.set_ylim(top=float(bent.inverted().transform(np.array([top]))[0]))
 
 
 def _power(value: float) -> str:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.identification.left_out import left_out
-from pendmap.records.summary import findings_said
+from pendmap.records.summary import doubts_said, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -89,7 +89,12 @@ def _percent(value: float) -> str:
 
 
 def as_text(comparison: Comparison) -> Iterator[str]:
-    """Yield the lines below the table: table 1, whether the model fits, what was found."""
+    """Yield the lines beside the table: table 1, whether the model fits, what was found.
+
+    Doubts about a unit come first.
+    """
+    runs = [one.run for one in comparison.runs]
+    yield from doubts_said(comparison.experiment, *runs)
     for one in comparison.runs:
         for row in one.table.rows:
             unit = "s" if row.what == "period" else "rad"
@@ -103,7 +108,7 @@ def as_text(comparison: Comparison) -> Iterator[str]:
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "
                 "something is missing in the model"
             )
-    said = left_out(comparison.experiment, [one.run for one in comparison.runs])
+    said = left_out(comparison.experiment, runs)
     if said:
         yield said
-    yield from findings_said(comparison.experiment, *(one.run for one in comparison.runs))
+    yield from findings_said(comparison.experiment, *runs)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.errors import InputError
 from pendmap.identification.digits import interval, with_error
 from pendmap.identification.left_out import left_out
-from pendmap.records.summary import findings_said
+from pendmap.records.summary import doubts_said, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -101,7 +101,11 @@ def _method(found: Identification) -> dict[str, Any]:
 
 
 def as_text(report: IdentificationReport) -> Iterator[str]:
-    """Yield the lines below the tables: intervals, warnings, what was found in the record."""
+    """Yield the lines beside the tables: intervals, warnings, what was found in the record.
+
+    Doubts about a unit come first.
+    """
+    yield from doubts_said(report.experiment, *report.runs)
     best = _best(report)
     if best is not None:
         yield f"{best.method}: {best.used}"

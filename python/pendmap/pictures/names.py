@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from pendmap.model import effects
+from pendmap.model.unit_names import unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from pendmap.model.units import Units
 
 __all__ = ["ANGLE", "clock", "per_time", "speed", "unit_of", "velocity"]
@@ -19,35 +16,6 @@ _THETA: Final = "\N{GREEK SMALL LETTER THETA}"
 
 ANGLE: Final = f"{_THETA} (rad)"
 """The angle, with its unit."""
-
-_RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-_UNITS: Final = {
-    "w0": "rad/s",
-    "c_over_m": "1/s",
-    "Tr": "rad/s\N{SUPERSCRIPT TWO}",
-    "torque": "rad/s\N{SUPERSCRIPT TWO}",
-    "offset": "rad",
-    "tilt": "rad",
-    "phi": "rad",
-    "Omega": "rad/s",
-}
-"""Units of what is fitted, in SI."""
-
-
-def unit_of(
-    parameter: str, definition: Callable[[str], Mapping[str, Any]] = effects.definition
-) -> str:
-    """Return the unit in SI of what a fit calls this, as ``w0`` or ``quadratic_drag.q``.
-
-    ``definition`` tells what is said of an effect, where there are others than the library's.
-    """
-    effect, _, own = parameter.partition("[")[0].rpartition(".")
-    if not effect:
-        return _UNITS.get(own, "")
-    entries = definition(effect)["parameters"]
-    unit = str(next(entry["unit"] for entry in entries if entry["name"] == own))
-    return "" if unit == "1" else re.sub(r"\^(\d)", lambda m: m[1].translate(_RAISED), unit)
 
 
 def velocity(units: Units) -> str:

@@ -34,7 +34,34 @@ if TYPE_CHECKING:
     from pendmap.records.description import Description
     from pendmap.records.text import Table
 
-__all__ = ["read_experiment"]
+__all__ = ["files_of", "read_experiment"]
+
+
+def files_of(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the files that an experiment is read from, without reading a record.
+
+    Parameters
+    ----------
+    path : str or path
+        As of :func:`read_experiment`.
+
+    Returns
+    -------
+    list of Path
+        The file, or ``experiment.toml`` and those that it names; they need not exist.
+
+    Raises
+    ------
+    InputError
+        If the ``experiment.toml`` is none.
+    """
+    place = Path(path)
+    if not place.is_dir():
+        return [place]
+    if not (place / NAME).is_file():
+        return []
+    plans = read_description(place / NAME).runs
+    return [place / NAME, *(place / file for file in dict.fromkeys(plan.file for plan in plans))]
 
 
 def read_experiment(path: str | os.PathLike[str]) -> Experiment:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -13,12 +13,15 @@ from pendmap.records.samples import FINEST
 from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
-__all__ = ["as_json", "as_text", "findings_said", "noise_said", "noise_unit"]
+__all__ = ["as_json", "as_text", "doubts_said", "findings_said", "noise_said", "noise_unit"]
+
+UNITS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
+"""Findings that a unit or a scale is wrong: unless that is mended, so is all that is fitted."""
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -133,18 +136,33 @@ def _line(found: Finding) -> str:
     return f"- {mark}{found.text}{where}  [{found.what}]"
 
 
+def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
+    """Yield a warning for each unit or scale that is wrong: to be read before any result."""
+    for where, found in _said_of(experiment, runs):
+        if _doubted(found):
+            yield f"Warning: {where}: {found.text}"
+
+
 def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
-    """Yield a line for what was found in an experiment and in some of its runs.
+    """Yield a line for what else was found in an experiment and in some of its runs.
 
     What says how the record was understood is left to ``pendmap look``.
     """
+    for where, found in _said_of(experiment, runs):
+        if not _doubted(found):
+            yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
+
+
+def _said_of(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
     for found in experiment.findings:
-        mark = "mended: " if found.mended else ""
-        yield f"{experiment.path}: {mark}{found.text}"
+        yield str(experiment.path), found
     for run in runs:
         for found in run.findings:
-            mark = "mended: " if found.mended else ""
-            yield f"{run.name}: {mark}{found.text}"
+            yield run.name, found
+
+
+def _doubted(found: Finding) -> bool:
+    return found.what in UNITS and not found.mended
 
 
 def _steps(run: Run) -> str:

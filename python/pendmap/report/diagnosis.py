@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pendmap.report.document import Document
-from pendmap.report.found import added, ranked, run_by_run
+from pendmap.report.found import added, run_by_run
 from pendmap.report.gap import gap, verdict, where
 from pendmap.report.outlook import following, set_aside
+from pendmap.report.ranking import ranked
 from pendmap.report.wording import lead
 
 if TYPE_CHECKING:

@@ -1,36 +1,39 @@
-"""Parts 5 to 7 of a diagnosis' report: what was added, the ranking, and run by run."""
+"""Parts 5 and 7 of a diagnosis' report: what was added, and run by run."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.discrepancy.given_out import given_out
 from pendmap.discrepancy.physical import unphysical
-from pendmap.discrepancy.select import GATE
 from pendmap.discrepancy.strength import strength_of
-from pendmap.discrepancy.summary import ranking_table
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Formula, Items, Name, Paragraph, Picture, Section, Table
-from pendmap.report.wording import compared, gained, joined, mrad, own_parameters, share, values
-from pendmap.words import written
+from pendmap.report.wording import (
+    compared,
+    joined,
+    mrad,
+    number,
+    own_parameters,
+    share,
+    stated,
+    values,
+    within,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pendmap.discrepancy import Discrepancy, NamedEffect
-    from pendmap.discrepancy.rivals import Rival, Standing
     from pendmap.identification import Estimate
     from pendmap.report.document import Block
 
-__all__ = ["added", "ranked", "run_by_run"]
+__all__ = ["added", "run_by_run"]
 
 SI: Final = "rad/s\N{SUPERSCRIPT TWO}"
-PLUS: Final = "\N{PLUS-MINUS SIGN}"
-RIVALS: Final = 4
-"""Rivals of an effect that are shown."""
-
-EQUATION: Final = "theta'' + (c/m) theta' + w0^2 (1 + a(t)) sin(theta) = -Tr sign(theta')"
-"""The model to begin with, as the paper has it."""
+EQUATION: Final = "theta'' + (c/m) v + w0^2 (1 + a(t)) sin(theta) = -Tr sign(v)"
+"""The model to begin with, as the paper has it, with the velocity named as effects name it."""
 
 
 def added(found: Discrepancy) -> Section:
@@ -59,7 +62,7 @@ def added(found: Discrepancy) -> Section:
         lines = (f"    {term:{wide}}   ({name})" for term, name in terms)
         blocks.append(Formula("\n".join([EQUATION, *lines])))
     if terms:
-        blocks.append(Paragraph(f"with {'; '.join(meant)}."))
+        blocks.append(Paragraph(f"with {'; '.join(dict.fromkeys(meant))}."))
     for effect in found.effects:
         entry = effect.definition
         if entry["group"] in {"drive", "reading"}:
@@ -85,7 +88,8 @@ def _signed(term: str) -> str:
 def _elsewhere(effect: NamedEffect) -> Iterator[str]:
     """Yield at which other place an effect would do as well."""
     for name, value in effect.elsewhere.items():
-        yield f". With {name} = {value:.4g} it does as well: the sides are not told apart here"
+        at = f"{name} = {number(value, 4)}"
+        yield f". With {at} it does as well: the sides are not told apart here"
 
 
 def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:
@@ -102,11 +106,11 @@ def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:
             and friction.value > 0
             and "Tr" not in own_parameters([effect.name])
         ):
-            against = f"{strength.torque / friction.value:.2g} Tr and "
+            against = f"{number(strength.torque / friction.value, 2)} Tr and "
         yield (
-            f". Over these records its torque is {strength.torque:.2g} {SI} rms, {against}"
-            f"{strength.torque / w0**2:.1g} w0\N{SUPERSCRIPT TWO}; at most "
-            f"{strength.greatest_torque:.2g} {SI}"
+            f". Over these records its torque is {number(strength.torque, 2)} {SI} rms, {against}"
+            f"{number(strength.torque / w0**2, 1)} w0\N{SUPERSCRIPT TWO}; at most "
+            f"{number(strength.greatest_torque, 2)} {SI}"
         )
     elif strength.reading > 0:
         yield (
@@ -131,7 +135,7 @@ def _parameters(found: Discrepancy) -> Table:
                 unit_of(name, found.definition),
                 _said(old, wide),
                 _said(now, wider),
-                f"{moved / error:+.2g}" if error and moved else "0",
+                f"{'+' * (moved > 0)}{number(moved / error, 2)}" if error and moved else "0",
             )
         )
     head = ("parameter", "unit", "before", "after", "moved, standard errors")
@@ -139,10 +143,7 @@ def _parameters(found: Discrepancy) -> Table:
 
 
 def _said(estimate: Estimate, wider: float) -> str:
-    error = wider * (estimate.stderr or 0.0)
-    if not (error and math.isfinite(error)):
-        return f"{estimate.value:.5g}"
-    return f"{written(estimate.value, error)} {PLUS} {error:.1g}"
+    return stated(estimate.value, wider * (estimate.stderr or 0.0))
 
 
 def _unphysical(found: Discrepancy) -> Iterator[Block]:
@@ -153,69 +154,22 @@ def _unphysical(found: Discrepancy) -> Iterator[Block]:
                 " for what is missing."
             )
             yield Paragraph((Name(name), said))
-
-
-def ranked(found: Discrepancy) -> Section:
-    """Return the ranking of candidates, and why the runners-up lost."""
-    head, rows = ranking_table(found)
-    blocks: list[Block] = [
-        Paragraph(
-            "Every effect of the library, scored at the baseline's fit: the score G is what it "
-            f"would take off the sum of squares by itself, in units of the noise. {GATE:g} is the "
-            "least for a refit; without a missing effect none gets there. Those refitted have the "
-            "fall of the BIC and of the sum of squares on what was held back."
-        ),
-        Table(
-            tuple(head),
-            tuple((Name(row[0]), *row[1:]) for row in rows),
-            words=("shape",),
-        ),
-        Picture("ranking", "Scores of the candidates at the baseline."),
-    ]
-    for standing in found.judgement.standings:
-        blocks += _rivals(found, standing)
-    return Section("Ranking", tuple(blocks))
-
-
-def _rivals(found: Discrepancy, standing: Standing) -> Iterator[Block]:
-    name = standing.candidate.name
-    if not standing.rivals:
-        yield Paragraph(("Nothing else of the library could stand in for ", Name(name), "."))
-        return
-    claimed = "" if found.effects else ", which comes nearest and is not claimed"
-    yield Paragraph(
-        (
-            "In the place of ",
-            Name(name),
-            (
-                f"{claimed} (gain {gained(standing.gain)}): the separation s is the part of that "
-                "gain which another effect does not reach."
-            ),
+    if unphysical(found.best.trial.fit):
+        yield Paragraph(
+            "The model file has 0 there, and the rest found again, to a residual of "
+            f"{mrad(found.usable.trial.fit.rms)} rms:"
         )
-    )
-    yield Table(
-        ("instead", "gain", "behind", "s", "s G", "why not"),
-        tuple(
-            (
-                Name(rival.candidate.title),
-                gained(rival.gain),
-                gained(rival.behind),
-                f"{rival.separation:.2g}",
-                gained(rival.separation * standing.gain),
-                _why(rival),
-            )
-            for rival in standing.rivals[:RIVALS]
-        ),
-        words=("why not",),
-    )
-
-
-def _why(rival: Rival) -> str:
-    if rival.contains:
-        return "has it as a special case and gains no more"
-    if rival.alike:
-        return f"not told apart: behind by less than {rival.margin:.3g}"
-    return "refitted, explains less" if rival.refitted else "scored, explains less"
+        rows = (
+            (Name(name), unit_of(name, found.definition), f"{value:.5g}")
+            for name, value in given_out(found).items()
+        )
+        yield Table(("parameter", "unit", "in the model file"), tuple(rows))
+    for name, since in found.below_zero.items():
+        said = (
+            f" is below 0 from {since:.3g} s in the laboratory on, by what drifts. That is "
+            "unphysical too: the drift stands for something else."
+        )
+        yield Paragraph((Name(name), said))
 
 
 def run_by_run(found: Discrepancy) -> Section:
@@ -226,6 +180,8 @@ def run_by_run(found: Discrepancy) -> Section:
     if not sizes:
         blocks.append(Paragraph("There is no effect to compare between runs."))
     names = [run.name for run in found.evidence.fitted]
+    if sizes and len(names) == 1:
+        blocks.append(Paragraph("There is one run, and nothing to compare it with."))
     for size in sizes:
         pairs = found.runs.coefficients[size]
         spread = found.runs.spread(size)
@@ -240,6 +196,9 @@ def run_by_run(found: Discrepancy) -> Section:
             if spread
             else " They differ by no more than noise."
         )
+        if len(names) == 1:
+            blocks.append(Paragraph((Name(size), f": {said} {label}".rstrip() + ".")))
+            continue
         blocks += [
             Paragraph(
                 (
@@ -254,12 +213,12 @@ def run_by_run(found: Discrepancy) -> Section:
                     f"value ({label})" if label else "value",
                     "standard error, the others held",
                 ),
-                tuple((Name(n), written(v, e), f"{e:.2g}") for n, v, e in shown),
+                tuple((Name(n), within(v, e), number(e, 2)) for n, v, e in shown),
             ),
         ]
         if blind:
             blocks.append(Paragraph(("It does not show in ", *joined(blind), ".")))
-    if sizes:
+    if sizes and len(names) > 1:
         blocks.append(
             Picture("runs", "Each run's own value, the other parameters held, with bars of 95 %.")
         )

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.summary import PLACES
 from pendmap.discrepancy.torque import STANDS_OUT
-from pendmap.discrepancy.verdict import CHANCE, FORECAST
+from pendmap.discrepancy.verdict import CHANCE, FAINT, FORECAST
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
-from pendmap.report.wording import chance, compared, joined, mrad, values
+from pendmap.report.noise import worth
+from pendmap.report.wording import chance, compared, joined, mrad, number, stated, values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,11 +39,10 @@ def verdict(found: Discrepancy) -> Section:
         Paragraph((Strong(found.verdict.capitalize()), ": ", SAID[found.verdict]))
     ]
     effects = tuple(
-        (*values(effect), f"; the right name with a probability {_of(effect.probability)}")
-        for effect in found.effects
+        (*values(effect), f"; probability {chance(effect.probability)}") for effect in found.effects
     )
     if effects:
-        blocks.append(Items(effects))
+        blocks += [Items(effects), Paragraph(_meant(found))]
     blocks += [
         Paragraph(("Not told apart here: ", *joined(names), ".")) for names in found.equivalent
     ]
@@ -50,37 +50,62 @@ def verdict(found: Discrepancy) -> Section:
     return Section("Verdict", tuple(blocks))
 
 
+def _meant(found: Discrepancy) -> str:
+    """Return what the probability of a name says."""
+    all_of_it = "and is" if len(found.effects) == 1 else "and the others here are"
+    said = (
+        f"The probability of a name is that it is right {all_of_it} all that is missing. Blind "
+        "experiments gave it: it is lower the more is left and the more effects it took."
+    )
+    if found.verdict == "ambiguous":
+        return f"{said} Names that are not told apart share it."
+    if found.verdict != "partial":
+        return said
+    return (
+        f"{said} Something is left, so that more is missing: a low probability does not say that "
+        "the effect is not there."
+    )
+
+
 def _rests(found: Discrepancy) -> Iterator[Text]:
     judged = found.judgement
     form = judged.form
     yield (
-        f"Chi-squared over degrees of freedom is {judged.ratio:.4g}; the doubt about the noise "
-        f"allows up to {judged.ratio_allowed:.4g}. On what was held out it is "
-        f"{judged.ratio_held:.4g}."
+        f"Chi-squared over degrees of freedom is {number(judged.ratio, 4)}, where noise alone has "
+        f"1; the doubt about the noise allows up to {number(judged.ratio_allowed, 4)}. On what was "
+        f"held out it is {number(judged.ratio_held, 4)}."
     )
     further = () if form.further is None else (" (", Name(form.further), " would take up most)")
     left: dict[str, tuple[str | Name, ...]] = {
-        "slow": ("so much in the slow part of the residuals",),
-        "torque": ("such a torque over angle, velocity, amplitude, phase or time",),
-        "runs": ("the parameters of the runs so far apart",),
-        "effects": ("so much for an effect that is not in the model", *further),
+        "slow": ("as much in the slow part of the residuals",),
+        "torque": ("as much torque over angle, velocity, amplitude, phase or time",),
+        "runs": ("the parameters of the runs as far apart",),
+        "effects": ("as much for an effect that is not in the model to explain", *further),
     }
     for key, words in left.items():
         chance_of = _rare(form.chances[key])
         yield ("Noise alone would leave ", *words, f" with a probability {chance_of}.")
+    # What an effect of the library would take up counts only beside others that are strong.
+    strong = sum(standing.gain for standing in judged.standings) >= FAINT
+    together = form.chance if strong else form.unnamed
+    count = len(form.chances) - (not strong)
+    those = f"these {count} probabilities" if strong else f"the first {count} of these"
     yield (
-        f"Something is left where the least of these, times how many they are, is below {CHANCE:g};"
-        f" with effects found, also where chi-squared on what was held out is above {FORECAST:g}."
+        f"The least of {those}, times {count} because so many were looked at, is "
+        f"{number(together, 2) if together > RARE else f'below {number(RARE, 1)}'}. Below "
+        f"{CHANCE:g} it counts as no chance: something is left."
     )
+    if judged.standings:
+        most = max(FORECAST, judged.ratio_allowed)
+        yield (
+            "Something is left, too, where chi-squared over degrees of freedom on what was held "
+            f"out is above {number(most, 3)}."
+        )
 
 
 def _rare(probability: float) -> str:
-    return f"of {probability:.2g}" if probability > RARE else f"below {RARE:g}"
-
-
-def _of(probability: float) -> str:
-    said = chance(probability)
-    return said if said.startswith(("above", "below")) else f"of {said}"
+    said = number(probability, 2) if probability > RARE else number(RARE, 1)
+    return f"of {said}" if probability > RARE else f"below {said}"
 
 
 def gap(found: Discrepancy) -> Iterator[Section]:
@@ -100,7 +125,7 @@ def gap(found: Discrepancy) -> Iterator[Section]:
         for run in own.by_run
     ]
     names = joined(dict.fromkeys(run.name for run in found.evidence.held))
-    parts = "Stretches were held back of " if found.evidence.inside else "Held back: "
+    parts = "Held out: stretches of " if found.evidence.inside else "Held out: "
     after = "; before is the baseline, after the model found" if found.adds else ""
     yield Section(
         "The gap",
@@ -113,6 +138,7 @@ def gap(found: Discrepancy) -> Iterator[Section]:
                 )
             ),
             compared(found, Table(("residual", "before", "after", "noise"), (*rows, *each))),
+            *worth(found),
             Picture("gap", "Residual by run, and the error of forecasts against their horizon."),
             Picture("residuals", "Record less model where the baseline misses most."),
         ),
@@ -143,7 +169,7 @@ def _ahead(forecast: Forecast) -> Iterator[tuple[str, ...]]:
     for k in dict.fromkeys((0, last // 4, last // 2, last)):
         yield (
             forecast.kind,
-            f"{forecast.horizon[k]:.3g} s",
+            f"{number(forecast.horizon[k])} s",
             mrad(forecast.before[k]),
             mrad(forecast.after[k]),
             mrad(forecast.noise_floor),
@@ -170,6 +196,11 @@ def where(found: Discrepancy) -> Iterator[Section]:
                 "The torque per moment of inertia that the baseline lacks stands out most clearly:"
             ),
             Items(tuple(_place(row) for row in clearest.values())),
+            Paragraph(
+                "Each is fitted by itself, as if the torque went by that quantity alone, beyond "
+                "what damping, friction, frequency and initial states can take up. Where it really "
+                "goes by another, it may come out too large, and with either sign."
+            ),
         ]
     else:
         blocks.append(
@@ -184,7 +215,7 @@ def where(found: Discrepancy) -> Iterator[Section]:
         (
             ("held out: " if one.held_out else "", Name(one.name)),
             *(
-                f"{getattr(one.errors[m], what):.3g} %" if m in one.errors else ""
+                f"{number(getattr(one.errors[m], what))} %" if m in one.errors else ""
                 for what in ("period_rms", "peak_rms")
                 for m in ("before", "after")
             ),
@@ -209,7 +240,7 @@ def where(found: Discrepancy) -> Iterator[Section]:
 def _place(row: dict[str, Any]) -> str:
     along = " along the motion" if row["along_motion"] else ""
     return (
-        f"{PLACES[row['over']]} {row['from']:.3g} to {row['to']:.3g} {row['unit']}: "
-        f"{row['torque']:.2g} \N{PLUS-MINUS SIGN} {row['stderr']:.1g} "
+        f"{PLACES[row['over']]} {number(row['from'])} to {number(row['to'])} {row['unit']}: "
+        f"{stated(row['torque'], row['stderr'])} "
         f"rad/s\N{SUPERSCRIPT TWO}{along}"
     )

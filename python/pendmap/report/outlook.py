@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.advice import chance_said
+from pendmap.discrepancy.advice import MARGIN
 from pendmap.discrepancy.limits import SURELY
 from pendmap.identification.left_out import left_out
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Items, Name, Paragraph, Section, Strong, Table
-from pendmap.report.wording import chance, gained, joined
+from pendmap.report.wording import chance, gained, joined, number
 from pendmap.words import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from pendmap.discrepancy import Discrepancy
     from pendmap.discrepancy.candidates import Candidate
     from pendmap.discrepancy.limits import Limit
@@ -35,6 +37,9 @@ LIMITS: Final = (
     "over w0\N{SUPERSCRIPT TWO}",
 )
 """Heads of the table of what would have shown."""
+
+MORE: Final = 1.5
+"""Times the noise of the readings from which it is said what counts as noise."""
 
 FIGURES: Final = {
     "separation": "s G",
@@ -69,7 +74,7 @@ def _meaning(outlook: Outlook) -> Text:
         return (
             f"{start}Half the interval of ",
             Name(outlook.about[0]),
-            f" over its value is now {outlook.now:.2g}; half of that is wanted.",
+            f" over its value is now {number(outlook.now, 2)}; half of that is wanted.",
         )
     median = "The last column is the median over all effects that were not found; half is wanted."
     return (
@@ -91,12 +96,17 @@ def _proposals(outlook: Outlook) -> Table:
             Strong(proposal.what) if prospect is best else proposal.what,
             f"{proposal.seconds:g}",
             f"{proposal.wait_s:g}",
-            gained(prospect.value) if separates else f"{prospect.value:.2g}",
+            gained(prospect.value) if separates else number(prospect.value, 2),
         ]
         if separates:
-            row += [chance_said(prospect.wrong or 0.0), chance(prospect.resolved or 0.0)]
+            row += [_wrong(prospect.wrong or 0.0), chance(prospect.resolved or 0.0)]
         rows.append(tuple(row))
     return Table(tuple(head), tuple(rows))
+
+
+def _wrong(probability: float) -> str:
+    """Return the chance of a wrong name: no model is known so well that it may be 0."""
+    return number(probability, 1) if probability >= MARGIN else f"below {number(MARGIN, 1)}"
 
 
 def set_aside(found: Discrepancy) -> Section:
@@ -119,7 +129,7 @@ def set_aside(found: Discrepancy) -> Section:
         blocks += [
             Paragraph(
                 "Refitted and not taken, with the fall of the BIC and of the sum of squares on "
-                "what was held back:"
+                "what was held out:"
             ),
             Table(
                 ("effects", "beside", "fall of BIC", "gain held out"),
@@ -157,8 +167,20 @@ def set_aside(found: Discrepancy) -> Section:
                 ),
                 words=("parameter", "shape"),
             ),
+            *_inflated(found),
         ]
     return Section("What was left out, and what would have shown", tuple(blocks))
+
+
+def _inflated(found: Discrepancy) -> Iterator[Block]:
+    """Yield by how much what is missing makes small effects harder to see."""
+    times = math.sqrt(found.level)
+    if times > MORE:
+        yield Paragraph(
+            "These sizes hold beside what is missing: what the baseline leaves counts as noise "
+            f"here, {number(times, 2)} times that of the readings. In records that the model "
+            "describes the sizes would be smaller by about as much."
+        )
 
 
 def _size(found: Discrepancy, effect: str) -> str:
@@ -169,14 +191,14 @@ def _limit(found: Discrepancy, effect: str, limit: float) -> str:
     if not math.isfinite(limit):
         return "not visible in these records"
     unit = unit_of(f"{effect}.{_size(found, effect)}", found.definition)
-    return f"{limit:.2g} {unit}".rstrip()
+    return f"{number(limit, 2)} {unit}".rstrip()
 
 
 def _shape(limit: Limit) -> str:
     """Return the shape that shows least, and those that are not visible."""
 
     def said(candidate: Candidate) -> str:
-        return ", ".join(f"{name} = {value:.3g}" for name, value in candidate.shape.items())
+        return ", ".join(f"{name} = {number(value)}" for name, value in candidate.shape.items())
 
     if not math.isfinite(limit.size):
         return ""
@@ -193,5 +215,5 @@ def _relative(found: Discrepancy, effect: str, limit: float) -> tuple[str, str]:
         return "", ""
     fit = found.best.trial.fit
     friction = fit.estimates.get("Tr")
-    against = f"{limit / friction.value:.2g}" if friction and friction.value > 0 else ""
-    return against, f"{limit / fit['w0'] ** 2:.1e}"
+    against = number(limit / friction.value, 2) if friction and friction.value > 0 else ""
+    return against, number(limit / fit["w0"] ** 2, 2)

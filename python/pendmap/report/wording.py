@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.candidates import own_name
 from pendmap.pictures.names import unit_of
@@ -21,18 +22,70 @@ __all__ = [
     "joined",
     "lead",
     "mrad",
+    "number",
     "own_parameters",
     "quantity",
     "share",
+    "stated",
     "values",
+    "within",
 ]
 
 Parts = tuple[str | Name | Strong, ...]
 
+SMALL, LARGE = -4, 6
+"""Powers of ten from which on, and below which, numbers are written out."""
+
+FAINT: Final = 1e-7
+"""Errors from which on they are written out."""
+
+RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return a number with so many digits; by a power of ten where it is very small or large."""
+    if not value or not math.isfinite(value):
+        return f"{value:g}"
+    power = _power(float(f"{value:.{digits - 1}e}"))
+    if SMALL <= power < LARGE:
+        text = f"{round(value, digits - 1 - power):.{max(digits - 1 - power, 0)}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    mantissa = f"{value / 10.0**power:.{digits}g}"
+    return _times(power).split()[-1] if mantissa == "1" else f"{mantissa}{_times(power)}"
+
+
+def within(value: float, width: float) -> str:
+    """Return a number with two digits of its uncertainty, by a power of ten where it is small."""
+    most = max(abs(value), abs(width))
+    if not math.isfinite(most) or not 0 < most < 10.0**SMALL:
+        return written(value, width)
+    power = _power(most)
+    return f"{written(value / 10.0**power, width / 10.0**power)}{_times(power)}"
+
+
+def stated(value: float, error: float) -> str:
+    """Return a number with its standard error to two digits, both by the same power of ten."""
+    if not (error and math.isfinite(error)):
+        return number(value, 5)
+    power = 0
+    if max(abs(value), error) < 10.0**SMALL or error < FAINT:
+        power = _power(max(abs(value), error))
+    value, error = value / 10.0**power, error / 10.0**power
+    text = f"{written(value, error)} \N{PLUS-MINUS SIGN} {written(error, error)}"
+    return f"({text}){_times(power)}" if power else text
+
+
+def _power(value: float) -> int:
+    return math.floor(math.log10(abs(value)))
+
+
+def _times(power: int) -> str:
+    return f" \N{MULTIPLICATION SIGN} 10{str(power).translate(RAISED)}"
+
 
 def mrad(value: float) -> str:
     """Return an angle that is small."""
-    return f"{1e3 * value:.3g} mrad"
+    return f"{number(1e3 * value)} mrad"
 
 
 def gained(value: float) -> str:
@@ -44,7 +97,9 @@ def chance(probability: float) -> str:
     """Return a probability, none of them certain."""
     if probability > 0.999:  # noqa: PLR2004 (as far as it is known)
         return "above 99.9 %"
-    return f"{100 * probability:.3g} %" if probability >= 0.001 else "below 0.1 %"  # noqa: PLR2004
+    if probability < 0.001:  # noqa: PLR2004
+        return "below 0.1 %"
+    return f"{100 * probability:.{3 if probability > 0.99 else 2}g} %"  # noqa: PLR2004
 
 
 def share(part: float) -> str:
@@ -69,10 +124,10 @@ def quantity(effect: NamedEffect, parameter: str) -> str:
     unit = unit_of(f"{effect.name}.{parameter}", lambda _: effect.definition)
     after = f" {unit}".rstrip()
     if bounds is None:
-        return f"{value:.4g}{after}"
+        return f"{number(value, 4)}{after}"
     width = (bounds[1] - bounds[0]) / 2
-    low, high = (written(bound, width) for bound in bounds)
-    return f"{written(value, width)}{after} (95 %: {low} to {high})"
+    low, high = (within(bound, width) for bound in bounds)
+    return f"{within(value, width)}{after} (95 %: {low} to {high})"
 
 
 def values(effect: NamedEffect) -> Parts:
@@ -118,7 +173,10 @@ def lead(found: Discrepancy) -> Parts:
         )
     if found.verdict == "partial":
         verb = "They close" if len(found.effects) > 1 else "It closes"
-        end = f", and something more. {verb} {share(closed)} of the squared gap, {to}; {noise}."
+        end = (
+            f", and something more. {verb} {share(closed)} of the squared gap: the residual on "
+            f"held-out data falls {to}; {noise}."
+        )
         return (Strong("What the model lacks is nearly"), " ", *names, end)
     near: Parts = ()
     if nearest:

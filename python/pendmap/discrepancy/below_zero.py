@@ -1,0 +1,109 @@
+"""Damping or friction that effects of time take below 0 while the records last.
+
+A drift is a straight line, and a line that falls ends below 0: damping would feed the motion then.
+What a drift is to an experiment is told by its torque, not by its name: one in proportion to the
+velocity adds to the damping, one of the same size at any velocity to the dry friction.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.discrepancy.replay import Motion, replayed
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.refit import Found
+    from pendmap.identification.runs import FitRun
+
+__all__ = ["below_zero"]
+
+INSTANTS: Final = 80
+"""Instants of the time in the laboratory at which drifts are looked at."""
+
+STEP: Final = 1e-3
+"""Part of a small swing in which they act."""
+
+EXACT: Final = 1e-9
+"""Error of the readings, rad, that the integrator takes for its own allowance."""
+
+LIKE: Final = 0.05
+"""How far from 2, or from 1, the torque at twice the velocity may be over that at once."""
+
+
+def below_zero(evidence: Evidence, found: Found) -> dict[str, float]:
+    """Return from which time in the laboratory on, s, damping or friction are below 0.
+
+    ``c_over_m`` and ``Tr`` with all effects that change with time and add to them, where they are
+    not below 0 all the time; empty where none changes sign while the records last.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    found : Found
+        A model.
+    """
+    fit = found.trial.fit
+    drifting = [e.name for e in fit.model.effects if e.drifts and e.brakes]
+    runs = evidence.fitted
+    times = np.linspace(
+        min(run.lab_time_s + run.time[0] for run in runs),
+        max(run.lab_time_s + run.time[-1] for run in runs),
+        INSTANTS,
+    )
+    speed = max(float(np.nanmax(np.abs(curve[1]))) for curve in fit.curves)
+    own = {name: np.full(INSTANTS, fit[name]) for name in ("c_over_m", "Tr") if name in fit.names}
+    for name in drifting:
+        try:
+            once, twice = (_torque(found, runs[0], name, times, v) for v in (speed / 2, speed))
+        except InputError:
+            continue  # so strong that nothing moves: it is told by other signs
+        at = int(np.argmax(np.abs(once)))
+        ratio = twice[at] / once[at] if once[at] else 0.0
+        if abs(ratio - 2) < LIKE and "c_over_m" in own:
+            own["c_over_m"] = own["c_over_m"] - twice / speed
+        elif abs(ratio - 1) < LIKE and "Tr" in own:
+            own["Tr"] = own["Tr"] - twice
+    return {
+        name: float(times[np.argmax(values < 0)])
+        for name, values in own.items()
+        if values.min() < 0 < values.max()
+    }
+
+
+def _torque(
+    found: Found, run: FitRun, effect: str, times: NDArray[np.float64], speed: float
+) -> NDArray[np.float64]:
+    """Return an effect's torque at the lowest point, rad/s^2, at instants in the laboratory."""
+    step = STEP * 2 * np.pi / found.trial.fit.model.w0
+    blank = [
+        dataclasses.replace(
+            run,
+            time=step * np.array([0.0, 0.5, 1.0]),  # no record has fewer
+            theta=np.zeros(3),
+            sigma=EXACT,
+            trusted=None,
+            drive=None,
+            pivot=None,
+            rod_sensor=None,
+            count=None,
+            lab_time_s=float(at),
+        )
+        for at in times
+    ]
+    states = [(0.0, speed)] * len(blank)
+    motion = Motion.of(found)
+    with_it, without = (
+        replayed(motion, blank, states),
+        replayed(motion.without(effect), blank, states),
+    )
+    return np.array(
+        [(a[1, 2] - b[1, 2]) / step for (_, a), (_, b) in zip(with_it, without, strict=True)]
+    )

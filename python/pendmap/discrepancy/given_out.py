@@ -1,0 +1,52 @@
+"""The model that a diagnosis gives out, beside the one that fits best."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pendmap.discrepancy.named import values_of
+from pendmap.discrepancy.physical import unphysical
+from pendmap.model.unit_names import unit_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pendmap.discrepancy.diagnose import Discrepancy
+
+__all__ = ["feeding", "given_out"]
+
+
+def given_out(found: Discrepancy) -> dict[str, float]:
+    """Return the parameters of the model file, SI; initial states and phases of runs left out."""
+    trial = found.usable.trial
+    values = {name: value for name, value in trial.start.items() if "[" not in name}
+    for effect in trial.fit.model.effects:
+        values |= {f"{effect.name}.{name}": value for name, value in effect.parameters.items()}
+    for candidate in trial.chosen:
+        parameters, _ = values_of(found.usable, candidate)
+        values |= {f"{candidate.name}.{name}": value for name, value in parameters.items()}
+    return values
+
+
+def feeding(found: Discrepancy) -> Iterator[str]:
+    """Yield which coefficients of damping and friction are negative, and what the file has then."""
+    negative = unphysical(found.best.trial.fit)
+    for name, value in negative.items():
+        yield (
+            f"{name} is {value:.3g} {unit_of(name, found.definition)}, unphysical: no pendulum "
+            "feeds its own motion"
+        )
+    if negative:
+        given = ", ".join(
+            f"{name} = {value:.4g} {unit_of(name, found.definition)}".rstrip()
+            for name, value in given_out(found).items()
+        )
+        yield (
+            f"  the model file has 0 there, the rest found again: {given}; residual "
+            f"{found.usable.trial.fit.rms:.4g} rad"
+        )
+    for name, since in found.below_zero.items():
+        yield (
+            f"{name} is below 0 from {since:.3g} s in the laboratory on, by what drifts: "
+            "unphysical, the drift stands for something else"
+        )
