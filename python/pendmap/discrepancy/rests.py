@@ -7,12 +7,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.candidates import Candidate, placed
 from pendmap.discrepancy.refit import KICK, Key, Refits, key_of
-from pendmap.discrepancy.trial import LITTLE, Trial, fitted, settled, with_candidates
+from pendmap.discrepancy.trial import (
+    LITTLE,
+    Trial,
+    fitted,
+    settled,
+    with_candidates,
+)
 from pendmap.errors import InputError
+from pendmap.identification.fitting import fit_runs
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.scores import Score
+    from pendmap.discrepancy.trial import Windows
     from pendmap.model import Rig
 
 __all__ = ["Rests", "consistent"]
@@ -103,13 +111,15 @@ class Rests:
         """Fit a trial's model without an effect, with those that stay, from its own motion."""
         model, free, start = _without(trial, dropped)
         try:
+            # Initial states first: a step of all from states that are another motion's leads away.
+            states = _following(self._evidence, model, free, start, trial.fit.windows)
             return fitted(
                 self._evidence,
                 model,
                 free,
                 chosen,
                 start=start,
-                windows=trial.fit.windows,
+                windows=states,
                 steps=LESS_STEPS,
                 least_gain=LITTLE,
             )
@@ -137,6 +147,28 @@ class Rests:
             )
         except InputError:
             return None
+
+
+def _following(
+    evidence: Evidence,
+    model: Rig,
+    free: list[str],
+    start: dict[str, float],
+    windows: Windows,
+) -> Windows:
+    """Return windows whose initial states are fitted to a model's parameters, which are held."""
+    fit = fit_runs(
+        evidence.fitted,
+        model,
+        free,
+        start=start,
+        windows=windows,
+        profiled=(),
+        hold=True,
+        steps=LESS_STEPS,
+        least_gain=LITTLE,
+    )
+    return fit.windows
 
 
 def consistent(rest: Trial, trial: Trial, candidate: Candidate) -> bool:
