@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
 """Edges between which probabilities are compared with what came true."""
 
+ENLARGED = 0.84
+"""From which probability on the picture is drawn larger: most names have one near 1."""
+
 STRONG, SEEN = 100.0, 60.0
 """Scores from which figures count."""
 
@@ -278,8 +281,10 @@ def draw_reliability(rows: Iterable[Row], path: Path) -> None:
     import matplotlib.pyplot as plt  # noqa: PLC0415 (for a picture only)
 
     chances, true = (np.array(x) for x in believed(rows))
-    figure, axes = plt.subplots(figsize=(4.2, 4.2), layout="constrained")
-    axes.plot([0, 1], [0, 1], color="0.7", linewidth=1)
+    figure, axes = plt.subplots(figsize=(4.6, 4.6), layout="constrained")
+    inner = axes.inset_axes((0.57, 0.08, 0.4, 0.4))
+    for one in (axes, inner):
+        one.plot([0, 1], [0, 1], color="0.7", linewidth=1)
     for low, high in itertools.pairwise(BINS):
         own = (chances >= low) & ((chances < high) | (high == 1.0))
         count = int(np.count_nonzero(own))
@@ -287,11 +292,17 @@ def draw_reliability(rows: Iterable[Row], path: Path) -> None:
             continue
         share, least, most = share_of(int(np.count_nonzero(true[own])), count)
         mean = float(np.mean(chances[own]))
-        axes.plot([mean, mean], [least, most], color="C0", linewidth=1.5)
-        axes.plot(mean, share, "o", color="C0", markersize=5)
-        axes.annotate(str(count), (mean, share), xytext=(6, -10), textcoords="offset points")
-    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
+        for one in (axes, inner):
+            one.plot([mean, mean], [least, most], color="C0", linewidth=1.5)
+            one.plot(mean, share, "o", color="C0", markersize=5)
+        shown = inner if mean > ENLARGED else axes
+        shown.annotate(str(count), (mean, share), xytext=(5, -11), textcoords="offset points")
+    inner.set(xlim=(ENLARGED, 1.03), ylim=(0.75, 1.02))
+    inner.tick_params(labelsize="small")
+    axes.indicate_inset_zoom(inner, edgecolor="0.5")
+    axes.set(xlim=(-0.02, 1.04), ylim=(-0.02, 1.04), aspect="equal")
     axes.set_xlabel("probability given to a name")
     axes.set_ylabel("share of names that were right")
+    axes.set_title("Numbers: how many names; bars: 95 %", fontsize="medium", loc="left")
     figure.savefig(path, dpi=150)
     plt.close(figure)
