@@ -110,23 +110,41 @@ class Rests:
     def fit_without(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
         """Fit a trial's model without an effect, with those that stay, from its own motion."""
         model, free, start = _without(trial, dropped)
+        windows = trial.fit.windows
         try:
-            # Initial states first: a step of all from states that are another motion's leads away.
-            states = _following(self._evidence, model, free, start, trial.fit.windows)
-            return fitted(
-                self._evidence,
-                model,
-                free,
-                chosen,
-                start=start,
-                windows=states,
-                steps=LESS_STEPS,
-                least_gain=LITTLE,
-            )
+            rest = self._fit(model, free, chosen, start, windows)
         except InputError:
             # Without it the motion is lost from here: from short windows on, as the baseline began.
             begin = start | {n: v for n, v in self.base.start.items() if n in free}
             return fitted(self._evidence, model, free, chosen, start=begin)
+        if rest.fit.converged:
+            return rest
+        try:
+            # Initial states first: a step of all from states that are another motion's leads away.
+            windows = _following(self._evidence, model, free, start, windows)
+            other = self._fit(model, free, chosen, start, windows)
+        except InputError:
+            return rest
+        return min((rest, other), key=lambda t: t.chi2)
+
+    def _fit(
+        self,
+        model: Rig,
+        free: list[str],
+        chosen: tuple[Candidate, ...],
+        start: dict[str, float],
+        windows: Windows,
+    ) -> Trial:
+        return fitted(
+            self._evidence,
+            model,
+            free,
+            chosen,
+            start=start,
+            windows=windows,
+            steps=LESS_STEPS,
+            least_gain=LITTLE,
+        )
 
     def instead(self, trial: Trial, dropped: Candidate, score: Score) -> Trial | None:
         """Fit a trial's model with another effect in an effect's place, that does nearly the same.
