@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.discrepancy.replay import Motion, replayed
+from pendmap.discrepancy.replay import Motion
+from pendmap.discrepancy.strength import EXACT, STEP, acting
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,12 +27,6 @@ __all__ = ["below_zero"]
 
 INSTANTS: Final = 80
 """Instants of the time in the laboratory at which drifts are looked at."""
-
-STEP: Final = 1e-3
-"""Part of a small swing in which they act."""
-
-EXACT: Final = 1e-9
-"""Error of the readings, rad, that the integrator takes for its own allowance."""
 
 LIKE: Final = 0.05
 """How far from 2, or from 1, the torque at twice the velocity may be over that at once."""
@@ -100,10 +95,5 @@ def _torque(
     ]
     states = [(0.0, speed)] * len(blank)
     motion = Motion.of(found)
-    with_it, without = (
-        replayed(motion, blank, states),
-        replayed(motion.without(effect), blank, states),
-    )
-    return np.array(
-        [(a[1, 2] - b[1, 2]) / step for (_, a), (_, b) in zip(with_it, without, strict=True)]
-    )
+    torque, _ = acting(motion, effect, blank, states, step)
+    return torque

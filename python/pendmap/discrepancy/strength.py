@@ -11,11 +11,15 @@ from pendmap.discrepancy.replay import Motion, replayed
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.discrepancy.refit import Found
     from pendmap.identification.runs import FitRun
 
-__all__ = ["Strength", "strength_of"]
+__all__ = ["EXACT", "STEP", "Strength", "acting", "strength_of"]
 
 INSTANTS: Final = 150
 """Instants of the records at which an effect is tried."""
@@ -81,14 +85,29 @@ def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength | None
             states.append((float(theta[at]), float(velocity[at])))
     motion = Motion.of(best)
     try:
-        with_it = replayed(motion, runs, states)
-        without = replayed(motion.without(effect), runs, states)
+        torque, reading = acting(motion, effect, runs, states, step)
     except InputError:
         return None
+    return Strength(*(s for x in (torque, reading) for s in (_rms(x), float(np.abs(x).max()))))
+
+
+def acting(
+    motion: Motion,
+    effect: str,
+    runs: Sequence[FitRun],
+    states: Sequence[tuple[float, float]],
+    step: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return an effect's torque, rad/s^2, and what it adds to the reading, rad, at runs' starts.
+
+    Each run is as short as ``step``, s.
+    """
+    with_it = replayed(motion, runs, states)
+    without = replayed(motion.without(effect), runs, states)
     pairs = list(zip(with_it, without, strict=True))
     torque = np.array([(a[1, 2] - b[1, 2]) / step for (_, a), (_, b) in pairs])
     reading = np.array([a[0] - b[0] for (a, _), (b, _) in pairs])
-    return Strength(*(s for x in (torque, reading) for s in (_rms(x), float(np.abs(x).max()))))
+    return torque, reading
 
 
 def _phase(best: Found, run: FitRun, place: int) -> float:
