@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use rayon::prelude::*;
+
 use super::normal::{Normal, Step};
 use super::problem::Problem;
 use super::way::Way;
@@ -12,12 +14,26 @@ use crate::error::Error;
 const FIRST_DAMPING: f64 = 1e-4;
 /// By how much it grows after a failure; it falls by the square of that.
 const GROWTH: f64 = 8.0;
-/// The part of what a step promised that it must gain for no other way to be tried.
+/// The part of what a step promised that it must gain to be as good as another one ...
+const FAIR: f64 = 0.25;
+/// ... and for no other way to be tried.
 const KEPT: f64 = 0.75;
+/// The part of the most that a window missed of what was promised from which others are looked at.
+const PART_MISSED: f64 = 0.1;
+/// The part of what it promised that a window keeps at most that is at a kink.
+const KEPT_AT_KINK: f64 = 0.1;
+/// So many windows at most are looked at.
+const FEW: usize = 2;
+/// The most steps by which such a window finds its initial state.
+const RELAXED: usize = 6;
 /// The most steps by which all else follows the widths.
 const FOLLOWED: usize = 2;
 /// The part of what a step promised that such a step has to promise.
 const FOLLOWED_GAIN: f64 = 0.1;
+/// Steps down after which it shows where a descent leads ...
+const TRIED: usize = 3;
+/// ... and so many times as much as the next one promises is the most that is hoped for.
+const HOPE: f64 = 3.0;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e8;
 
@@ -30,6 +46,9 @@ pub struct Point {
     pub windows: Vec<Window>,
     /// The equations there.
     pub normal: Normal,
+    /// What initial states promise in vain: at a kink, as where friction just holds, a least sum of
+    /// squares is not flat.
+    in_vain: f64,
 }
 
 impl Point {
@@ -39,7 +58,7 @@ impl Point {
     /// [`Error::Diverges`] where a motion leaves the range of numbers, or a value is out of range.
     pub fn new(problem: &Problem, values: Vec<f64>, windows: Vec<Window>) -> Result<Self, Error> {
         let normal = Normal::at(problem, &values, &windows).ok_or(Error::Diverges)?;
-        Ok(Self { values, windows, normal })
+        Ok(Self { values, windows, normal, in_vain: 0.0 })
     }
 
     /// The samples that count, less the parameters and initial states that were adapted to them.
@@ -68,12 +87,20 @@ impl Point {
 
     /// The point a step further if it is lower, and how many were tried: straight; where that leads
     /// less far down than it promised in ratios too, all else following the widths.
-    fn lower(&self, problem: &Problem, step: &Step, held: &[usize]) -> (usize, Option<Self>) {
+    fn lower(&mut self, problem: &Problem, step: &Step, held: &[usize]) -> (usize, Option<Self>) {
         let chi2 = self.normal.chi2;
-        let straight = self.moved(problem, step).filter(|next| next.normal.chi2 < chi2);
-        let kept = straight.as_ref().is_some_and(|p| chi2 - p.normal.chi2 > KEPT * step.gain);
+        let lower = |next: &Self| next.normal.chi2 < chi2;
+        let keeps = |next: &Self, part: f64| chi2 - next.normal.chi2 > part * step.gain;
         let widths = || (0..problem.ways.len()).filter(|k| problem.ways[*k] == Way::Width);
-        if kept || widths().next().is_none() {
+        let bends = widths().next().is_some();
+        let mut straight = self.moved(problem, step);
+        if let Some(next) = straight.as_mut().filter(|next| !bends && !keeps(next, FAIR)) {
+            next.relax(problem, self, step);
+            self.in_vain = next.in_vain;
+        }
+        let straight = straight.filter(lower);
+        let kept = straight.as_ref().is_some_and(|next| keeps(next, KEPT));
+        if kept || !bends {
             return (1, straight);
         }
         let Some(bent) = self.gone(problem, step, |place| problem.ways[place]) else {
@@ -83,6 +110,54 @@ impl Point {
         let (followed, bent) = bent.followed(problem, &held, FOLLOWED_GAIN * step.gain);
         let best = straight.as_ref().map_or(chi2, |point| point.normal.chi2);
         (2 + followed, if bent.normal.chi2 < best { Some(bent) } else { straight })
+    }
+
+    /// Windows that rose where the step from `before` promised a fall find initial states of their
+    /// own.
+    ///
+    /// A motion near the top, or one that friction nearly holds, goes another way after the least
+    /// step too far, and no other window can make that good: one alone would hold up the search.
+    fn relax(&mut self, problem: &Problem, before: &Self, step: &Step) {
+        if self.windows.len() == 1 {
+            return;
+        }
+        let missed: Vec<f64> = (0..self.windows.len())
+            .map(|k| self.normal.parts[k] - before.normal.parts[k] + step.gains[k])
+            .collect();
+        let most = missed.iter().copied().fold(0.0, f64::max);
+        let limit = Limit { gain: 0.1, part: 1e-3, steps: RELAXED, target: f64::INFINITY };
+        let held: Vec<usize> = (0..self.values.len()).collect();
+        let alone = |values: &[f64], window: Window| {
+            let mut point = Self::new(problem, values.to_vec(), vec![window]).ok()?;
+            let promised = point.normal.step(0.0, &held).gain;
+            let chi2 = point.normal.chi2;
+            descend(problem, &mut point, &held, limit, &AtomicBool::new(false)).ok()?;
+            let kept = chi2 - point.normal.chi2;
+            Some((point, if kept < KEPT_AT_KINK * promised { promised - kept } else { 0.0 }))
+        };
+        let settled = |k: usize| {
+            // From where the step led, and from where it was.
+            let from = [self.windows[k], before.windows[k]];
+            let found = from.into_iter().filter_map(|window| alone(&self.values, window));
+            let (point, _) =
+                found.min_by(|(a, _), (b, _)| a.normal.chi2.total_cmp(&b.normal.chi2))?;
+            let (_, in_vain) = alone(&before.values, before.windows[k])?;
+            Some((k, point, in_vain))
+        };
+        let risen: Vec<usize> =
+            (0..missed.len()).filter(|k| missed[*k] > PART_MISSED * most).collect();
+        if risen.len() > FEW {
+            // Not a window or two, but the step itself goes too far.
+            return;
+        }
+        let found: Vec<(usize, Self, f64)> = risen.into_par_iter().filter_map(settled).collect();
+        for (k, point, in_vain) in found {
+            if point.normal.chi2 < self.normal.parts[k] {
+                self.windows[k] = point.windows[0];
+                self.normal.replace(k, point.normal);
+            }
+            self.in_vain += in_vain;
+        }
     }
 
     /// The point to which all but `held` follows, and how many were tried, while steps gain `enough`.
@@ -113,6 +188,9 @@ pub struct Limit {
     pub part: f64,
     /// The most steps.
     pub steps: usize,
+    /// The sum of squares that is to be reached: a descent that promises far less is given up;
+    /// infinite where any is worth it.
+    pub target: f64,
 }
 
 /// How a descent ended.
@@ -122,6 +200,8 @@ pub struct Outcome {
     pub steps: usize,
     /// Whether the limit was reached, or no step leads further down.
     pub converged: bool,
+    /// Whether it was given up: it leads nowhere near [`Limit::target`].
+    pub given_up: bool,
 }
 
 /// Goes down from `point`, parameters `held` kept where they are.
@@ -135,29 +215,35 @@ pub fn descend(
     limit: Limit,
     cancel: &AtomicBool,
 ) -> Result<Outcome, Error> {
-    let (mut damping, mut steps) = (0.0, 0);
+    let (mut damping, mut steps, mut down) = (0.0, 0, 0);
+    let ended = |steps, converged| Ok(Outcome { steps, converged, given_up: false });
     loop {
         if cancel.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
         }
         let chi2 = point.normal.chi2;
         let step = point.normal.step(damping, held);
-        if damping == 0.0 && step.gain <= limit.gain + limit.part * chi2 {
+        let promised = step.gain - point.in_vain;
+        if damping == 0.0 && promised <= limit.gain + limit.part * chi2 {
             // The last step costs one more point and is worth it: what is left is its square.
             if let Some(next) = point.moved(problem, &step).filter(|next| next.normal.chi2 <= chi2)
             {
                 *point = next;
             }
-            return Ok(Outcome { steps: steps + 1, converged: true });
+            return ended(steps + 1, true);
+        }
+        if damping == 0.0 && down >= TRIED && chi2 - HOPE * promised > limit.target {
+            return Ok(Outcome { steps, converged: false, given_up: true });
         }
         if steps >= limit.steps {
-            return Ok(Outcome { steps, converged: false });
+            return ended(steps, false);
         }
         let (tried, next) = point.lower(problem, &step, held);
         steps += tried;
         if let Some(next) = next {
-            let fair = chi2 - next.normal.chi2 > 0.25 * step.gain;
+            let fair = chi2 - next.normal.chi2 > FAIR * step.gain;
             *point = next;
+            down += 1;
             if fair {
                 damping = if damping > FIRST_DAMPING { damping / (GROWTH * GROWTH) } else { 0.0 };
             }
@@ -165,8 +251,8 @@ pub fn descend(
             damping = (damping * GROWTH).max(FIRST_DAMPING);
             // At a kink, as where a half swing more or less is made before the last stop, the sum
             // of squares has a least value without being flat.
-            if step.gain <= limit.gain + limit.part * chi2 || damping > MOST_DAMPING {
-                return Ok(Outcome { steps, converged: true });
+            if promised <= limit.gain + limit.part * chi2 || damping > MOST_DAMPING {
+                return ended(steps, true);
             }
         }
     }

@@ -35,11 +35,16 @@ fn over<T: Send>(
     windows: &[Window],
     make: impl Fn(Linear, &Columns) -> T + Sync,
 ) -> Option<Vec<T>> {
-    let of_record = |index: usize| Some((problem.shaped(index, values)?, problem.columns(index)));
-    let records: Vec<(Shaped, Columns)> =
-        (0..problem.records.len()).map(of_record).collect::<Option<_>>()?;
+    // Of the records that the windows are of.
+    let mut records: Vec<Option<(Shaped, Columns)>> = vec![None; problem.records.len()];
+    for window in windows {
+        if records[window.record].is_none() {
+            let shaped = problem.shaped(window.record, values)?;
+            records[window.record] = Some((shaped, problem.columns(window.record)));
+        }
+    }
     let each = |window: &Window| {
-        let (shaped, columns) = &records[window.record];
+        let (shaped, columns) = records[window.record].as_ref()?;
         let linear = linearise(problem, shaped, columns, window);
         let sound = linear.rows.iter().all(|slope| slope.is_finite());
         (sound && linear.chi2.is_finite()).then(|| make(linear, columns))
@@ -108,6 +113,8 @@ impl Block {
 pub struct Normal {
     /// The sum of the squared residuals, or of the deviances of readings rounded to counts.
     pub chi2: f64,
+    /// The part of each window in it.
+    pub parts: Vec<f64>,
     /// For each window the states at its samples.
     pub states: Vec<Vec<State>>,
     /// For each window the residuals over the standard errors.
@@ -129,9 +136,22 @@ pub struct Step {
     pub starts: Vec<State>,
     /// By how much the sum of squares falls if all is linear.
     pub gain: f64,
+    /// The part of each window in that.
+    pub gains: Vec<f64>,
 }
 
 impl Normal {
+    /// Puts the equations of one window, found by themselves, in the place of window `index`.
+    pub fn replace(&mut self, index: usize, mut only: Self) {
+        self.parts[index] = only.chi2;
+        self.states[index] = only.states.swap_remove(0);
+        self.residuals[index] = only.residuals.swap_remove(0);
+        self.apart[index] = only.apart.swap_remove(0);
+        self.white[index] = only.white.swap_remove(0);
+        self.blocks[index] = only.blocks.swap_remove(0);
+        self.chi2 = self.parts.iter().sum();
+    }
+
     /// The normal equations at `values`, with the windows' initial states; none where a value is out
     /// of its range or a motion leaves the range of numbers.
     #[must_use]
@@ -145,6 +165,7 @@ impl Normal {
         let count = problem.free.len();
         let mut normal = Self {
             chi2: 0.0,
+            parts: Vec::with_capacity(all.len()),
             states: Vec::with_capacity(all.len()),
             residuals: Vec::with_capacity(all.len()),
             apart: Vec::with_capacity(all.len()),
@@ -155,6 +176,7 @@ impl Normal {
         // In the order of the windows: a sum does not depend on threads.
         for (chi2, states, [residuals, apart, white], block) in all {
             normal.chi2 += chi2;
+            normal.parts.push(chi2);
             normal.states.push(states);
             normal.residuals.push(residuals);
             normal.apart.push(apart);
@@ -202,7 +224,7 @@ impl Normal {
     #[must_use]
     pub fn completed(&self, values: &DVector<f64>, damping: f64) -> Step {
         let mut starts = Vec::with_capacity(self.blocks.len());
-        let mut gain = 0.0;
+        let mut gains = Vec::with_capacity(self.blocks.len());
         for block in &self.blocks {
             let triangle = block.damped(damping);
             let blind = Block::blind(&triangle);
@@ -220,10 +242,11 @@ impl Normal {
             }
             // |r|^2 - |r - A x|^2 with the equations as they are without damping.
             let moved = block.triangle.columns(0, last) * &step;
-            gain += moved.dot(&(block.triangle.column(last) * 2.0 - &moved));
+            gains.push(moved.dot(&(block.triangle.column(last) * 2.0 - &moved)));
             starts.push([step[0], step[1]]);
         }
-        Step { values: values.iter().copied().collect(), starts, gain }
+        let gain = gains.iter().sum();
+        Step { values: values.iter().copied().collect(), starts, gain, gains }
     }
 
     /// The covariance of the free parameters; infinite for those that nothing determines.

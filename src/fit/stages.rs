@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::descent::{Limit, Point, descend};
+use super::descent::{Limit, Outcome, Point, descend};
 use super::normal::Normal;
 use super::problem::Problem;
 use super::window::{Window, cut, guess, halves};
@@ -35,11 +35,13 @@ pub struct Settings {
     /// So many parameters, the first ones, stay at their starts: a model is tried on a record that
     /// it was not fitted to, and the initial states alone are adapted.
     pub hold: usize,
+    /// As of [`Limit::target`], of a search that begins at given windows.
+    pub target: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { shortest: TAU, growth: 4.0, steps: 40, gain: 1e-3, hold: 0 }
+        Self { shortest: TAU, growth: 4.0, steps: 40, gain: 1e-3, hold: 0, target: f64::INFINITY }
     }
 }
 
@@ -54,6 +56,8 @@ pub struct Fit {
     pub stages: usize,
     /// Whether the last stage converged.
     pub converged: bool,
+    /// Whether it was given up.
+    pub given_up: bool,
 }
 
 impl Fit {
@@ -81,12 +85,15 @@ pub fn fit(
     windows: Option<Vec<Window>>,
     cancel: &AtomicBool,
 ) -> Result<Fit, Error> {
-    let last = Limit { gain: settings.gain, part: 1e-9, steps: settings.steps };
+    let last =
+        Limit { gain: settings.gain, part: 1e-9, steps: settings.steps, target: f64::INFINITY };
     let Some(windows) = windows else { return widened(problem, settings, last, cancel) };
+    let last = Limit { target: settings.target, ..last };
     let held = held(problem, settings);
     let mut point = Point::new(problem, problem.start(), windows)?;
     let outcome = descend(problem, &mut point, &held, last, cancel)?;
-    Ok(Fit { point, steps: outcome.steps, stages: 1, converged: outcome.converged })
+    let Outcome { steps, converged, given_up } = outcome;
+    Ok(Fit { point, steps, stages: 1, converged, given_up })
 }
 
 /// The parameters that are not adapted.
@@ -102,7 +109,7 @@ fn widened(
 ) -> Result<Fit, Error> {
     let span = |times: &[f64]| times[times.len() - 1] - times[0];
     let most = problem.records.iter().map(|r| span(&r.times).min(r.longest)).fold(0.0, f64::max);
-    let rough = Limit { gain: 0.1, part: 1e-3, steps: settings.steps };
+    let rough = Limit { gain: 0.1, part: 1e-3, ..last };
     let held = held(problem, settings);
     let mut length = settings.shortest.min(most);
     let windows = cut(problem, length, |record, at| guess(&problem.records[record], at));
@@ -120,7 +127,8 @@ fn widened(
             steps += outcome.steps;
         }
         if length >= most {
-            return Ok(Fit { point, steps, stages, converged: outcome.converged });
+            let converged = outcome.converged;
+            return Ok(Fit { point, steps, stages, converged, given_up: false });
         }
         // Not a rest of the record at the end that is much shorter than the others.
         length *= settings.growth;
@@ -132,7 +140,7 @@ fn widened(
         // that is known.
         point = match Point::new(problem, point.values.clone(), windows) {
             Ok(next) => next,
-            Err(_) => return Ok(Fit { point, steps, stages, converged: false }),
+            Err(_) => return Ok(Fit { point, steps, stages, converged: false, given_up: false }),
         };
     }
 }
@@ -184,7 +192,7 @@ fn settled(
     cancel: &AtomicBool,
 ) -> Result<Vec<Window>, Error> {
     let held: Vec<usize> = (0..values.len()).collect();
-    let limit = Limit { gain: 0.1, part: 1e-3, steps: 10 };
+    let limit = Limit { gain: 0.1, part: 1e-3, steps: 10, target: f64::INFINITY };
     let settle = |window: Window| {
         let Ok(mut point) = Point::new(problem, values.to_vec(), vec![window]) else {
             return Ok(window);

@@ -120,6 +120,7 @@ pub struct FitChoices {
     steps: usize,
     gain: f64,
     hold: usize,
+    target: f64,
     profiled: Vec<usize>,
     level: f64,
     doubt: f64,
@@ -165,8 +166,8 @@ pub fn fit_runs<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let problem = problem(runs, &free, choices.tolerance)?;
     let given = windows.map(|given| self::windows(given, &problem)).transpose()?;
-    let FitChoices { shortest, growth, steps, gain, hold, .. } = choices;
-    let settings = Settings { shortest, growth, steps, gain, hold };
+    let FitChoices { shortest, growth, steps, gain, hold, target, .. } = choices;
+    let settings = Settings { shortest, growth, steps, gain, hold, target };
     let (found, ends) = watched(py, None, |control| {
         let found = fit(&problem, settings, given, control.flag())?;
         let level = choices.level * found.widening(&problem, choices.doubt);
@@ -180,6 +181,7 @@ pub fn fit_runs<'py>(
     dict.set_item("steps", found.steps)?;
     dict.set_item("stages", found.stages)?;
     dict.set_item("converged", found.converged)?;
+    dict.set_item("given_up", found.given_up)?;
     Ok(dict)
 }
 

@@ -35,8 +35,8 @@ def recorded(folder: Path, *, forced: int = 0) -> Experiment:
 
 def test_a_negative_coefficient_is_0_and_the_rest_fitted_again(tmp_path: Path) -> None:
     evidence = evidence_of(recorded(tmp_path))
-    # Far more drag than there is: the viscous damping has to make up for it.
-    model = Rig(6.0, c_over_m=0.05, Tr=0.05, effects=(Effect("quadratic_drag", {"q": 0.05}),))
+    # More drag than there is: the viscous damping has to make up for it.
+    model = Rig(6.0, c_over_m=0.05, Tr=0.05, effects=(Effect("quadratic_drag", {"q": 0.01}),))
     trial = fitted(evidence, model, ["w0", "c_over_m", "Tr"])
     found = Found(trial, tried(evidence, trial))
     assert set(unphysical(trial.fit)) == {"c_over_m"}
@@ -74,7 +74,7 @@ def test_a_search_from_0_finds_the_effects_that_are_there(tmp_path: Path) -> Non
     evidence = evidence_of(read_experiment(where.experiment))
     base = fitted(evidence, Rig(6.0, c_over_m=0.01, Tr=0.05), ["w0", "c_over_m", "Tr"])
     drag = next(c for c, *_ in candidates((), driven=False) if c.name == "quadratic_drag")
-    model = Rig(6.0, Tr=0.05, effects=(Effect("quadratic_drag", {"q": 0.05}),))
+    model = Rig(6.0, Tr=0.05, effects=(Effect("quadratic_drag", {"q": 0.01}),))
     wrong = fitted(evidence, model, ["w0", "c_over_m", "Tr"], [drag])
     assert set(unphysical(wrong.fit)) == {"c_over_m"}
     found = Found(wrong, tried(evidence, wrong))

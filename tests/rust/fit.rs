@@ -154,7 +154,7 @@ fn intervals_end_where_the_best_of_the_rest_is_that_much_worse() {
             let mut held = found.clone();
             held.values[which] = *end;
             held = Point::new(&problem, held.values, held.windows).expect("a point");
-            let limit = Limit { gain: 1e-6, part: 0.0, steps: 50 };
+            let limit = Limit { gain: 1e-6, part: 0.0, steps: 50, target: f64::INFINITY };
             descend(&problem, &mut held, &[which], limit, &cancel).expect("converges");
             let rise = held.normal.chi2 - found.normal.chi2;
             assert!((rise - level).abs() < 0.05, "{which}: {end} {rise}");

@@ -35,7 +35,7 @@ fn searched(problem: &Problem, steps: usize) -> (Point, Outcome) {
         start: [*theta, 0.0],
     });
     let mut point = Point::new(problem, problem.start(), windows.collect()).expect("a motion");
-    let limit = Limit { gain: 1e-12, part: 0.0, steps };
+    let limit = Limit { gain: 1e-12, part: 0.0, steps, target: f64::INFINITY };
     let outcome = descend(problem, &mut point, &[], limit, &AtomicBool::new(false));
     (point, outcome.expect("not cancelled"))
 }

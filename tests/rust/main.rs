@@ -6,7 +6,7 @@
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`effects`]: the library, each effect in every respect
 //! - [`formulas`]: effects that users write; [`rewritten`]: the library's as such
-//! - [`fit`], [`fit_derivatives`], [`fit_counts`]: parameters from records
+//! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_counts`]: parameters from records
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
@@ -26,6 +26,7 @@ mod exact;
 mod fit;
 mod fit_counts;
 mod fit_derivatives;
+mod fit_ends;
 mod fit_records;
 mod fit_way;
 mod formulas;

@@ -59,13 +59,12 @@ def pruned(search: Search, best: Found) -> Found:
         for k in _rivals(scores, rest, best.trial, candidate, level):
             other = _with_rival(search, scores, k, rest, best, candidate)
             if other is None or other.held.chi2 > best.held.chi2 + LOSS * level:
-                continue  # better where it was fitted alone
-            if other.trial.bic(level) < best.trial.bic(level) - 1:
-                without = Found(rest, best.held)
-                search.attempts.append(
-                    attempt_of(without, other, scores, [k], level=level, accepted=True)
-                )
-                return pruned(search, other)
+                continue  # not better, or where it was fitted alone
+            without = Found(rest, best.held)
+            search.attempts.append(
+                attempt_of(without, other, scores, [k], level=level, accepted=True)
+            )
+            return pruned(search, other)
     return best
 
 
@@ -91,14 +90,19 @@ def _rivals(
 def _with_rival(  # noqa: PLR0913, PLR0917 (which one, and in which place)
     search: Search, scores: Scores, k: int, rest: Trial, best: Found, candidate: Candidate
 ) -> Found | None:
-    """Return the model with a rival in an effect's place."""
+    """Return the model with a rival in an effect's place; none where that is not better."""
     score = scores.scores[k]
-    found = search.refit(rest, scores, [k])
+    level = search.level()
+    target = search.target(best.trial, rest.adapted + score.candidate.count)
+    found = search.fitted(rest, scores, [k], target)
     near = SIMPLER * (rest.chi2 - best.trial.chi2)
     fewer = score.candidate.count < candidate.count
-    if found is None or not fewer or found.trial.chi2 - best.trial.chi2 >= near:
-        return found
-    other = search.rests.instead(best.trial, candidate, score)
-    if other is None or other.chi2 >= found.trial.chi2:
-        return found
-    return Found(other, tried(search.evidence, other))
+    if found is not None and fewer and found.chi2 - best.trial.chi2 < near:
+        other = search.rests.instead(best.trial, candidate, score, target)
+        found = min((t for t in (found, other) if t), key=lambda t: t.chi2)
+    if found is None or found.bic(level) >= best.trial.bic(level) - 1:
+        return None
+    try:
+        return Found(found, tried(search.evidence, found))
+    except InputError:
+        return None  # what was held back leads out of the range of numbers

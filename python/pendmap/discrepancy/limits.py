@@ -7,7 +7,8 @@ import functools
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.select import GAIN, GATE
+from pendmap.discrepancy.race import GATE
+from pendmap.discrepancy.select import GAIN
 from pendmap.model.effects import Effect
 
 if TYPE_CHECKING:

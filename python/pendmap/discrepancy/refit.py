@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.held import Held, tried
 from pendmap.discrepancy.sides import better_side
+from pendmap.discrepancy.slipped import from_short_windows
 from pendmap.discrepancy.trial import (
     ASTRAY,
     CLEAN,
     Trial,
-    from_short_windows,
     with_candidates,
 )
+from pendmap.discrepancy.valley import exponents
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,6 +41,9 @@ step of the fit is the whole of it. A phase needs some size to be anything."""
 SHORT: Final = 0.8
 """A first fit that gains less than this part of what the score promised is tried again."""
 
+HOPE: Final = 1.5
+"""So many times what the score promises is the most that is hoped for of what is beaten."""
+
 Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
 
 
@@ -61,20 +66,60 @@ class Refits:
 
     def __init__(self, evidence: Evidence) -> None:
         self.evidence = evidence
-        self._known: dict[tuple[Key, Key], Found | None] = {}
+        self._known: dict[tuple[Key, Key], Trial | None] = {}
+        self._targets: dict[tuple[Key, Key], float] = {}
+        self._held: dict[tuple[Key, Key], Found | None] = {}
 
-    def refit(self, trial: Trial, scores: Scores, places: Sequence[int]) -> Found | None:
-        """Fit candidates from the score's whole step, and from a part of it if that fails."""
+    def refit(
+        self, trial: Trial, scores: Scores, places: Sequence[int], target: float = math.inf
+    ) -> Found | None:
+        """Fit candidates as :meth:`fitted` does, and try them on what was held back."""
+        full = self.fitted(trial, scores, places, target)
+        if full is None:
+            return None
+        key = key_of(trial.chosen), key_of([scores.scores[k].candidate for k in places])
+        if key not in self._held:
+            try:
+                self._held[key] = Found(full, tried(self.evidence, full))
+            except InputError:
+                self._held[key] = None  # what was held back leads out of the range of numbers
+        return self._held[key]
+
+    def fitted(
+        self, trial: Trial, scores: Scores, places: Sequence[int], target: float = math.inf
+    ) -> Trial | None:
+        """Fit candidates from the score's whole step, and from a part of it if that fails.
+
+        Parameters
+        ----------
+        trial : Trial
+            The model without them.
+        scores : Scores
+            At that model.
+        places : sequence of int
+            Which of the scores.
+        target : float
+            The sum of squares that is to be reached: candidates that promise far less are beaten,
+            and not fitted to the end.
+        """
         added = [scores.scores[k].candidate for k in places]
-        key = (key_of(trial.chosen), key_of(added))
-        if key not in self._known:
-            self._known[key] = self._refitted(trial, scores, places, added)
+        key = key_of(trial.chosen), key_of(added)
+        if key not in self._known or target > self._targets[key]:
+            if trial.chi2 - HOPE * scores.together(places) > target:
+                # Not even by what the score promises: its size alone, in the shape that it has.
+                found, whole = self._fit(trial, added, _kick(scores, places), bare=True), False
+            else:
+                found = self._refitted(trial, scores, places, added, target)
+                whole = found is None or found.fit.converged or found.chi2 <= target
+            self._known[key] = found
+            self._targets[key] = math.inf if whole else target
+            self._held.pop(key, None)
         return self._known[key]
 
     def known(self, trial: Trial, added: Sequence[Candidate]) -> Trial | None:
-        """Return the fit of a trial's model with candidates, if it was made."""
-        found = self._known.get((key_of(trial.chosen), key_of(added)))
-        return None if found is None else found.trial
+        """Return the fit of a trial's model with candidates, if it was made to the end."""
+        key = key_of(trial.chosen), key_of(added)
+        return self._known.get(key) if self._targets.get(key) == math.inf else None
 
     def _refitted(
         self,
@@ -82,42 +127,55 @@ class Refits:
         scores: Scores,
         places: Sequence[int],
         added: Sequence[Candidate],
-    ) -> Found | None:
-        start = {n: v for k in places for n, v in scores.scores[k].start.items()}
-        sizes = {candidate.free[0] for candidate in added}
-        kick = {n: KICK * v if n in sizes else v for n, v in start.items()}
-        found = self._fit(trial, added, kick)
+        target: float,
+    ) -> Trial | None:
+        start = _step(scores, places)
+        found = self._fit(trial, added, _kick(scores, places), target)
         if len(added) == 1 and added[0].adapted:
             for k in self._other_shapes(scores, places[0]):
                 if found is not None and found.remainder.z < CLEAN:
                     break  # where nothing is left no shape gains anything
-                score = scores.scores[k]
-                size = score.candidate.free[0]
-                faint = score.start | {size: KICK * score.start[size]}
-                again = self._fit(trial, [score.candidate], faint)
+                other = [scores.scores[k].candidate]
+                again = self._fit(trial, other, _kick(scores, [k]), _least(target, found))
                 found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
         promised = scores.together(places)
         if found is None or trial.chi2 - found.chi2 < SHORT * promised:
-            other = self._fit(trial, added, start)
-            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+            again = self._fit(trial, added, start, _least(target, found))
+            found = min((t for t in (found, again) if t is not None), key=_chi2, default=None)
+        beaten = found is not None and found.chi2 > target
+        found = self._regained(trial, added, start, found, promised, beaten=beaten)
+        if found is not None and found.chi2 <= target:
+            found = better_side(self.evidence, found)
+        return found
+
+    def _regained(  # noqa: PLR0913 (what was tried, and how it went)
+        self,
+        trial: Trial,
+        added: Sequence[Candidate],
+        start: dict[str, float],
+        found: Trial | None,
+        promised: float,
+        *,
+        beaten: bool,
+    ) -> Trial | None:
+        """Return a fit from short windows on, where the one that was found lost the motion."""
         if found is None or found.chi2 > trial.chi2:
             # More can do all that less did: the motion was lost on the way.
             other = self._fit(trial, added, start, short=True)
-            found = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
-            if found is None:
-                return None
-        else:
-            short = trial.chi2 - found.chi2 < SHORT * promised and not found.fit.converged
-            found = self.unslipped(found, lost=short)
-        found = better_side(self.evidence, found)
-        try:
-            return Found(found, tried(self.evidence, found))
-        except InputError:
-            return None  # what was held back leads out of the range of numbers
+            return min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+        less = trial.chi2 - found.chi2 < SHORT * promised
+        if beaten and not less:
+            return found
+        return self.unslipped(found, lost=less and not found.fit.converged)
 
     def _other_shapes(self, scores: Scores, place: int) -> list[int]:
-        """Return the next best shapes of a candidate: the score at size 0 is not all there is."""
+        """Return the next best shapes of a candidate: the score at size 0 is not all there is.
+
+        An exponent is found from any.
+        """
         one = scores.scores[place]
+        if exponents(one.candidate):
+            return []
         shapes = [
             k
             for k, s in enumerate(scores.scores)
@@ -134,16 +192,20 @@ class Refits:
         except InputError:
             return found  # from short windows on the motion is lost
 
-    def _fit(
+    def _fit(  # noqa: PLR0913 (what to fit, and from where)
         self,
         trial: Trial,
         added: Sequence[Candidate],
         start: dict[str, float],
+        target: float = math.inf,
         *,
         short: bool = False,
+        bare: bool = False,
     ) -> Trial | None:
         try:
-            return with_candidates(self.evidence, trial, added, start, short=short)
+            return with_candidates(
+                self.evidence, trial, added, start, short=short, bare=bare, target=target
+            )
         except InputError:
             return None  # the start leads out of the range of numbers
 
@@ -151,6 +213,19 @@ class Refits:
 def key_of(chosen: Sequence[Candidate]) -> Key:
     """Return what a set of candidates is known by."""
     return frozenset((c.name, tuple(sorted(c.shape.items()))) for c in chosen)
+
+
+def _step(scores: Scores, places: Sequence[int]) -> dict[str, float]:
+    return {n: v for k in places for n, v in scores.scores[k].start.items()}
+
+
+def _kick(scores: Scores, places: Sequence[int]) -> dict[str, float]:
+    sizes = {scores.scores[k].candidate.free[0] for k in places}
+    return {n: KICK * v if n in sizes else v for n, v in _step(scores, places).items()}
+
+
+def _least(target: float, found: Trial | None) -> float:
+    return target if found is None else min(target, found.chi2)
 
 
 def _chi2(trial: Trial) -> float:

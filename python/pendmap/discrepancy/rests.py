@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.discrepancy.candidates import Candidate, placed
@@ -15,7 +16,7 @@ from pendmap.discrepancy.trial import (
     with_candidates,
 )
 from pendmap.errors import InputError
-from pendmap.identification.fitting import fit_runs
+from pendmap.identification.fitting import TrajectoryFit, fit_runs
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
@@ -79,7 +80,7 @@ class Rests:
         known = self._refits.known(self.base, chosen)
         if known is not None and known.fit.converged and consistent(known, trial, dropped):
             return known
-        rest = self.fit_without(trial, dropped, chosen)
+        rest = self.fit_without(trial, dropped, chosen, known)
         if known is not None:
             rest = min((rest, known), key=lambda t: t.chi2)
         elif not rest.fit.converged:
@@ -107,8 +108,17 @@ class Rests:
         except InputError:
             return self.base
 
-    def fit_without(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
-        """Fit a trial's model without an effect, with those that stay, from its own motion."""
+    def fit_without(
+        self,
+        trial: Trial,
+        dropped: Candidate,
+        chosen: tuple[Candidate, ...],
+        known: Trial | None = None,
+    ) -> Trial:
+        """Fit a trial's model without an effect, with those that stay, from its own motion.
+
+        A fit of the same that is known and better is given back.
+        """
         model, free, start = _without(trial, dropped)
         windows = trial.fit.windows
         try:
@@ -119,10 +129,14 @@ class Rests:
             return fitted(self._evidence, model, free, chosen, start=begin)
         if rest.fit.converged:
             return rest
+        if known is not None and known.fit.converged and known.chi2 < rest.chi2:
+            return known
         try:
             # Initial states first: a step of all from states that are another motion's leads away.
-            windows = _following(self._evidence, model, free, start, windows)
-            other = self._fit(model, free, chosen, start, windows)
+            near = _following(self._evidence, model, free, start, windows)
+            if near.chi2 > self.base.chi2:
+                return rest  # the other parameters are not near either
+            other = self._fit(model, free, chosen, start, near.windows)
         except InputError:
             return rest
         return min((rest, other), key=lambda t: t.chi2)
@@ -146,10 +160,13 @@ class Rests:
             least_gain=LITTLE,
         )
 
-    def instead(self, trial: Trial, dropped: Candidate, score: Score) -> Trial | None:
+    def instead(
+        self, trial: Trial, dropped: Candidate, score: Score, target: float = math.inf
+    ) -> Trial | None:
         """Fit a trial's model with another effect in an effect's place, that does nearly the same.
 
-        It begins at the trial's own motion.
+        It begins at the trial's own motion, and is given up where it promises far less than the
+        target.
         """
         model, free, start = _without(trial, dropped)
         other = score.candidate
@@ -162,6 +179,7 @@ class Rests:
                 chosen,
                 start=start | score.start,
                 windows=trial.fit.windows,
+                target=target,
             )
         except InputError:
             return None
@@ -173,9 +191,9 @@ def _following(
     free: list[str],
     start: dict[str, float],
     windows: Windows,
-) -> Windows:
-    """Return windows whose initial states are fitted to a model's parameters, which are held."""
-    fit = fit_runs(
+) -> TrajectoryFit:
+    """Return the fit of the initial states to a model's parameters, which are held."""
+    return fit_runs(
         evidence.fitted,
         model,
         free,
@@ -186,7 +204,6 @@ def _following(
         steps=LESS_STEPS,
         least_gain=LITTLE,
     )
-    return fit.windows
 
 
 def consistent(rest: Trial, trial: Trial, candidate: Candidate) -> bool:

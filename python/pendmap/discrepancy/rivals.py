@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.discrepancy.select import ALIKE
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.trial import Trial
 
 __all__ = ["Rival", "Standing", "standing_of"]
-
-ALIKE: Final = 10.0
-"""Twice the difference of log-likelihoods below which two effects are not told apart."""
 
 CHANCE: Final = 1e-3
 """Chance of what is left below which the model is wrong by so much at least: a form that is wrong
@@ -158,16 +156,16 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
         if scores.same(own, k):
             reached = gain
         elif rank < REFITTED and gain - reached < reach:
-            found = search.refit(rest, scores, [k])
-            if found is not None:
-                rival = search.settled(found).trial
+            target = search.target(best.trial, rest.adapted + score.candidate.count, margin)
+            rival = search.rival(rest, scores, k, target)
+            if rival is not None:
                 if not rival.fit.converged and scores.likeness(own, k) > CONTAINS:
                     # What does the same begins at the same motion.
-                    other = search.rests.instead(best.trial, candidate, score)
+                    other = search.rests.instead(best.trial, candidate, score, target)
                     rival = min((t for t in (rival, other) if t), key=lambda t: t.chi2)
                 reached, refitted = (rest.chi2 - rival.chi2) / level, True
         likeness = scores.likeness(own, k)
-        if refitted:
+        if refitted and rival is not None:
             # Its shape has been adapted since: what counts is what it does now.
             likeness = max(likeness, _likeness(search.evidence, best.trial, rival, rest))
         more = score.candidate.count > candidate.count

@@ -28,6 +28,7 @@ from pendmap.identification.sensitivity import (
     STATE,
     WindowSlopes,
     freed_together,
+    lengths,
     window_slopes,
 )
 
@@ -180,7 +181,7 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
     base, residual = _orthonormal(together.columns[:, : len(names)]), together.residual
     columns = together.columns[:, len(names) :]
     residual = residual - base @ (base.T @ residual)
-    sizes = np.linalg.norm(columns, axis=0)
+    sizes = lengths(columns)
     columns /= np.where(sizes > 0, sizes, 1.0)
     # Twice is enough: what rounding left of the base the first time is gone.
     for _ in range(2):
@@ -188,15 +189,15 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
     gram, pull = columns.T @ columns, columns.T @ residual
     unseen = np.sqrt(np.diag(gram)) < UNSEEN
     gram[unseen], gram[:, unseen], pull[unseen] = 0.0, 0.0, 0.0
-    lengths = np.where(unseen, 1.0, np.sqrt(np.diag(gram)))
-    gram, pull, sizes = gram / np.outer(lengths, lengths), pull / lengths, sizes * lengths
+    units = np.where(unseen, 1.0, np.sqrt(np.diag(gram)))
+    gram, pull, sizes = gram / np.outer(units, units), pull / units, sizes * units
     scores, where, first = [], [], 0
     for candidate in every:
         own = list(range(first, first + len(candidate.free)))
         first += len(own)
         where.append(own)
-        units = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
-        scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], units))
+        faint = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
+        scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], faint))
     return Scores(tuple(scores), tuple(where), gram, pull)
 
 

@@ -5,28 +5,26 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.attempts import Attempt, attempt_of
 from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.exchange import LOSS, pruned
 from pendmap.discrepancy.held import tried
-from pendmap.discrepancy.refit import WORTH, Found, Key, Refits, key_of
+from pendmap.discrepancy.race import GATE, LEFT, beginnings, best_following
+from pendmap.discrepancy.refit import Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests, consistent
 from pendmap.discrepancy.scores import Scores, scores_of
+from pendmap.discrepancy.slipped import slipped
 from pendmap.discrepancy.trial import Trial, settled
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
+    from pendmap.discrepancy.attempts import Attempt
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.model import Formula
 
-__all__ = ["GATE", "Search"]
-
-GATE: Final = 12.0
-"""The least score of a candidate that is refitted: of all candidates together none passes 8.5
-where nothing is missing."""
+__all__ = ["ALIKE", "GAIN", "Search"]
 
 GAIN: Final = 12.0
 """The least fall of the BIC for which an effect is accepted."""
@@ -39,9 +37,6 @@ DOUBT: Final = 0.01
 """The same chance beside a fall of the BIC that suffices: of white noise that falls so far with far
 less, of noise whose colour is half known it may not."""
 
-REFITTED: Final = 4
-"""So many candidates are refitted, those with the greatest scores."""
-
 SCATTER: Final = 3.0
 """And by so many standard errors less than is expected: an effect that gains ``G`` where it was
 fitted gains ``f G``, give or take ``2 sqrt(f G)``, of ``f`` times as many samples held back."""
@@ -52,18 +47,15 @@ PATIENCE: Final = 0.5
 AT_LAST: Final = 0.1
 """And in the end: where phases of the drive are adapted to what was held back, that says little."""
 
-PAIRED: Final = 8
-"""Pairs are looked for that have one of so many candidates: alone, what hides behind another shows
-little."""
-
-BEGINNINGS: Final = 1
-"""So many more beginnings are followed where the best one does not lead to the end."""
-
-LEFT: Final = 1e-3
-"""Chance of what is left above which the end is reached."""
+ALIKE: Final = 10.0
+"""Twice the difference of log-likelihoods below which two models are not told apart."""
 
 LEAST_LEVEL: Final = 0.5
 """Noise is not taken for less, of what its readings are stated to have, than this."""
+
+MOSTLY: Final = 0.5
+"""Part of what an effect has gained that it gains still from a better baseline: with less the
+search begins again from that."""
 
 BEGUN: Final = 2
 """So often a search begins again from a better baseline."""
@@ -112,22 +104,30 @@ class Search:
         self._begun = 0
         # What was computed once is not again: rivals are often candidates that were tried.
         self._scores: dict[Key, Scores] = {}
+        self._settled: list[Found] = []
         self._refits = Refits(evidence)
         self.rests = Rests(evidence, base, self._refits)
 
     def _begin_again(self, base: Trial) -> None:
         """Forget everything but a better baseline."""
         self._begun += 1
-        self.base = Found(base, tried(self.evidence, base))
         self.attempts, self.first = [], None
         self._scores, self._refits = {}, Refits(self.evidence)
+        self._base_is(base)
+
+    def _base_is(self, base: Trial) -> None:
+        self.base = Found(base, tried(self.evidence, base))
         self.rests = Rests(self.evidence, base, self._refits)
+
+    def _rests_on(self, better: Trial, found: Trial) -> bool:
+        """Whether what an effect gained was for the most part the baseline's being worse."""
+        return better.chi2 - found.chi2 < MOSTLY * (self.base.trial.chi2 - found.chi2)
 
     def run(self) -> Found:
         """Return the best model."""
         best = self._path([self.base])[-1]
         if self.most and not self._at_end(best):
-            for other in self._beginnings(best):
+            for other in beginnings(self, best):
                 further = self._path([self.base, self.settled(other)])[-1]
                 best = min((best, further), key=lambda found: found.trial.bic(self.level()))
                 if self._at_end(best):
@@ -139,53 +139,51 @@ class Search:
         begun = any(attempt.accepted for attempt in self.attempts)
         return best.trial.remainder.chance > LEFT and bool(best.trial.chosen or not begun)
 
-    def _beginnings(self, best: Found) -> list[Found]:
-        """Return other beginnings than the one that led to a model: the best pair and effects."""
-        scores = self.scores(self.base.trial)
-        ranked = scores.best()
-        pairs = [scores.best_pair(ranked[:PAIRED], PAIRED)[1:]] if len(ranked) > 1 else []
-        begun = set(best.trial.names)
-        found = []
-        for places in [*pairs, *((k,) for k in ranked[:REFITTED])]:
-            names = {scores.scores[k].candidate.name for k in places}
-            if names <= begun or len(names - {ZERO}) > self.most:
-                continue
-            other = self.refit(self.base.trial, scores, places)
-            if other and self.gains(self.base.trial, other.trial):
-                found.append(other)
-        found = [other for other in found if self._holds(self.base, other)]
-        return sorted(found, key=lambda other: other.trial.bic(self.level()))[:BEGINNINGS]
-
     def _path(self, path: list[Found]) -> list[Found]:
         """Return models from the baseline on, each with an effect or two more."""
-        while self._room(path[-1].trial) > 0:
-            following = self._following(path[-1])
+        while self.room(path[-1].trial) > 0:
+            following = best_following(self, path[-1])
             if following is None:
                 break
             if len(path) == 1 and self._begun < BEGUN:
                 better = self._better_base(following.trial)
-                if better is not None:
+                if better is not None and self._rests_on(better, following.trial):
                     self._begin_again(better)
                     path = [self.base]
                     continue
+                if better is not None:
+                    self._base_is(better)
+                    path = [self.base]
             path.append(self.settled(following))
             best = path[-1].trial
             self.rests.keep(best)
             self.progress(len(best.chosen))
         # What was worse on what was held back, for want of another effect, must be better with it.
-        while len(path) > 1 and not self._holds(self.base, path[-1], AT_LAST):
+        while len(path) > 1 and not self.holds(self.base, path[-1], AT_LAST):
             path.pop()
         return path
 
     def settled(self, found: Found) -> Found:
         """Return a fit with all the steps that it wants: candidates are given few."""
-        if found.trial.fit.converged:
+        if found.trial.fit.converged or any(f is found for f in self._settled):
             return found
         try:
             full = settled(self.evidence, found.trial)
             if not full.fit.converged:
                 full = self._refits.unslipped(full, lost=True)
-            return Found(full, tried(self.evidence, full))
+            found = Found(full, tried(self.evidence, full))
+        except InputError:
+            pass
+        self._settled.append(found)
+        return found
+
+    def regained(self, found: Found) -> Found:
+        """Return a fit from short windows on, where one has slipped and that is better."""
+        if not slipped(found.trial):
+            return found
+        other = self._refits.unslipped(found.trial, lost=True)
+        try:
+            return found if other is found.trial else Found(other, tried(self.evidence, other))
         except InputError:
             return found
 
@@ -229,59 +227,59 @@ class Search:
         """Return the chance that noise alone makes the sum of squares fall by so much."""
         return self.base.trial.remainder.chance_of(gain, count, LEAST_LEVEL)
 
-    def _room(self, trial: Trial) -> int:
-        return self.most - len([name for name in trial.names if name != ZERO])
+    def room(self, trial: Trial) -> int:
+        """Return how many effects may be added to a trial's."""
+        return self.most - len(self.counted(trial.names))
 
-    def _following(self, current: Found) -> Found | None:
-        """Return the model with the best further effect, or pair of them, that is accepted."""
-        scores = self.scores(current.trial)
-        if self.first is None:
-            self.first = scores
-        level = self.level()
-        ranked = scores.best()
-        least = GATE * level
-        if ranked:
-            least = max(least, WORTH * scores.scores[ranked[0]].gain)
-        strong = [k for k in ranked[:REFITTED] if scores.scores[k].gain >= least]
-        wanted = [
-            [k] for n, k in enumerate(strong) if not any(scores.same(j, k) for j in strong[:n])
-        ]
-        if self._room(current.trial) > 1:
-            wanted += self._promising_pairs(scores, ranked, level)
-        refitted = []
-        for places in wanted:
-            found = self.refit(current.trial, scores, places)
-            if found is not None:
-                refitted.append((found, places))
-        refitted.sort(key=lambda pair: pair[0].trial.bic(level))
-        accepted = None
-        for found, places in refitted:
-            good = accepted is None and self.accepts(current, found)
-            accepted = found if good else accepted
-            self.attempts.append(
-                attempt_of(current, found, scores, places, level=level, accepted=good)
-            )
-        return accepted
+    @staticmethod
+    def counted(names: Collection[str]) -> set[str]:
+        """Return the names of those effects that count."""
+        return set(names) - {ZERO}
 
-    def _promising_pairs(
-        self, scores: Scores, ranked: Sequence[int], level: float
-    ) -> list[list[int]]:
-        """Return the best pair, if it promises more than its members one after the other."""
-        if len(ranked) < 2:  # noqa: PLR2004 (a pair)
-            return []
-        gain, a, b = scores.best_pair(ranked, PAIRED)
-        alone = max(scores.scores[a].gain, scores.scores[b].gain, scores.scores[ranked[0]].gain)
-        return [[a, b]] if gain - alone > 2 * GATE * level else []
+    def target(self, best: Trial, adapted: int, margin: float = ALIKE) -> float:
+        """Return the sum of squares that a model must reach to matter beside another one.
 
-    def refit(self, trial: Trial, scores: Scores, places: Sequence[int]) -> Found | None:
+        Parameters
+        ----------
+        best : Trial
+            The other one.
+        adapted : int
+            How many numbers the model has.
+        margin : float
+            By how much it may be worse, over the noise's level.
+        """
+        penalty = math.log(max(best.fit.samples / self.level(), 2.0))
+        return best.chi2 + self.level() * (margin + penalty * max(best.adapted - adapted, 0))
+
+    def refit(
+        self, trial: Trial, scores: Scores, places: Sequence[int], target: float = math.inf
+    ) -> Found | None:
         """Return a trial's model with candidates, those at some places of the scores, fitted."""
-        return self._refits.refit(trial, scores, places)
+        return self._refits.refit(trial, scores, places, target)
+
+    def fitted(
+        self, trial: Trial, scores: Scores, places: Sequence[int], target: float = math.inf
+    ) -> Trial | None:
+        """Return the same, not tried on what was held back."""
+        return self._refits.fitted(trial, scores, places, target)
+
+    def rival(
+        self, trial: Trial, scores: Scores, place: int, target: float = math.inf
+    ) -> Trial | None:
+        """Return the same for one candidate, with all the steps that its target is worth."""
+        found = self._refits.fitted(trial, scores, [place], target)
+        if found is None or (found.fit.given_up and found.chi2 > target):
+            return found
+        try:
+            return settled(self.evidence, found, target)
+        except InputError:
+            return found
 
     def accepts(self, current: Found, found: Found) -> bool:
         """Whether a model is better than one with fewer effects, by more than chance."""
-        return self.gains(current.trial, found.trial) and self._holds(current, found, PATIENCE)
+        return self.gains(current.trial, found.trial) and self.holds(current, found, PATIENCE)
 
-    def _holds(self, current: Found, found: Found, patience: float = 0.0) -> bool:
+    def holds(self, current: Found, found: Found, patience: float = 0.0) -> bool:
         """Whether a model is no worse on what was held back than a right one may be."""
         level = self.level()
         held = (current.held.chi2 - found.held.chi2) / level

@@ -28,7 +28,6 @@ __all__ = [
     "LITTLE",
     "Trial",
     "fitted",
-    "from_short_windows",
     "settled",
     "with_candidates",
 ]
@@ -54,6 +53,12 @@ CLEAN: Final = 1.0
 
 FEW_STEPS: Final = 12
 """Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
+
+SIZED_STEPS: Final = 5
+"""The same of a size alone, before its shape is fitted with it."""
+
+NEAR_STEPS: Final = 6
+"""The same where an exponent has been moved, and all else is nearly where it belongs."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,7 +130,8 @@ class Trial:
     @property
     def adapted(self) -> int:
         """How many numbers were adapted to the records, shapes that were scanned among them."""
-        scanned = sum(c.count - len(c.free) - len(c.adapted) for c in self.chosen)
+        free = set(self.free)
+        scanned = sum(c.count - len(free & {*c.free, *c.adapted}) for c in self.chosen)
         return len(self.fit.names) + scanned
 
 
@@ -140,6 +146,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     steps: int = MOST_STEPS,
     least_gain: float = 1e-3,
     growth: float = 4.0,
+    target: float = math.inf,
 ) -> Trial:
     """Fit a model to the evidence.
 
@@ -153,7 +160,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         What is fitted.
     chosen : sequence of Candidate
         The effects of the model that were added to the baseline.
-    start, windows, steps, least_gain, growth
+    start, windows, steps, least_gain, growth, target
         As of :func:`pendmap.identification.fitting.fit_runs`.
     """
     fit = fit_runs(
@@ -166,11 +173,12 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         steps=steps,
         least_gain=least_gain,
         growth=growth,
+        target=target,
     )
     return Trial(fit, tuple(free), tuple(chosen), evidence.fitted, evidence.floors)
 
 
-def settled(evidence: Evidence, trial: Trial) -> Trial:
+def settled(evidence: Evidence, trial: Trial, target: float = math.inf) -> Trial:
     """Return a fit with all the steps that it wants; candidates are given few."""
     if trial.fit.converged:
         return trial
@@ -181,16 +189,19 @@ def settled(evidence: Evidence, trial: Trial) -> Trial:
         trial.chosen,
         start=trial.start,
         windows=trial.fit.windows,
+        target=target,
     )
 
 
-def with_candidates(
+def with_candidates(  # noqa: PLR0913 (what to fit, and from where)
     evidence: Evidence,
     trial: Trial,
     added: Sequence[Candidate],
     start: Mapping[str, float],
     *,
     short: bool = False,
+    bare: bool = False,
+    target: float = math.inf,
 ) -> Trial:
     """Fit a trial's model with further effects, from the trial's parameters and windows on.
 
@@ -206,10 +217,14 @@ def with_candidates(
         Sizes and phases to begin with.
     short : bool
         Whether to begin at short windows instead, where the trial's lead astray.
+    bare : bool
+        Whether shapes stay as they are.
+    target : float
+        The sum of squares that is to be reached; what promises far less is given up.
     """
     model = placed(trial.fit.model, added)
     free = [*trial.free, *(name for c in added for name in c.free)]
-    shapes = [name for c in added for name in c.adapted]
+    shapes = [] if bare else [name for c in added for name in c.adapted]
     begin = trial.start | dict(start)
     windows = None if short else trial.fit.windows
     if shapes and not short:
@@ -220,10 +235,10 @@ def with_candidates(
             free,
             start=begin,
             windows=windows,
-            steps=FEW_STEPS,
+            steps=FEW_STEPS if any(exponents(c) for c in added) else SIZED_STEPS,
             least_gain=LITTLE,
         )
-        near = _near_exponents(evidence, sized, added)
+        near = _near_exponents(evidence, sized, added, target)
         # An exponent's start is the model's; it sets the unit of its size.
         model, begin, windows = near.model, _values(near), near.windows
     chosen = (*trial.chosen, *added)
@@ -237,10 +252,13 @@ def with_candidates(
         steps=FEW_STEPS,
         least_gain=LITTLE,
         growth=GENTLE,
+        target=target,
     )
 
 
-def _near_exponents(evidence: Evidence, sized: Trial, added: Sequence[Candidate]) -> TrajectoryFit:
+def _near_exponents(
+    evidence: Evidence, sized: Trial, added: Sequence[Candidate], target: float
+) -> TrajectoryFit:
     """Return a fit with candidates' sizes, whose exponents are brought near their best."""
 
     def again(model: Rig, start: Mapping[str, float], before: TrajectoryFit) -> TrajectoryFit:
@@ -250,39 +268,16 @@ def _near_exponents(evidence: Evidence, sized: Trial, added: Sequence[Candidate]
             sized.free,
             start=start,
             windows=before.windows,
-            steps=FEW_STEPS,
+            steps=NEAR_STEPS,
             least_gain=LITTLE,
         ).fit
 
     fit = sized.fit
     for candidate in added:
         for size, exponent in exponents(candidate).items():
-            fit = nearer(fit, evidence.fitted, size, exponent, again)
+            fit = nearer(fit, evidence.fitted, size, exponent, again, target=target)
     return fit
 
 
 def _values(fit: TrajectoryFit) -> dict[str, float]:
     return {name: estimate.value for name, estimate in fit.estimates.items()}
-
-
-def from_short_windows(evidence: Evidence, trial: Trial) -> Trial:
-    """Fit a trial's model again from short windows on; return the better of both.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        A fit that may have slipped.
-    """
-    again = fitted(
-        evidence,
-        trial.fit.model,
-        trial.free,
-        trial.chosen,
-        start=trial.start,
-        steps=FEW_STEPS,
-        least_gain=LITTLE,
-        growth=GENTLE,
-    )
-    return min((trial, again), key=lambda t: t.chi2)

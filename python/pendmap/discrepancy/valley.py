@@ -45,6 +45,9 @@ SHORTEST: Final = 0.01
 PROMISED: Final = 0.01
 """Of the sum of squares: what promises less is near enough."""
 
+HOPE: Final = 3.0
+"""So many times as much as a step promises is the most that is hoped for."""
+
 
 def exponents(candidate: Candidate) -> dict[str, str]:
     """Return the exponents of an effect's shape by the sizes whose units depend on them."""
@@ -55,12 +58,14 @@ def exponents(candidate: Candidate) -> dict[str, str]:
     }
 
 
-def nearer(
+def nearer(  # noqa: PLR0913 (what to fit, and how)
     fit: TrajectoryFit,
     runs: Sequence[FitRun],
     size: str,
     exponent: str,
     again: Callable[[Rig, Mapping[str, float], TrajectoryFit], TrajectoryFit],
+    *,
+    target: float = math.inf,
 ) -> TrajectoryFit:
     """Return a fit in which an exponent, which is not fitted, is near its best.
 
@@ -74,11 +79,15 @@ def nearer(
         The size whose unit depends on the exponent, and this.
     again : callable
         Fits a model from a start on, with the windows of a fit; an InputError where it is lost.
+    target : float
+        The sum of squares that is to be reached; what promises far less is given up.
     """
     reach = REACH
     for _ in range(STAGES):
         step, gain, follow = _step(fit, runs, exponent)
         if gain < PROMISED or reach < SHORTEST or fit[size] == 0:
+            break
+        if fit.chi2 - HOPE * gain > target:
             break
         step = math.copysign(min(abs(step), reach), step)
         start = {name: e.value - step * follow[name] for name, e in fit.estimates.items()}

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.discrepancy.select import GATE
+from pendmap.discrepancy.race import GATE
 from pendmap.figures import blocks, style
 from pendmap.figures.gap import AFTER, name_runs
 from pendmap.pictures.names import unit_of

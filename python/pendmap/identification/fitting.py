@@ -76,6 +76,8 @@ class TrajectoryFit:
         Steps of the search.
     converged : bool
         Whether it ended.
+    given_up : bool
+        Whether it was given up, since it led nowhere near the target.
     widening : float
         Above 1 where the sum of squares is greater than chance allows, as it is where the model
         lacks something: the intervals are wider by its root, covariance and standard errors are
@@ -100,6 +102,7 @@ class TrajectoryFit:
     windows: tuple[tuple[int, int, int, float, float], ...]
     steps: int
     converged: bool
+    given_up: bool
     widening: float
     mixed: tuple[str, ...]
 
@@ -122,6 +125,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     steps: int = 40,
     least_gain: float = 1e-3,
     growth: float = 4.0,
+    target: float = math.inf,
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
 
@@ -161,6 +165,9 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     growth : float
         By how much windows grow from stage to stage: with less a motion near the top, where small
         errors of its state soon are large, is lost less often.
+    target : float
+        The sum of squares that is to be reached: with ``windows``, a search that after some steps
+        promises far less is given up.
 
     Raises
     ------
@@ -188,6 +195,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         "steps": steps,
         "gain": least_gain,
         "hold": len([n for n in names if n.partition("[")[0] in free]) if hold else 0,
+        "target": target,
         "profiled": [k for k in chosen if k not in unknown.mixed],
         "level": LEVEL,
         "doubt": sigma_doubt,
@@ -317,6 +325,7 @@ def _result(
         ),
         steps=found["steps"],
         converged=found["converged"],
+        given_up=found["given_up"],
         widening=found["widening"],
         mixed=tuple(unknown.names[k] for k in unknown.mixed),
     )

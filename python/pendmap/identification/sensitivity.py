@@ -26,6 +26,7 @@ __all__ = [
     "Sensitivities",
     "WindowSlopes",
     "freed_together",
+    "lengths",
     "sensitivities",
     "window_slopes",
 ]
@@ -114,7 +115,7 @@ class WindowSlopes:
         def free(values: NDArray[np.float64]) -> NDArray[np.float64]:
             kept = values[counted]
             rest = kept - basis @ (basis.T @ kept)
-            followed = np.linalg.norm(rest, axis=0) < FOLLOWED * np.linalg.norm(kept, axis=0)
+            followed = lengths(rest) < FOLLOWED * lengths(kept)
             return np.asarray(np.where(followed, 0.0, rest), np.float64)
 
         places = np.flatnonzero(counted).astype(np.int64)
@@ -139,14 +140,17 @@ def window_slopes(
         found = _core.fit_rows(given, begin, tolerance_of(runs), bare_windows(fit.windows, units))
     except ValueError as error:
         raise InputError(str(error)) from None
-    at = [value for _, value in begin]
-    all_slopes = []
-    for (places, rows, residual, weight), window in zip(found, fit.windows, strict=True):
-        bare = np.zeros((len(rows), len(begin)))
-        bare[:, places] = rows[:, :-STATE]
-        columns, states = unknown.columns(bare, at), rows[:, -STATE:]
-        all_slopes.append(WindowSlopes(*window[:2], columns, states, residual, weight))
-    return unknown.names, all_slopes
+    ends = np.cumsum([len(rows) for _, rows, _, _ in found])
+    bare = np.zeros((int(ends[-1]), len(begin)))
+    for (places, rows, _, _), end in zip(found, ends, strict=True):
+        bare[end - len(rows) : end, places] = rows[:, :-STATE]
+    columns = np.split(unknown.columns(bare, [value for _, value in begin]), ends[:-1])
+    return unknown.names, [
+        WindowSlopes(*window[:2], own, rows[:, -STATE:], residual, weight)
+        for (_, rows, residual, weight), window, own in zip(
+            found, fit.windows, columns, strict=True
+        )
+    ]
 
 
 def sensitivities(
@@ -184,6 +188,11 @@ def freed_together(names: tuple[str, ...], windows: Sequence[WindowSlopes]) -> S
         labels.append(np.stack([run, window.first + counted, np.full(counted.size, index)]))
     run, sample, of = np.concatenate(labels, axis=1)
     return Sensitivities(names, np.concatenate(columns), np.concatenate(residuals), run, sample, of)
+
+
+def lengths(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the length of each column, in one pass through the rows as they are stored."""
+    return np.asarray(np.sqrt(np.einsum("n...,n...->...", columns, columns)), np.float64)
 
 
 def _basis(states: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
@@ -188,7 +189,7 @@ class Rig:
         """What results are counted in."""
         return Units(self.w0, si=True)
 
-    @property
+    @functools.cached_property
     def pendulum(self) -> Pendulum:
         """The same without dimensions; ``omega`` is 1 where nothing is driven."""
         units = self.units

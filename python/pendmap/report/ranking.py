@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.select import GATE
+from pendmap.discrepancy.race import GATE
 from pendmap.discrepancy.summary import ranking_table
 from pendmap.report.document import Name, Paragraph, Picture, Section, Table
 from pendmap.report.wording import gained, number, stated
