@@ -30,9 +30,11 @@ const RELAXED: usize = 6;
 const FOLLOWED: usize = 2;
 /// The part of what a step promised that such a step has to promise.
 const FOLLOWED_GAIN: f64 = 0.1;
-/// Steps down after which it shows where a descent leads ...
+/// Steps down after which it shows where a descent leads, ...
 const TRIED: usize = 3;
-/// ... and so many times as much as the next one promises is the most that is hoped for.
+/// ... if the next one promises at most this part of what the last one gained; ...
+const SHRINKS: f64 = 0.5;
+/// ... then so many times as much is the most that is hoped for.
 const HOPE: f64 = 3.0;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e8;
@@ -215,7 +217,7 @@ pub fn descend(
     limit: Limit,
     cancel: &AtomicBool,
 ) -> Result<Outcome, Error> {
-    let (mut damping, mut steps, mut down) = (0.0, 0, 0);
+    let (mut damping, mut steps, mut down, mut fell) = (0.0, 0, 0, 0.0);
     let ended = |steps, converged| Ok(Outcome { steps, converged, given_up: false });
     loop {
         if cancel.load(Ordering::Relaxed) {
@@ -232,7 +234,8 @@ pub fn descend(
             }
             return ended(steps + 1, true);
         }
-        if damping == 0.0 && down >= TRIED && chi2 - HOPE * promised > limit.target {
+        let settles = damping == 0.0 && down >= TRIED && promised < SHRINKS * fell;
+        if settles && chi2 - HOPE * promised > limit.target {
             return Ok(Outcome { steps, converged: false, given_up: true });
         }
         if steps >= limit.steps {
@@ -241,7 +244,8 @@ pub fn descend(
         let (tried, next) = point.lower(problem, &step, held);
         steps += tried;
         if let Some(next) = next {
-            let fair = chi2 - next.normal.chi2 > FAIR * step.gain;
+            fell = chi2 - next.normal.chi2;
+            let fair = fell > FAIR * step.gain;
             *point = next;
             down += 1;
             if fair {

@@ -6,6 +6,8 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from pendmap.discrepancy.candidates import Candidate, placed
 from pendmap.discrepancy.refit import KICK, Key, Refits, key_of
 from pendmap.discrepancy.trial import (
@@ -239,6 +241,8 @@ def _faint(trial: Trial, dropped: Candidate) -> int | None:
     if size not in trial.fit.names or dropped.phase is not None:
         return None
     error = trial.fit.estimates[size].stderr
+    if not np.isfinite(trial.fit.covariance).all():
+        return None  # nothing says where what it took up goes
     if not error or abs(trial.start[size]) > FAINT * error:
         return None
     return trial.fit.names.index(size)

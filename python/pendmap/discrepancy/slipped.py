@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["from_short_windows", "slipped"]
 
-MOST: Final = 0.5
+MOST: Final = 0.8
 """Part of all that is left beyond noise that stands in one window where it was lost."""
 
 MUCH: Final = 20.0
