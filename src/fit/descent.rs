@@ -69,6 +69,12 @@ impl Point {
         problem.samples().saturating_sub(self.values.len() + 2 * self.windows.len())
     }
 
+    /// How far each parameter may go.
+    fn ends(&self, problem: &Problem) -> Vec<[f64; 2]> {
+        let both = self.values.iter().zip(&problem.ranges);
+        both.map(|(value, [low, high])| [(low - value).min(0.0), (high - value).max(0.0)]).collect()
+    }
+
     /// The point a step further; none where it cannot be.
     #[must_use]
     pub fn moved(&self, problem: &Problem, step: &Step) -> Option<Self> {
@@ -78,7 +84,11 @@ impl Point {
     fn gone(&self, problem: &Problem, step: &Step, way: impl Fn(usize) -> Way) -> Option<Self> {
         let all = || self.values.iter().zip(&step.values).enumerate();
         let part = all().map(|(k, (value, by))| way(k).part(*value, *by)).fold(1.0, f64::min);
-        let values = all().map(|(k, (value, by))| way(k).gone(*value, part * by)).collect();
+        let gone = |(k, (value, by)): (usize, (&f64, &f64))| {
+            let [low, high] = problem.ranges[k];
+            way(k).gone(*value, part * by).clamp(low, high)
+        };
+        let values = all().map(gone).collect();
         let mut windows = self.windows.clone();
         for (window, step) in windows.iter_mut().zip(&step.starts) {
             window.start[0] += part * step[0];
@@ -94,24 +104,29 @@ impl Point {
         let lower = |next: &Self| next.normal.chi2 < chi2;
         let keeps = |next: &Self, part: f64| chi2 - next.normal.chi2 > part * step.gain;
         let widths = || (0..problem.ways.len()).filter(|k| problem.ways[*k] == Way::Width);
-        let bends = widths().next().is_some();
         let mut straight = self.moved(problem, step);
-        if let Some(next) = straight.as_mut().filter(|next| !bends && !keeps(next, FAIR)) {
+        if straight.as_ref().is_some_and(|next| keeps(next, KEPT)) {
+            return (1, straight);
+        }
+        let (mut tried, mut bent) = (1, None);
+        if widths().next().is_some() {
+            tried += 1;
+            if let Some(next) = self.gone(problem, step, |place| problem.ways[place]) {
+                let held: Vec<usize> = held.iter().copied().chain(widths()).collect();
+                let (more, next) = next.followed(problem, &held, FOLLOWED_GAIN * step.gain);
+                tried += more;
+                bent = Some(next).filter(lower);
+            }
+        }
+        let fair = |next: &Self| keeps(next, FAIR);
+        if let Some(next) = straight.as_mut().filter(|next| !fair(next))
+            && !bent.as_ref().is_some_and(fair)
+        {
             next.relax(problem, self, step);
             self.in_vain = next.in_vain;
         }
-        let straight = straight.filter(lower);
-        let kept = straight.as_ref().is_some_and(|next| keeps(next, KEPT));
-        if kept || !bends {
-            return (1, straight);
-        }
-        let Some(bent) = self.gone(problem, step, |place| problem.ways[place]) else {
-            return (2, straight);
-        };
-        let held: Vec<usize> = held.iter().copied().chain(widths()).collect();
-        let (followed, bent) = bent.followed(problem, &held, FOLLOWED_GAIN * step.gain);
-        let best = straight.as_ref().map_or(chi2, |point| point.normal.chi2);
-        (2 + followed, if bent.normal.chi2 < best { Some(bent) } else { straight })
+        let both = straight.filter(lower).into_iter().chain(bent);
+        (tried, both.min_by(|a, b| a.normal.chi2.total_cmp(&b.normal.chi2)))
     }
 
     /// Windows that rose where the step from `before` promised a fall find initial states of their
@@ -224,7 +239,7 @@ pub fn descend(
             return Err(Error::Interrupted);
         }
         let chi2 = point.normal.chi2;
-        let step = point.normal.step(damping, held);
+        let step = point.normal.step_between(damping, held, &point.ends(problem));
         let promised = step.gain - point.in_vain;
         if damping == 0.0 && promised <= limit.gain + limit.part * chi2 {
             // The last step costs one more point and is worth it: what is left is its square.

@@ -215,9 +215,33 @@ impl Normal {
     /// The step that the damped equations ask for, `held` parameters kept where they are.
     #[must_use]
     pub fn step(&self, damping: f64, held: &[usize]) -> Step {
+        self.step_between(damping, held, &[])
+    }
+
+    /// The same with steps of parameters kept between `ends`: where one would lead beyond, it leads
+    /// to the end, and the others follow. A step cut short as a whole would creep along there.
+    #[must_use]
+    pub fn step_between(&self, damping: f64, held: &[usize], ends: &[[f64; 2]]) -> Step {
         let (information, pull) = self.reduced(damping);
-        let inverse = pseudo_inverse(&information, held);
-        self.completed(&(inverse * pull), damping)
+        let mut fixed = held.to_vec();
+        let mut known = DVector::zeros(self.count);
+        loop {
+            let rest = &pull - &information * &known;
+            let values = pseudo_inverse(&information, &fixed) * rest + &known;
+            let beyond = |k: &usize| {
+                let outside =
+                    ends.get(*k).is_some_and(|[low, high]| values[*k] < *low || values[*k] > *high);
+                outside && !fixed.contains(k)
+            };
+            let found: Vec<usize> = (0..self.count).filter(beyond).collect();
+            if found.is_empty() {
+                return self.completed(&values, damping);
+            }
+            for k in found {
+                known[k] = values[k].clamp(ends[k][0], ends[k][1]);
+                fixed.push(k);
+            }
+        }
     }
 
     /// The same with the step of the parameters given: the initial states follow.

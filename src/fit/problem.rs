@@ -92,6 +92,17 @@ pub struct Free {
 }
 
 impl Free {
+    /// Between which values it means something: the ends of an effect's parameter, else all.
+    fn range(&self, records: &[Record]) -> [f64; 2] {
+        let of_effect = |(record, slot): &(usize, Slot)| {
+            let Slot::Parameter(place) = *slot else { return None };
+            let pendulum = &records[*record].pendulum;
+            let (effect, own) = pendulum.owner(place)?;
+            Some(pendulum.effects[effect].kind.definition().parameters[own].range)
+        };
+        self.places.first().and_then(of_effect).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
+    }
+
     /// What it is in record `index`.
     fn slot(&self, index: usize) -> Option<Slot> {
         self.places.iter().find(|(record, _)| *record == index).map(|(_, slot)| *slot)
@@ -107,6 +118,8 @@ pub struct Problem {
     pub free: Vec<Free>,
     /// How each of them goes along a step.
     pub ways: Vec<Way>,
+    /// Between which values each of them means something.
+    pub ranges: Vec<[f64; 2]>,
     /// The error allowed to a step of the integrator.
     pub tolerance: f64,
     /// The instruction set that derivatives are computed with.
@@ -184,7 +197,8 @@ impl Problem {
             }
         }
         let ways = free.iter().map(|one| Way::of(one, &free, &records)).collect();
-        let problem = Self { records, free, ways, tolerance, path: Path::choose()? };
+        let ranges = free.iter().map(|one| one.range(&records)).collect();
+        let problem = Self { records, free, ways, ranges, tolerance, path: Path::choose()? };
         for index in 0..problem.records.len() {
             let count = problem.columns(index).reading.len();
             if count > MOST_READINGS {

@@ -162,7 +162,10 @@ class Refits:
         if found is None or found.chi2 > trial.chi2:
             # More can do all that less did: the motion was lost on the way.
             other = self._fit(trial, added, start, short=True)
-            return min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+            best = min((t for t in (found, other) if t is not None), key=_chi2, default=None)
+            if found is None or best is None or best.chi2 <= trial.chi2:
+                return best
+            return min(best, self.unslipped(found, lost=True), key=_chi2)
         less = trial.chi2 - found.chi2 < SHORT * promised
         if beaten and not less:
             return found

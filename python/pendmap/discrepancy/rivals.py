@@ -52,7 +52,8 @@ class Rival:
     candidate : Candidate
         Effect and shape.
     gain : float
-        By how much the sum of squares falls with it, over the noise's level.
+        By how much the sum of squares falls with it, over the noise's level; of a fit that was
+        given up far behind, by how much it had fallen.
     behind : float
         How much less that is than with the effect that was found: twice the difference of
         log-likelihoods.
