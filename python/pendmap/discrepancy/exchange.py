@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 from pendmap.discrepancy.attempts import attempt_of
 from pendmap.discrepancy.held import tried
 from pendmap.discrepancy.refit import Found
+from pendmap.discrepancy.rivals import margin_of
+from pendmap.discrepancy.trial import ALIKE
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,7 +102,10 @@ def _with_rival(  # noqa: PLR0913, PLR0917 (which one, and in which place)
     if found is not None and fewer and found.chi2 - best.trial.chi2 < near:
         other = search.rests.instead(best.trial, candidate, score, target)
         found = min((t for t in (found, other) if t), key=lambda t: t.chi2)
-    if found is None or found.bic(level) >= best.trial.bic(level) - 1:
+    # Where something is left, that much moves the effects' gains against each other.
+    gain = (rest.chi2 - best.trial.chi2) / level
+    least = 1.0 + margin_of(best.trial, gain) - ALIKE
+    if found is None or found.bic(level) >= best.trial.bic(level) - least:
         return None
     try:
         return Found(found, tried(search.evidence, found))

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Literal
 
-from pendmap.discrepancy.select import ALIKE
+from pendmap.discrepancy.trial import ALIKE
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.menu import Proposal

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.discrepancy.attempts import attempt_of
 from pendmap.discrepancy.refit import WORTH
+from pendmap.discrepancy.trial import ALIKE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.scores import Scores
     from pendmap.discrepancy.select import Search
 
-__all__ = ["GATE", "LEFT", "beginnings", "best_following"]
+__all__ = ["GATE", "LEFT", "beginnings", "best_following", "better"]
 
 GATE: Final = 12.0
 """The least score of a candidate that is refitted: of all candidates together none passes 8.5
@@ -98,6 +99,16 @@ def beginnings(search: Search, best: Found) -> list[Found]:
             found.append(other)
     found = [other for other in found if search.holds(search.base, other)]
     return sorted(found, key=lambda other: other.trial.bic(search.level()))[:BEGINNINGS]
+
+
+def better(search: Search, further: Found, best: Found) -> bool:
+    """Whether a model found from another beginning is better than the first one.
+
+    With more effects, and something left all the same, it has to be so beyond doubt.
+    """
+    counts = [len(search.counted(found.trial.names)) for found in (further, best)]
+    least = ALIKE if counts[0] > counts[1] and not search.at_end(further) else 0.0
+    return best.trial.bic(search.level()) - further.trial.bic(search.level()) > least
 
 
 def _raced(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.discrepancy.select import ALIKE
+from pendmap.discrepancy.trial import ALIKE
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.select import Search
     from pendmap.discrepancy.trial import Trial
 
-__all__ = ["Rival", "Standing", "standing_of"]
+__all__ = ["Rival", "Standing", "margin_of", "standing_of"]
 
 CHANCE: Final = 1e-3
 """Chance of what is left below which the model is wrong by so much at least: a form that is wrong
 moves the effects' gains against each other by as much."""
 
 NEARBY: Final = 0.1
-"""But no rival counts as equal that falls short of the winner's gain by more than this part."""
+"""But what falls short of a gain by more than this part does less."""
 
 NEAR: Final = (30.0, 0.3)
 """A rival is refitted if its score falls short of the winner's gain by less than the first, or than
@@ -121,6 +121,21 @@ class Standing:
         return 1.0 / (1.0 + sum(weights))
 
 
+def margin_of(trial: Trial, gain: float) -> float:
+    """Return by how much a rival may do less and not be told from an effect of a model.
+
+    Parameters
+    ----------
+    trial : Trial
+        The model.
+    gain : float
+        Of the effect, over the noise's level, as the margin.
+    """
+    if trial.remainder.chance >= CHANCE:
+        return ALIKE
+    return max(ALIKE, min(trial.remainder.excess, NEARBY * gain))
+
+
 def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
     """Return an effect of the best model among those that might stand in its place.
 
@@ -145,10 +160,7 @@ def standing_of(search: Search, best: Found, candidate: Candidate) -> Standing:
     if own is None:
         return Standing(candidate, gain, ())
     others = [k for k in places if k != own and scores.scores[k].gain > 0]
-    remainder = best.trial.remainder
-    margin = ALIKE
-    if remainder.chance < CHANCE:
-        margin = max(ALIKE, min(remainder.excess, NEARBY * gain))
+    margin = margin_of(best.trial, gain)
     reach = max(NEAR[0], NEAR[1] * gain, margin)
     rivals = []
     for rank, k in enumerate(others):

@@ -9,12 +9,12 @@ from pendmap.discrepancy.baseline import taken_by
 from pendmap.discrepancy.candidates import Candidate, candidates
 from pendmap.discrepancy.exchange import LOSS, pruned
 from pendmap.discrepancy.held import tried
-from pendmap.discrepancy.race import GATE, LEFT, beginnings, best_following
+from pendmap.discrepancy.race import GATE, LEFT, beginnings, best_following, better
 from pendmap.discrepancy.refit import Found, Key, Refits, key_of
 from pendmap.discrepancy.rests import Rests, consistent
 from pendmap.discrepancy.scores import Scores, scores_of
 from pendmap.discrepancy.slipped import slipped
-from pendmap.discrepancy.trial import Trial, settled
+from pendmap.discrepancy.trial import ALIKE, Trial, settled
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.evidence import Evidence
     from pendmap.model import Formula
 
-__all__ = ["ALIKE", "GAIN", "Search"]
+__all__ = ["GAIN", "Search"]
 
 GAIN: Final = 12.0
 """The least fall of the BIC for which an effect is accepted."""
@@ -46,9 +46,6 @@ PATIENCE: Final = 0.5
 
 AT_LAST: Final = 0.1
 """And in the end: where phases of the drive are adapted to what was held back, that says little."""
-
-ALIKE: Final = 10.0
-"""Twice the difference of log-likelihoods below which two models are not told apart."""
 
 LEAST_LEVEL: Final = 0.5
 """Noise is not taken for less, of what its readings are stated to have, than this."""
@@ -125,16 +122,21 @@ class Search:
 
     def run(self) -> Found:
         """Return the best model."""
-        best = self._path([self.base])[-1]
-        if self.most and not self._at_end(best):
+        best = self._pruned(self._path([self.base])[-1])
+        if self.most and not self.at_end(best):
             for other in beginnings(self, best):
-                further = self._path([self.base, self.settled(other)])[-1]
-                best = min((best, further), key=lambda found: found.trial.bic(self.level()))
-                if self._at_end(best):
+                further = self._pruned(self._path([self.base, self.settled(other)])[-1])
+                if better(self, further, best):
+                    best = further
+                if self.at_end(best):
                     break
-        return self.settled(pruned(self, best) if best.trial.chosen else best)
+        return best
 
-    def _at_end(self, best: Found) -> bool:
+    def _pruned(self, found: Found) -> Found:
+        """Return a model without what is idle or beaten, fitted to its end."""
+        return self.settled(pruned(self, found) if found.trial.chosen else found)
+
+    def at_end(self, best: Found) -> bool:
         """Whether a model leaves no more than chance, and is no beginning that led nowhere."""
         begun = any(attempt.accepted for attempt in self.attempts)
         return best.trial.remainder.chance > LEFT and bool(best.trial.chosen or not begun)

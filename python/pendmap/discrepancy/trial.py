@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
 
 __all__ = [
+    "ALIKE",
     "ASTRAY",
     "CLEAN",
     "FEW_STEPS",
@@ -41,6 +42,9 @@ short again may find a better one."""
 
 MOST_STEPS: Final = 40
 """Steps of a fit at most."""
+
+ALIKE: Final = 10.0
+"""Twice the difference of log-likelihoods below which two models are not told apart."""
 
 GENTLE: Final = 1.5
 """By so much windows grow from stage to stage where a fit was lost as they grew by more."""
