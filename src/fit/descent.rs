@@ -2,8 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rayon::prelude::*;
-
+use super::alone::relax;
 use super::normal::{Normal, Step};
 use super::problem::Problem;
 use super::way::Way;
@@ -18,14 +17,6 @@ const GROWTH: f64 = 8.0;
 const FAIR: f64 = 0.25;
 /// ... and for no other way to be tried.
 const KEPT: f64 = 0.75;
-/// The part of the most that a window missed of what was promised from which others are looked at.
-const PART_MISSED: f64 = 0.1;
-/// The part of what it promised that a window keeps at most that is at a kink.
-const KEPT_AT_KINK: f64 = 0.1;
-/// So many windows at most are looked at.
-const FEW: usize = 2;
-/// The most steps by which such a window finds its initial state.
-const RELAXED: usize = 6;
 /// The most steps by which all else follows the widths.
 const FOLLOWED: usize = 2;
 /// The part of what a step promised that such a step has to promise.
@@ -50,7 +41,7 @@ pub struct Point {
     pub normal: Normal,
     /// What initial states promise in vain: at a kink, as where friction just holds, a least sum of
     /// squares is not flat.
-    in_vain: f64,
+    pub(super) in_vain: f64,
 }
 
 impl Point {
@@ -99,7 +90,13 @@ impl Point {
 
     /// The point a step further if it is lower, and how many were tried: straight; where that leads
     /// less far down than it promised in ratios too, all else following the widths.
-    fn lower(&mut self, problem: &Problem, step: &Step, held: &[usize]) -> (usize, Option<Self>) {
+    fn lower(
+        &mut self,
+        problem: &Problem,
+        step: &Step,
+        held: &[usize],
+        cancel: &AtomicBool,
+    ) -> (usize, Option<Self>) {
         let chi2 = self.normal.chi2;
         let lower = |next: &Self| next.normal.chi2 < chi2;
         let keeps = |next: &Self, part: f64| chi2 - next.normal.chi2 > part * step.gain;
@@ -122,59 +119,11 @@ impl Point {
         if let Some(next) = straight.as_mut().filter(|next| !fair(next))
             && !bent.as_ref().is_some_and(fair)
         {
-            next.relax(problem, self, step);
+            relax(problem, next, self, step, cancel);
             self.in_vain = next.in_vain;
         }
         let both = straight.filter(lower).into_iter().chain(bent);
         (tried, both.min_by(|a, b| a.normal.chi2.total_cmp(&b.normal.chi2)))
-    }
-
-    /// Windows that rose where the step from `before` promised a fall find initial states of their
-    /// own.
-    ///
-    /// A motion near the top, or one that friction nearly holds, goes another way after the least
-    /// step too far, and no other window can make that good: one alone would hold up the search.
-    fn relax(&mut self, problem: &Problem, before: &Self, step: &Step) {
-        if self.windows.len() == 1 {
-            return;
-        }
-        let missed: Vec<f64> = (0..self.windows.len())
-            .map(|k| self.normal.parts[k] - before.normal.parts[k] + step.gains[k])
-            .collect();
-        let most = missed.iter().copied().fold(0.0, f64::max);
-        let limit = Limit { gain: 0.1, part: 1e-3, steps: RELAXED, target: f64::INFINITY };
-        let held: Vec<usize> = (0..self.values.len()).collect();
-        let alone = |values: &[f64], window: Window| {
-            let mut point = Self::new(problem, values.to_vec(), vec![window]).ok()?;
-            let promised = point.normal.step(0.0, &held).gain;
-            let chi2 = point.normal.chi2;
-            descend(problem, &mut point, &held, limit, &AtomicBool::new(false)).ok()?;
-            let kept = chi2 - point.normal.chi2;
-            Some((point, if kept < KEPT_AT_KINK * promised { promised - kept } else { 0.0 }))
-        };
-        let settled = |k: usize| {
-            // From where the step led, and from where it was.
-            let from = [self.windows[k], before.windows[k]];
-            let found = from.into_iter().filter_map(|window| alone(&self.values, window));
-            let (point, _) =
-                found.min_by(|(a, _), (b, _)| a.normal.chi2.total_cmp(&b.normal.chi2))?;
-            let (_, in_vain) = alone(&before.values, before.windows[k])?;
-            Some((k, point, in_vain))
-        };
-        let risen: Vec<usize> =
-            (0..missed.len()).filter(|k| missed[*k] > PART_MISSED * most).collect();
-        if risen.len() > FEW {
-            // Not a window or two, but the step itself goes too far.
-            return;
-        }
-        let found: Vec<(usize, Self, f64)> = risen.into_par_iter().filter_map(settled).collect();
-        for (k, point, in_vain) in found {
-            if point.normal.chi2 < self.normal.parts[k] {
-                self.windows[k] = point.windows[0];
-                self.normal.replace(k, point.normal);
-            }
-            self.in_vain += in_vain;
-        }
     }
 
     /// The point to which all but `held` follows, and how many were tried, while steps gain `enough`.
@@ -256,7 +205,7 @@ pub fn descend(
         if steps >= limit.steps {
             return ended(steps, false);
         }
-        let (tried, next) = point.lower(problem, &step, held);
+        let (tried, next) = point.lower(problem, &step, held, cancel);
         steps += tried;
         if let Some(next) = next {
             fell = chi2 - next.normal.chi2;

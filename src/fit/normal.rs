@@ -9,6 +9,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
+use super::block::{Block, STATE};
 use super::linear::{Linear, linearise};
 use super::problem::{Columns, Problem, Shaped};
 use super::window::Window;
@@ -16,10 +17,6 @@ use crate::integrate::State;
 
 /// A direction whose information is this part of the greatest is not determined.
 const BLIND: f64 = 1e-13;
-/// The same of an initial state, in the triangle, whose squares are the information.
-const BLIND_STATE: f64 = 1e-11;
-/// Columns of the initial state.
-const STATE: usize = 2;
 
 /// All windows at `values` with their derivatives; none where a value is out of its range or a motion
 /// leaves the range of numbers.
@@ -53,58 +50,6 @@ fn over<T: Send>(
     match windows {
         [only] => Some(vec![each(only)?]),
         _ => windows.par_iter().map(each).collect(),
-    }
-}
-
-/// What one window says.
-#[derive(Clone, Debug)]
-struct Block {
-    /// The free parameters that it depends on.
-    places: Vec<usize>,
-    /// The triangle: columns for the initial state, the parameters and the residual.
-    triangle: DMatrix<f64>,
-}
-
-impl Block {
-    fn new(linear: &Linear, places: Vec<usize>) -> Self {
-        let (count, width) = (places.len(), linear.width);
-        let counted: Vec<usize> = (0..linear.residuals.len())
-            .filter(|k| linear.row(*k).iter().any(|x| *x != 0.0))
-            .collect();
-        let columns = width + 1;
-        let mut all = DMatrix::zeros(counted.len().max(columns), columns);
-        for (row, k) in counted.into_iter().enumerate() {
-            let slopes = linear.row(k);
-            for of in 0..STATE {
-                all[(row, of)] = slopes[count + of];
-            }
-            for (place, slope) in slopes[..count].iter().enumerate() {
-                all[(row, STATE + place)] = *slope;
-            }
-            all[(row, width)] = linear.residuals[k];
-        }
-        Self { places, triangle: all.qr().r() }
-    }
-
-    /// The triangle with every diagonal of the normal equations raised by the part `damping`.
-    fn damped(&self, damping: f64) -> DMatrix<f64> {
-        if damping == 0.0 {
-            return self.triangle.clone();
-        }
-        let columns = self.triangle.ncols();
-        let mut all = self.triangle.clone().resize_vertically(2 * columns - 1, 0.0);
-        for k in 0..columns - 1 {
-            all[(columns + k, k)] = damping.sqrt() * self.triangle.column(k).norm();
-        }
-        all.qr().r()
-    }
-
-    /// Whether the triangle says nothing about each direction of the initial state, as while the
-    /// pendulum is stuck.
-    fn blind(triangle: &DMatrix<f64>) -> [bool; STATE] {
-        let sizes = [0, 1].map(|k| triangle.column(k).norm());
-        let limit = BLIND_STATE * sizes[0].max(sizes[1]);
-        [0, 1].map(|k| triangle[(k, k)].abs() <= limit)
     }
 }
 

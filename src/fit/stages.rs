@@ -9,8 +9,8 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
+use super::alone::alone;
 use super::descent::{Limit, Outcome, Point, descend};
-use super::normal::Normal;
 use super::problem::Problem;
 use super::window::{Window, cut, guess, halves};
 use crate::error::Error;
@@ -85,10 +85,12 @@ pub fn fit(
     windows: Option<Vec<Window>>,
     cancel: &AtomicBool,
 ) -> Result<Fit, Error> {
-    let last =
-        Limit { gain: settings.gain, part: 1e-9, steps: settings.steps, target: f64::INFINITY };
-    let Some(windows) = windows else { return widened(problem, settings, last, cancel) };
-    let last = Limit { target: settings.target, ..last };
+    let Settings { gain, steps, target, .. } = settings;
+    let last = Limit { gain, part: 1e-9, steps, target };
+    let Some(windows) = windows else {
+        // Short windows promise nothing of long ones.
+        return widened(problem, settings, Limit { target: f64::INFINITY, ..last }, cancel);
+    };
     let held = held(problem, settings);
     let mut point = Point::new(problem, problem.start(), windows)?;
     let outcome = descend(problem, &mut point, &held, last, cancel)?;
@@ -158,12 +160,11 @@ fn states<'a>(problem: &'a Problem, point: &'a Point) -> impl FnMut(usize, usize
 
 /// The point with the windows split whose residuals stand out; none where none does.
 fn split(problem: &Problem, point: &Point, cancel: &AtomicBool) -> Result<Option<Point>, Error> {
-    let Normal { residuals, .. } = &point.normal;
     let mean = |all: &Vec<f64>| {
         let counted = all.iter().filter(|r| **r != 0.0).count().max(1);
         all.iter().map(|r| r * r).sum::<f64>() / counted as f64
     };
-    let means: Vec<f64> = residuals.iter().map(mean).collect();
+    let means: Vec<f64> = point.normal.residuals.iter().map(mean).collect();
     let mut sorted = means.clone();
     sorted.sort_by(f64::total_cmp);
     let limit = ASTRAY * sorted[(sorted.len() - 1) / 2].max(1.0);
@@ -191,14 +192,9 @@ fn settled(
     windows: Vec<Window>,
     cancel: &AtomicBool,
 ) -> Result<Vec<Window>, Error> {
-    let held: Vec<usize> = (0..values.len()).collect();
-    let limit = Limit { gain: 0.1, part: 1e-3, steps: 10, target: f64::INFINITY };
     let settle = |window: Window| {
-        let Ok(mut point) = Point::new(problem, values.to_vec(), vec![window]) else {
-            return Ok(window);
-        };
-        descend(problem, &mut point, &held, limit, cancel)?;
-        Ok(point.windows[0])
+        let found = alone(problem, values, window, cancel)?;
+        Ok(found.map_or(window, |found| found.point.windows[0]))
     };
     windows.into_par_iter().map(settle).collect()
 }

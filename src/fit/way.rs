@@ -7,7 +7,8 @@
 //! derivatives, errors and the end of the search are. Where a size makes up for another one, as that
 //! of a drag for damping, the valley is straight as it is: both ways are tried.
 
-use super::problem::{Free, Record, Slot};
+use super::problem::{Free, Slot};
+use super::record::Record;
 
 /// The most that a width changes in one step, as the logarithm of its ratio.
 const FARTHEST: f64 = 2.0;

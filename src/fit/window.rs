@@ -1,6 +1,7 @@
 //! A record cut into windows, each with an initial state of its own.
 
-use super::problem::{Problem, Record};
+use super::problem::Problem;
+use super::record::Record;
 use crate::integrate::State;
 
 /// A window needs so many trusted samples to say anything about the parameters.

@@ -2,8 +2,8 @@
 
 use pendmap::fit::counted::{Said, said, surplus};
 use pendmap::fit::descent::Point;
-use pendmap::fit::problem::{Counts, Problem, Slot};
 use pendmap::fit::window::Window;
+use pendmap::fit::{Counts, Problem, Slot};
 
 use crate::fit_records::{free, record};
 use crate::support::undriven;

@@ -61,7 +61,6 @@ pub fn free(slots: &[Slot], records: usize, start: &[f64]) -> Vec<Free> {
 }
 
 /// Gravity, then all parameters of the pendulum, and their values.
-/// Times from 0 on.
 pub fn everything(pendulum: &Pendulum) -> (Vec<Slot>, Vec<f64>) {
     let parameters = pendulum.parameters();
     let slots = (0..parameters.len()).map(Slot::Parameter);

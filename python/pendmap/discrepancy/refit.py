@@ -186,12 +186,12 @@ class Refits:
         ]
         return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: STARTS - 1]
 
-    def unslipped(self, found: Trial, *, lost: bool = False) -> Trial:
+    def unslipped(self, found: Trial, *, lost: bool = False, gently: bool = False) -> Trial:
         """Return a fit from short windows on, where one is lost or astray and that is better."""
         if not lost and found.chi2 <= ASTRAY * max(found.fit.degrees, 1):
             return found
         try:
-            return from_short_windows(self.evidence, found)
+            return from_short_windows(self.evidence, found, gently=gently)
         except InputError:
             return found  # from short windows on the motion is lost
 

@@ -86,7 +86,7 @@ class Rests:
         if known is not None:
             rest = min((rest, known), key=lambda t: t.chi2)
         elif not rest.fit.converged:
-            rest = self._refits.unslipped(rest)
+            rest = self._refits.unslipped(rest, gently=True)
         if rest.chi2 - trial.chi2 < NEAR * (self.base.chi2 - trial.chi2):
             rest = self._settled(rest)
         if rest.chi2 <= self.base.chi2:

@@ -172,7 +172,7 @@ class Search:
         try:
             full = settled(self.evidence, found.trial)
             if not full.fit.converged:
-                full = self._refits.unslipped(full, lost=True)
+                full = self._refits.unslipped(full, lost=True, gently=True)
             found = Found(full, tried(self.evidence, full))
         except InputError:
             pass
@@ -183,7 +183,7 @@ class Search:
         """Return a fit from short windows on, where one has slipped and that is better."""
         if not slipped(found.trial):
             return found
-        other = self._refits.unslipped(found.trial, lost=True)
+        other = self._refits.unslipped(found.trial, lost=True, gently=True)
         try:
             return found if other is found.trial else Found(other, tried(self.evidence, other))
         except InputError:

@@ -27,6 +27,7 @@ __all__ = [
     "FEW_STEPS",
     "GENTLE",
     "LITTLE",
+    "QUICK",
     "Trial",
     "fitted",
     "settled",
@@ -46,8 +47,11 @@ MOST_STEPS: Final = 40
 ALIKE: Final = 10.0
 """Twice the difference of log-likelihoods below which two models are not told apart."""
 
+QUICK: Final = 4.0
+"""By so much windows grow from stage to stage ..."""
+
 GENTLE: Final = 1.5
-"""By so much windows grow from stage to stage where a fit was lost as they grew by more."""
+"""... and by so much where what comes out decides, or was lost as they grew by more."""
 
 LITTLE: Final = 0.05
 """Of a sum of squares: far below what decides between candidates."""
@@ -149,7 +153,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     windows: Windows | None = None,
     steps: int = MOST_STEPS,
     least_gain: float = 1e-3,
-    growth: float = 4.0,
+    growth: float = QUICK,
     target: float = math.inf,
 ) -> Trial:
     """Fit a model to the evidence.
@@ -255,7 +259,6 @@ def with_candidates(  # noqa: PLR0913 (what to fit, and from where)
         windows=windows,
         steps=FEW_STEPS,
         least_gain=LITTLE,
-        growth=GENTLE,
         target=target,
     )
 
