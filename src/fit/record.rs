@@ -105,6 +105,6 @@ impl Record {
 }
 
 /// The error of a number out of its range.
-pub fn range(name: &'static str, value: f64, allowed: &'static str) -> Error {
+pub(super) fn range(name: &'static str, value: f64, allowed: &'static str) -> Error {
     Error::Range { name, value, allowed }
 }
