@@ -120,3 +120,15 @@ def test_a_name_that_does_not_foretell_the_run_held_out_is_not_claimed(tmp_path:
     assert found.judgement.ratio_held > 1.3
     assert found.verdict == "unknown"
     assert not found.effects
+
+
+def test_an_effect_of_nothing_does_not_stay_since_its_rest_was_lost(tmp_path: Path) -> None:
+    # The drag alone had been found first, with a window that had slipped; a bearing harmonic of
+    # nothing, give or take nothing, led out of there and was named for it.
+    found, truth = diagnosed(
+        tmp_path, "quadratic_drag", seed=4, noise=0.1, counts=4096, rate=124.0, **MIXED
+    )
+    assert [effect.name for effect in found.effects] == ["quadratic_drag"]
+    (effect,) = found.effects
+    low, high = effect.ci95["q"]
+    assert low < truth["quadratic_drag"]["q"] < high

@@ -60,6 +60,7 @@ class Rests:
         self._evidence = evidence
         self._refits = refits
         self._known: dict[Key, Trial] = {}
+        self._gone: set[tuple[Key, Key]] = set()
         self.keep(base)
 
     def keep(self, trial: Trial) -> None:
@@ -70,8 +71,14 @@ class Rests:
         """Fit a trial's model without one of the effects that were added."""
         chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
         key = key_of(chosen)
-        if key not in self._known:
-            self._known[key] = self._rest(trial, dropped, chosen)
+        known, way = self._known.get(key), (key, key_of(trial.chosen))
+        if known is None or (
+            # It was found on another way, and is in the wrong valley if this one's size says so.
+            chosen and way not in self._gone and not consistent(known, trial, dropped)
+        ):
+            self._gone.add(way)
+            rest = self._rest(trial, dropped, chosen)
+            self.keep(rest if known is None else min((known, rest), key=lambda t: t.chi2))
         return self._known[key]
 
     def _rest(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
