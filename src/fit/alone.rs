@@ -10,8 +10,12 @@ use super::problem::Problem;
 use super::window::Window;
 use crate::error::Error;
 
-/// How far it goes: beyond that the parameters say more.
-const LIMIT: Limit = Limit { gain: 0.1, part: 1e-3, steps: 10, target: f64::INFINITY };
+/// The gain in the sum of squares up to which it goes ...
+const GAIN: f64 = 0.1;
+/// ... or the part of the sum that this is: beyond that the parameters say more.
+const PART: f64 = 1e-3;
+/// The most steps where a step of all windows failed: at a kink more lead nowhere.
+const RELAXED: usize = 6;
 /// The part of the most that a window missed of what was promised from which others are looked at.
 const PART_MISSED: f64 = 0.1;
 /// The part of what it promised that a window keeps at most that is at a kink.
@@ -29,7 +33,8 @@ pub struct Alone {
     pub in_vain: f64,
 }
 
-/// Fits the initial state of `window` alone; none where its motion leaves the range of numbers.
+/// Fits the initial state of `window` alone in at most so many `steps`; none where its motion leaves
+/// the range of numbers.
 ///
 /// # Errors
 /// [`Error::Interrupted`] when `cancel` is set.
@@ -37,6 +42,7 @@ pub fn alone(
     problem: &Problem,
     values: &[f64],
     window: Window,
+    steps: usize,
     cancel: &AtomicBool,
 ) -> Result<Option<Alone>, Error> {
     let held: Vec<usize> = (0..values.len()).collect();
@@ -45,7 +51,8 @@ pub fn alone(
     };
     let promised = point.normal.step(0.0, &held).gain;
     let chi2 = point.normal.chi2;
-    descend(problem, &mut point, &held, LIMIT, cancel)?;
+    let limit = Limit { gain: GAIN, part: PART, steps, target: f64::INFINITY };
+    descend(problem, &mut point, &held, limit, cancel)?;
     let kept = chi2 - point.normal.chi2;
     let in_vain = if kept < KEPT_AT_KINK * promised { promised - kept } else { 0.0 };
     Ok(Some(Alone { point, in_vain }))
@@ -75,7 +82,7 @@ pub fn relax(
         // Not a window or two, but the step itself goes too far.
         return;
     }
-    let fitted = |values: &[f64], window| alone(problem, values, window, cancel).ok()?;
+    let fitted = |values: &[f64], window| alone(problem, values, window, RELAXED, cancel).ok()?;
     let found = |k: usize| {
         // From where the step led, and from where it was.
         let from = [point.windows[k], before.windows[k]];

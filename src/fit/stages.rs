@@ -20,6 +20,8 @@ use crate::integrate::State;
 const ASTRAY: f64 = 36.0;
 /// How often they are.
 const MOST_SPLITS: usize = 3;
+/// The most steps by which a window finds its own initial state.
+const SETTLED: usize = 10;
 
 /// Choices of a fit.
 #[derive(Clone, Copy, Debug)]
@@ -193,7 +195,7 @@ fn settled(
     cancel: &AtomicBool,
 ) -> Result<Vec<Window>, Error> {
     let settle = |window: Window| {
-        let found = alone(problem, values, window, cancel)?;
+        let found = alone(problem, values, window, SETTLED, cancel)?;
         Ok(found.map_or(window, |found| found.point.windows[0]))
     };
     windows.into_par_iter().map(settle).collect()
