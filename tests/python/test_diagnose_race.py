@@ -14,8 +14,10 @@ from pendmap.discrepancy.baseline import baseline, taken_by
 from pendmap.discrepancy.candidates import candidates
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.refit import Refits
+from pendmap.discrepancy.rests import Rests
 from pendmap.discrepancy.scores import Scores, scores_of
 from pendmap.discrepancy.slipped import from_short_windows, slipped
+from pendmap.errors import InputError
 from pendmap.identification.fitting import fit_runs
 
 if TYPE_CHECKING:
@@ -124,6 +126,32 @@ def test_a_window_that_went_another_way_is_told_from_a_missing_effect(
     assert slipped(astray)
     regained = from_short_windows(evidence, astray)
     assert regained.chi2 == pytest.approx(drag.chi2, rel=1e-6)
+
+
+def test_where_nothing_is_found_without_an_effect_the_baseline_is(
+    dragged: tuple[Evidence, Trial, Scores], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    evidence, base, scores = dragged
+    refits = Refits(evidence)
+    places = [place_of(scores, name) for name in ("quadratic_drag", "viscous_warm_up")]
+    both = refits.fitted(base, scores, places)
+    assert both is not None
+
+    def lost(*_given: object, **_named: object) -> Trial:
+        raise InputError("lost")
+
+    def astray(*_given: object, **_named: object) -> Trial:
+        fit = dataclasses.replace(base.fit, chi2=2 * base.fit.chi2)
+        return dataclasses.replace(base, chosen=both.chosen[1:], fit=fit)
+
+    monkeypatch.setattr("pendmap.discrepancy.rests.with_candidates", lost)
+    monkeypatch.setattr(Rests, "fit_without", astray)
+    rests = Rests(evidence, base, refits)
+    rest = rests.less(both, both.chosen[0])
+    assert rest is base
+    # It is asked for once.
+    monkeypatch.setattr(Rests, "fit_without", lost)
+    assert rests.less(both, both.chosen[0]) is base
 
 
 def test_a_pendulum_that_rests_holds_up_no_fit(tmp_path: Path) -> None:

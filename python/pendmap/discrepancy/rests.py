@@ -78,7 +78,8 @@ class Rests:
         ):
             self._gone.add(way)
             rest = self._rest(trial, dropped, chosen)
-            self.keep(rest if known is None else min((known, rest), key=lambda t: t.chi2))
+            # Of the baseline where nothing that has the effects is better.
+            self._known[key] = rest if known is None else min((known, rest), key=lambda t: t.chi2)
         return self._known[key]
 
     def _rest(self, trial: Trial, dropped: Candidate, chosen: tuple[Candidate, ...]) -> Trial:
