@@ -208,3 +208,38 @@ def test_a_wrong_unit_is_said_before_the_verdict(tmp_path: Path, pendmap_command
     assert first.endswith("the unit or the scale is wrong")
     assert others[0].startswith("Verdict: ")
     assert not any("the unit or the scale is wrong" in line for line in others)
+
+
+def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: Run) -> None:
+    time = np.arange(3000) * 0.02
+    theta = 0.05 * np.exp(-0.03 * time) * np.cos(6.0 * time)
+    theta += 1e-4 * np.random.default_rng(2).standard_normal(time.size)
+    (tmp_path / "small.csv").write_text(csv((time, np.degrees(theta))), encoding="utf-8")
+    run = pendmap_command("diagnose", "small.csv", "--json")
+    assert run.returncode == 0, run.stderr
+    found = json.loads(run.stdout)
+    # To the pendulum of 2.9 rad that it is taken for gravity is nothing, and a spring all.
+    assert found["effects"]
+    assert all(effect["approximate"] for effect in found["effects"])
+    assert found["next_experiment"]
+
+
+def test_what_was_no_candidate_is_said(hidden: str, pendmap_command: Run) -> None:
+    none = pendmap_command("diagnose", hidden, "--max-effects", "0", "--out", "a.toml")
+    assert "at most 0 effects were allowed" in none.stdout
+    drags = ("quadratic_drag", "power_law_drag")
+    words = [word for name in drags for word in ("--without", name)]
+    less = pendmap_command("diagnose", hidden, *words, "--out", "b.toml")
+    assert "left out of the candidates: quadratic_drag, power_law_drag" in less.stdout
+
+
+def test_a_driven_record_taken_for_a_free_one_is_refused_with_what_it_needs(
+    hidden: str, tmp_path: Path, pendmap_command: Run
+) -> None:
+    (tmp_path / "forced.csv").write_bytes((tmp_path / hidden / "run_01.csv").read_bytes())
+    run = pendmap_command("diagnose", "forced.csv", "--out", "c.toml")
+    assert run.returncode == 2
+    assert "forced.csv: no model follows these records" in run.stderr
+    assert 'kind = "forced"' in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert not (tmp_path / "c.toml").exists()

@@ -80,3 +80,18 @@ def test_what_is_partial(gains: list[float], closed: float, spread: float, clear
     # Where nothing is left beside it, one alone in doubt is not claimed, nor are several.
     little = 0 < sum(sorted(gains)[:-1]) < 0.1 * max(gains) < math.inf
     assert closes_most(standings, closed, spread, rest=False) is (clear and little)
+
+
+@pytest.mark.parametrize("seed", [34, 43])
+def test_without_noise_nothing_is_made_of_what_the_arithmetic_leaves(
+    seed: int, tmp_path: Path
+) -> None:
+    clean = {"seed": seed, "noise": 0.0, "counts": 0}
+    nothing, _ = diagnosed(tmp_path, **clean)
+    assert nothing.verdict == "none"
+    assert nothing.gap.after < 1e-9
+    drag, truth = diagnosed(tmp_path, "quadratic_drag", **clean)
+    assert drag.verdict == "named"
+    (effect,) = drag.effects
+    assert effect.name == "quadratic_drag"
+    assert effect.parameters["q"] == pytest.approx(truth["quadratic_drag"]["q"], rel=1e-5)

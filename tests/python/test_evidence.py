@@ -10,6 +10,7 @@ import pytest
 
 from driven_decays import motion
 from pendmap.discrepancy.evidence import evidence_of
+from pendmap.errors import InputError
 from pendmap.records import Experiment, Run
 
 TIME = np.arange(1500) * 0.01
@@ -17,10 +18,18 @@ ANGLE = motion(TIME, (1.0, 0.0), w0=6.2, c_over_m=0.05, friction=0.03)
 NOISE = np.random.default_rng(1).standard_normal(TIME.size)
 
 
-def run(name: str, kind: Literal["free", "forced"], *, hold_out: bool = False) -> Run:
+def run(
+    name: str,
+    kind: Literal["free", "forced"],
+    *,
+    hold_out: bool = False,
+    samples: int = TIME.size,
+    noise: float = 1e-3,
+) -> Run:
     drive = {"p": 0.1, "Omega": 12.0, "phi": 0.0} if kind == "forced" else None
-    readings, trusted = ANGLE + 1e-3 * NOISE, np.ones(TIME.size, bool)
-    return Run(name, f"{name}.csv", kind, TIME, readings, trusted, drive=drive, hold_out=hold_out)
+    time, trusted = TIME[:samples], np.ones(samples, bool)
+    readings = (ANGLE + noise * NOISE)[:samples]
+    return Run(name, f"{name}.csv", kind, time, readings, trusted, drive=drive, hold_out=hold_out)
 
 
 @pytest.mark.parametrize(
@@ -49,3 +58,27 @@ def test_what_is_marked_is_held_back_and_nothing_else() -> None:
     evidence = evidence_of(Experiment(Path("there"), tuple(runs)))
     assert [each.name for each in evidence.held] == ["c"]
     assert [each.name for each in evidence.fitted] == ["a", "b"]
+
+
+def test_a_run_too_short_to_show_its_noise_has_that_of_the_others() -> None:
+    lengths = {"a": 1500, "b": 1500, "c": 1500, "few": 19, "some": 60}
+    runs = tuple(run(name, "free", samples=count) for name, count in lengths.items())
+    *known, few, some = evidence_of(Experiment(Path("there"), runs)).readings
+    usual = np.median([reading.sigma for reading in known])
+    assert usual == pytest.approx(1e-3, rel=0.1)
+    assert few.sigma == some.sigma == usual
+    assert 0 < few.doubt < 0.1
+    # Alone it has what it shows, and says how little that is.
+    (alone,) = evidence_of(Experiment(Path("there"), (run("a", "free", samples=250),))).readings
+    assert alone.doubt > 0.02
+
+
+def test_without_noise_a_reading_is_worth_no_more_than_a_sensor_can_tell() -> None:
+    runs = tuple(run(name, "free", noise=0.0) for name in "abc")
+    readings = evidence_of(Experiment(Path("there"), runs)).readings
+    assert all(reading.sigma >= 1e-7 for reading in readings)
+
+
+def test_too_few_samples_to_hold_any_back_are_refused() -> None:
+    with pytest.raises(InputError, match=r"too few samples.*201 samples or more"):
+        evidence_of(Experiment(Path("there"), (run("a", "free", samples=150),)))

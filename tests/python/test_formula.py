@@ -110,6 +110,8 @@ def test_a_formula_s_name_does_not_do_for_another(tmp_path: Path) -> None:
         (("x", 3, {"k": 1}), "term is 3: allowed is a text"),
         (("magnet", "-k*v", {"k": 1}), "one of the library"),
         (("x y", "-k*v", {"k": 1}), "a letter, then letters"),
+        (("w0", "-k*v", {"k": 1}), "a pendulum has a parameter of that name"),
+        (("c_over_m", "-k*v", {"k": 1}), "a pendulum has a parameter of that name"),
         (("x", "-v*v", {"v": 1}), "'v' has a meaning of its own"),
         (("x", "k", {"k": 2, "q": 0}), "parameter 'q' is not in the term"),
         (

@@ -25,7 +25,7 @@ def test_degrees_become_radians(tmp_path: Path) -> None:
 def test_small_degrees_are_known_by_their_periods(tmp_path: Path) -> None:
     time, theta, _ = motion(start=0.045, duration=30.0)
     run = read(tmp_path, text((time, np.degrees(noisy(theta, 1e-4, 0)))))
-    finding = found(run)["angle-scale"]
+    finding = found(run)["angle-unit"]
     assert not finding.mended
     assert "degrees?" in finding.text
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Advice", "advice_of", "chance_said"]
 
+NOTHING: Final = "No free decay or run under the drive adds to these records."
+
 MARGIN: Final = 1e-6
 """A chance below this is not told: no model is known so well."""
 
@@ -99,7 +101,7 @@ def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> l
             "rotation: whether the rest repeats, and over what it changes, says what it is."
         )
     if outlook is None:
-        return said or ["No free decay or run under the drive adds to these records."]
+        return said or [NOTHING]
     best = outlook.best
     if best is not None:
         say = {"separation": _separation, "interval": _interval, "limits": _limits}
@@ -110,7 +112,7 @@ def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> l
         f"{_revealed(judgement, one)}; {other} by {_revealed(judgement, other)}."
         for one, other in outlook.equals
     ]
-    return said
+    return said or [NOTHING]
 
 
 def _revealed(judgement: Judgement, name: str) -> str:

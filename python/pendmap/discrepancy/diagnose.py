@@ -21,6 +21,7 @@ from pendmap.discrepancy.runs import RunByRun, run_by_run
 from pendmap.discrepancy.select import Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
+from pendmap.errors import InputError
 from pendmap.model.effects import definition
 from pendmap.notebook import Readable
 
@@ -73,6 +74,10 @@ class Discrepancy(Readable):
         Of all others at the best model.
     level : float
         Of the noise: by what sums of squares are divided.
+    without : tuple of str
+        Effects that were no candidates.
+    most : int
+        How many effects could be added.
     own : tuple of Formula
         Candidates of the user's own beside the library's.
     functions : tuple of FunctionScore
@@ -94,6 +99,8 @@ class Discrepancy(Readable):
     attempts: tuple[Attempt, ...]
     beside: Scores
     level: float
+    without: tuple[str, ...] = ()
+    most: int = MOST_EFFECTS
     own: tuple[Formula, ...] = ()
     functions: tuple[FunctionScore, ...] = ()
 
@@ -218,7 +225,13 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     nearest = search.run()
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial)
-    after = residual_torque(evidence, nearest.trial)
+    try:
+        after = residual_torque(evidence, nearest.trial)
+    except InputError as error:
+        raise InputError(
+            f"{experiment.path}: no model follows these records: {error}. A run under a drive is "
+            'allowed with the drive, in an experiment.toml: kind = "forced"'
+        ) from None
     judgement = judge(evidence, search, nearest, runs, after.chance)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else search.base
@@ -240,6 +253,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         tuple(search.attempts),
         search.scores(best.trial),
         search.level(),
+        tuple(without),
+        max_effects,
         own,
         function_scores(evidence, search.base.trial, best.trial, functions),
     )

@@ -34,6 +34,16 @@ FEWEST_FREE: Final = 3
 FEWEST: Final = 20
 """Samples that a stretch held back has at least; two are needed for its initial state."""
 
+LEAST: Final = round(FEWEST / (HELD[0][1] - HELD[0][0])) + 1
+"""Samples of a run of which stretches can be held back."""
+
+KNOWN: Final = 0.1
+"""Relative standard error of the noise above which a record is too short to show it."""
+
+FINEST: Final = 1e-7
+"""The least noise, rad: a count of 2^26 in a turn, finer than any sensor. Of records without noise
+the way that polynomials follow the motion would be taken for it."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Evidence:
@@ -128,9 +138,7 @@ def evidence_of(experiment: Experiment) -> Evidence:
             f"{adrift[0].name}: is forced, and nothing says what drives it: allowed is a run with"
             " drive or pivot"
         )
-    readings = tuple(
-        reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad) for run in runs
-    )
+    readings = _readings(runs)
     every = [
         in_blocks(as_fit_run(run, reading)) for run, reading in zip(runs, readings, strict=True)
     ]
@@ -151,6 +159,29 @@ def evidence_of(experiment: Experiment) -> Evidence:
             inside=False,
         )
     return _stretched(experiment, runs, readings, every)
+
+
+def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
+    """Return what the readings of each run are worth.
+
+    A run too short to show its noise has that of the others: they are of one sensor.
+    """
+
+    def own(run: Run, sigma: float | None = None) -> Reading:
+        return reading_of(run.time, run.theta, sigma, trusted=run.trusted, count=run.count_rad)
+
+    every = [own(run) for run in runs]
+    known = [reading for reading in every if reading.doubt <= KNOWN]
+    if known:
+        usual = float(np.median([reading.sigma for reading in known]))
+        doubt = max(reading.doubt for reading in known)
+        for k, run in enumerate(runs):
+            if every[k].doubt > KNOWN:
+                every[k] = dataclasses.replace(own(run, usual), doubt=doubt)
+    return tuple(
+        reading if reading.sigma >= FINEST else own(run, FINEST)
+        for run, reading in zip(runs, every, strict=True)
+    )
 
 
 def _middle_runs(every: Sequence[FitRun]) -> list[int]:
@@ -193,6 +224,11 @@ def _stretched(
         if inside and back.any():
             held.append(dataclasses.replace(run, trusted=back))
             held_of.append(k)
+    if not held:
+        raise InputError(
+            f"{experiment.path}: too few samples, none of them can be held back: allowed is a run "
+            f"of {LEAST} samples or more"
+        )
     return Evidence(
         experiment,
         runs,

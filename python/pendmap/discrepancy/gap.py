@@ -36,8 +36,9 @@ class Gap:
 
     Parameters
     ----------
-    noise_floor : float
-        Of the noise alone, as it is seen without a model.
+    noise_floor, held_out_noise_floor : float
+        Of the noise alone, as it is seen without a model: of the runs that were fitted, and of what
+        was held back.
     before, after : float
         Of the baseline and of the model found, on the runs that both were fitted to.
     held_out_before, held_out_after : float
@@ -47,6 +48,7 @@ class Gap:
     """
 
     noise_floor: float
+    held_out_noise_floor: float
     before: float
     after: float
     held_out_before: float
@@ -58,17 +60,16 @@ def gap_of(evidence: Evidence, base: Found, best: Found) -> Gap:
     """Return the gap that a baseline leaves and that a model leaves."""
     before, held_before = base.trial.fit, base.held.fit
     after, held_after = best.trial.fit, best.held.fit
-    rows = [
-        *_rows(evidence.fitted, before, after, held_out=False),
-        *_rows(evidence.held, held_before, held_after, held_out=True),
-    ]
+    rows = _rows(evidence.fitted, before, after, held_out=False)
+    held = _rows(evidence.held, held_before, held_after, held_out=True)
     return Gap(
-        _together(evidence.fitted, [row.noise_floor for row in rows]),
+        _together(evidence.fitted, rows),
+        _together(evidence.held, held),
         _rms(evidence.fitted, before),
         _rms(evidence.fitted, after),
         _rms(evidence.held, held_before),
         _rms(evidence.held, held_after),
-        tuple(rows),
+        (*rows, *held),
     )
 
 
@@ -92,9 +93,9 @@ def _floor(run: FitRun) -> float:
     return float(np.sqrt(np.mean(np.square(sigma if run.trusted is None else sigma[run.trusted]))))
 
 
-def _together(runs: Sequence[FitRun], floors: Sequence[float]) -> float:
-    sizes = [run.time.size for run in runs]
-    squares = [size * floor**2 for size, floor in zip(sizes, floors, strict=False)]
+def _together(runs: Sequence[FitRun], rows: Sequence[RunGap]) -> float:
+    sizes = [run.time.size if run.trusted is None else int(run.trusted.sum()) for run in runs]
+    squares = [size * row.noise_floor**2 for size, row in zip(sizes, rows, strict=True)]
     return math.sqrt(sum(squares) / sum(sizes))
 
 

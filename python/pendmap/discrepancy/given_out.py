@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from pendmap.discrepancy.diagnose import Discrepancy
 
-__all__ = ["feeding", "given_out"]
+__all__ = ["confined", "feeding", "given_out"]
 
 
 def given_out(found: Discrepancy) -> dict[str, float]:
@@ -28,6 +28,13 @@ def given_out(found: Discrepancy) -> dict[str, float]:
     return values
 
 
+def confined(found: Discrepancy) -> Iterator[str]:
+    """Yield which effects of the model no map over initial conditions can have."""
+    for effect in found.usable.trial.fit.model.effects:
+        if effect.definition["mappable"] == "no":
+            yield f"{effect.name}: allowed in simulate, compare and diagnose; no map has it"
+
+
 def feeding(found: Discrepancy) -> Iterator[str]:
     """Yield which coefficients of damping and friction are negative, and what the file has then."""
     negative = unphysical(found.best.trial.fit)
@@ -36,6 +43,8 @@ def feeding(found: Discrepancy) -> Iterator[str]:
             f"{name} is {value:.3g} {unit_of(name, found.definition)}, unphysical: no pendulum "
             "feeds its own motion"
         )
+    if {"c_over_m", "Tr"} <= negative.keys():
+        yield "  both damping and friction are: the record may run backwards in time"
     if negative:
         given = ", ".join(
             f"{name} = {value:.4g} {unit_of(name, found.definition)}".rstrip()

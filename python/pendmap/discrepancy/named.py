@@ -15,6 +15,7 @@ from pendmap.discrepancy.sides import elsewhere
 from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
+from pendmap.records.summary import doubted
 
 if TYPE_CHECKING:
     from pendmap.discrepancy.candidates import Candidate
@@ -110,7 +111,7 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
                 parameters,
                 ci95,
                 standing.share * judgement.complete,
-                judgement.approximate,
+                judgement.approximate or doubted(evidence.experiment, *evidence.runs),
                 candidate.formula,
                 others.get(candidate.name, {}),
             )

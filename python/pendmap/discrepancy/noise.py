@@ -33,6 +33,10 @@ __all__ = ["Remainder", "remainder_of"]
 FOR_SURE: Final = 1e9
 """So many amplitudes tell a level for sure."""
 
+ARITHMETIC: Final = 1e-4
+"""Mean square of residuals, over the readings' standard errors, below which they are not looked
+into: of records without noise fits leave less, and it has a shape."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Remainder:
@@ -118,7 +122,7 @@ def remainder_of(
         Share of rounding in the variance of each run's noise; 0 where there are no counts.
     """
     spectra = spectra_of(fit, runs)
-    if not spectra.quick_sizes.any():
+    if not spectra.quick_sizes.any() or spectra.mean < ARITHMETIC:
         return Remainder(1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs), 1.0, np.ones((2, 1)), FOR_SURE)
     laws = laws_of(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
     sizes = spectra.slow_sizes.sum(axis=1)

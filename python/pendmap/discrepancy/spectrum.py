@@ -71,6 +71,12 @@ class Spectra:
     motion: Floats
     states: Floats
 
+    @property
+    def mean(self) -> float:
+        """Mean squared amplitude of all."""
+        sizes = self.slow_sizes.sum() + self.quick_sizes.sum()
+        return float((self.slow.sum() + self.quick.sum()) / sizes)
+
 
 def spectra_of(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:
     """Return the spectra of what a fit leaves.

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.discrepancy.given_out import feeding, given_out
+from pendmap.discrepancy.given_out import confined, feeding, given_out
 from pendmap.discrepancy.physical import unphysical
 from pendmap.model.unit_names import unit_of
 from pendmap.records.summary import doubts_said, findings_said
@@ -23,7 +23,7 @@ SAID: Final = {
     "named": "named: the effects below explain what the baseline lacks",
     "partial": "partial: the effects below close most of the gap, and something is left",
     "ambiguous": "ambiguous: these records do not tell the effects of a class apart",
-    "unknown": "unknown: something is missing that no effect of the library explains",
+    "unknown": "unknown: something is missing that no candidate explains",
 }
 
 PLACES: Final[dict[str, str]] = {
@@ -67,11 +67,13 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "equivalent": found.equivalent,
         "gap": {
             "noise_floor": gap.noise_floor,
+            "held_out_noise_floor": gap.held_out_noise_floor,
             "before": gap.before,
             "after": gap.after,
             "held_out_before": gap.held_out_before,
             "held_out_after": gap.held_out_after,
-            "closed": judgement.closed,
+            "closed": judgement.closed if found.effects else None,
+            "closed_by_nearest": judgement.closed if judgement.standings else None,
             "runs": [
                 {
                     "name": run.name,
@@ -253,17 +255,22 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             yield f"    or {said}, which does as well: the sides are not told apart"
     for names in found.equivalent:
         yield f"  not told apart here: {', '.join(names)}"
+    if found.without:
+        yield f"  left out of the candidates: {', '.join(found.without)}"
+    if found.most == 0 and found.verdict != "none":
+        yield "  no candidate was fitted: at most 0 effects were allowed"
     if found.verdict == "unknown" and found.nearest.trial.names:
         yield f"  nearest, and not claimed: {', '.join(found.nearest.trial.names)}"
     yield (
         f"Residual, rms: {gap.before:.4g} rad before, {gap.after:.4g} after, noise "
         f"{gap.noise_floor:.4g}; held out {gap.held_out_before:.4g} before, "
-        f"{gap.held_out_after:.4g} after"
+        f"{gap.held_out_after:.4g} after, noise {gap.held_out_noise_floor:.4g}"
     )
     if judgement.standings:
         by = "" if found.effects else " by what is nearest"
-        yield f"Share of the squared gap closed{by}: {100 * judgement.closed:.0f} %"
+        yield f"Share of the squared gap closed{by}: {100 * max(judgement.closed, 0.0):.0f} %"
     yield from feeding(found)
+    yield from confined(found)
     # Of each thing that it may go by the clearest place: neighbours say the same.
     clearest = {row["over"]: row for row in reversed(found.where)}
     for row in sorted(clearest.values(), key=lambda row: -abs(row["z"]))[:WHERE]:

@@ -31,7 +31,9 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     for run in experiment.runs:
         if any(run is each for each in read):
             continue
-        why = "held out" if run.hold_out else "forced"
+        # Where runs held out are read all the same, that is no reason.
+        held = run.hold_out and not any(each.hold_out for each in read)
+        why = "held out" if held else "forced"
         if run.kind == "free" and not run.hold_out:
             why = "of peaks alone" if run.peaks_only else "shorter" if run.moves else STILL
         elif run.kind == "free" and not run.moves:

@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Formula", "FormulaKey", "formulas_of", "load_formulas"]
 
+_DAMPING: Final = ("c_over_m", "zeta", "gamma", "Tr", "theta_r")
+_DRIVE: Final = ("p", "Omega", "omega", "phi", "phase")
+_TAKEN: Final = frozenset(("w0", "length_m", "gravity", "torque", *_DAMPING, *_DRIVE))
+"""Names of a pendulum's own parameters."""
+
 _FORMULA: Final = ("name", "term", "parameters", "revealed_by")
 _PARAMETER: Final = ("power", "typical", "range", "unit", "meaning")
 _TYPICAL: Final = (1e-4, 0.3)
@@ -113,6 +118,11 @@ class Formula:
             parts = tuple(_parameter(n, self.parameters[n], names) for n in names)
         except InputError as error:
             raise InputError(f"formula '{self.name}': {error}") from None
+        if self.name in _TAKEN:
+            raise InputError(
+                f"formula '{self.name}': a pendulum has a parameter of that name: allowed is "
+                "another"
+            )
         key = (self.name, self.term, self.revealed_by, parts)
         try:
             entry, proportional = _core.formula(key)

@@ -174,13 +174,14 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
     # 1 for radians; readings that are k times the angle show about 1/k^2.
     if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
         factor = _factor(found)
-        degrees = " (degrees?)" if share < 0.1 else ""
+        flat = share < 0.1
+        degrees = " (degrees?)" if flat else ""
         text = (
             f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
             f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is about"
             f" {factor:.2g} times the reading{degrees}, or another force acts"
         )
-        work.say("angle-scale", text)
+        work.say("angle-unit" if flat else "angle-scale", text)
 
 
 def _factor(found: Periods) -> float:

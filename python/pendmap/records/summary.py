@@ -18,10 +18,21 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
-__all__ = ["as_json", "as_text", "doubts_said", "findings_said", "noise_said", "noise_unit"]
+__all__ = [
+    "as_json",
+    "as_text",
+    "doubted",
+    "doubts_said",
+    "findings_said",
+    "noise_said",
+    "noise_unit",
+]
 
 UNITS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
 """Findings that a unit or a scale is wrong: unless that is mended, so is all that is fitted."""
+
+SCALE: Final = "angle-scale"
+"""Of these the one that an effect may bring about just as well."""
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -141,6 +152,12 @@ def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
     for where, found in _said_of(experiment, runs):
         if _doubted(found):
             yield f"Warning: {where}: {found.text}"
+
+
+def doubted(experiment: Experiment, *runs: Run) -> bool:
+    """Whether a unit of these runs is wrong, as far as can be seen."""
+    said = (found for _, found in _said_of(experiment, runs))
+    return any(_doubted(found) and found.what != SCALE for found in said)
 
 
 def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:

@@ -26,7 +26,7 @@ SAID: Final = {
     "ambiguous": "a class of effects explains it, which these records do not tell apart.",
     "partial": "what was found closes most of the gap, and something is left: its form is only "
     "nearly right.",
-    "unknown": "something is missing that no effect of the library explains. No name is claimed.",
+    "unknown": "something is missing that no candidate explains. No name is claimed.",
 }
 
 RARE: Final = 1e-9
@@ -111,9 +111,10 @@ def _rare(probability: float) -> str:
 def gap(found: Discrepancy) -> Iterator[Section]:
     """Yield the gap before and after, and how forecasts lose their way."""
     own = found.gap
+    floor = mrad(own.held_out_noise_floor)
     rows = [
         ("fitted runs", mrad(own.before), mrad(own.after), mrad(own.noise_floor)),
-        ("held out", mrad(own.held_out_before), mrad(own.held_out_after), mrad(own.noise_floor)),
+        ("held out", mrad(own.held_out_before), mrad(own.held_out_after), floor),
     ]
     each = [
         (

@@ -102,7 +102,7 @@ def _rivals(found: Discrepancy, standing: Standing) -> Iterator[Block]:
 
 def _why(rival: Rival) -> str:
     if rival.contains:
-        return "has it as a special case and gains no more"
+        return "does the same with more parameters and gains no more"
     if rival.alike:
         return f"not told apart: behind by less than {rival.margin:.3g}"
     return "refitted, explains less" if rival.refitted else "scored, explains less"

@@ -142,7 +142,7 @@ def lead(found: Discrepancy) -> Parts:
     nearest = found.nearest.trial.names
     gap, closed = found.gap, found.judgement.closed
     to = f"from {mrad(gap.held_out_before)} to {mrad(gap.held_out_after)}"
-    noise = f"the noise is {mrad(gap.noise_floor)}"
+    noise = f"the noise is {mrad(gap.held_out_noise_floor)}"
     if found.verdict == "none":
         return (
             Strong("Nothing is missing"),
@@ -181,10 +181,11 @@ def lead(found: Discrepancy) -> Parts:
     near: Parts = ()
     if nearest:
         verb = "close" if len(nearest) > 1 else "closes"
-        end = f", {verb} {share(closed)} of its squared gap; no name is claimed."
+        part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
+        end = f", {verb} {part}; no name is claimed."
         near = (" What comes nearest, ", *joined(nearest), end)
     return (
-        Strong("Something is missing that no effect of the library explains"),
+        Strong("Something is missing that no candidate explains"),
         f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}.",
         *near,
     )
