@@ -126,7 +126,7 @@ def test_its_numbers_are_those_of_the_json() -> None:
     gap = fields["gap"]
     floor = gap["noise_floor"]
     assert told["fitted runs"][1:] == [mrad(gap["before"]), mrad(gap["after"]), mrad(floor)]
-    held = [mrad(gap["held_out_before"]), mrad(gap["held_out_after"]), mrad(floor)]
+    held = [mrad(gap[f"held_out_{what}"]) for what in ("before", "after", "noise_floor")]
     assert told["held out"][1:] == held
     for run in gap["runs"]:
         name = f"{'held out: ' if run['held_out'] else ''}`{run['name']}`"
