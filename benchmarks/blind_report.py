@@ -296,7 +296,12 @@ def draw_reliability(rows: Iterable[Row], path: Path) -> None:
             one.plot([mean, mean], [least, most], color="C0", linewidth=1.5)
             one.plot(mean, share, "o", color="C0", markersize=5)
         shown = inner if mean > ENLARGED else axes
-        shown.annotate(str(count), (mean, share), xytext=(5, -11), textcoords="offset points")
+        # The last but one would stand in the last one's way.
+        beside = (-5, -11) if (low, high) == BINS[-3:-1] else (5, -11)
+        side = "right" if beside[0] < 0 else "left"
+        shown.annotate(
+            str(count), (mean, share), xytext=beside, textcoords="offset points", ha=side
+        )
     inner.set(xlim=(ENLARGED, 1.03), ylim=(0.75, 1.02))
     inner.tick_params(labelsize="small")
     axes.indicate_inset_zoom(inner, edgecolor="0.5")

@@ -11,7 +11,8 @@ import pendmap
 from hidden import diagnosed
 from pendmap.discrepancy.calibration import complete
 from pendmap.discrepancy.candidates import candidates
-from pendmap.discrepancy.rivals import Standing
+from pendmap.discrepancy.rivals import SPECIAL, Rival, Standing
+from pendmap.discrepancy.trial import ALIKE
 from pendmap.discrepancy.verdict import CHANCE, SURE, closes_most
 
 if TYPE_CHECKING:
@@ -80,6 +81,34 @@ def test_what_is_partial(gains: list[float], closed: float, spread: float, clear
     # Where nothing is left beside it, one alone in doubt is not claimed, nor are several.
     little = 0 < sum(sorted(gains)[:-1]) < 0.1 * max(gains) < math.inf
     assert closes_most(standings, closed, spread, rest=False) is (clear and little)
+
+
+def test_what_has_the_name_as_a_special_case_takes_its_share() -> None:
+    named = {c.name: c for c, *_ in candidates((), driven=False)}
+
+    def rival(name: str, behind: float, *, contains: bool) -> Rival:
+        far = behind / 500.0
+        return Rival(
+            named[name],
+            500.0 - behind,
+            behind,
+            far,
+            1 - far,
+            refitted=True,
+            contains=contains,
+            margin=ALIKE,
+        )
+
+    alone = Standing(named["quadratic_drag"], 500.0, ())
+    assert alone.share == 1.0
+    power = Standing(named["quadratic_drag"], 500.0, (rival("power_law_drag", 0.0, contains=True),))
+    assert power.share == pytest.approx(1 / (1 + SPECIAL))
+    assert power.equivalent == ["quadratic_drag"]
+    cubic = Standing(named["quadratic_drag"], 500.0, (rival("cubic_damping", 0.0, contains=False),))
+    assert cubic.share == 0.5
+    assert cubic.equivalent == ["quadratic_drag", "cubic_damping"]
+    far = Standing(named["quadratic_drag"], 500.0, (rival("power_law_drag", 30.0, contains=True),))
+    assert far.share == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", [34, 43])
