@@ -113,6 +113,9 @@ def test_what_is_left_out_is_said() -> None:
     # One is both: where runs held out are read, it is left out since it is forced.
     both = Experiment(Path("there"), (*runs, run("forced", hold_out=True)))
     assert left_out(both, [runs[0], runs[3]]) == "2 runs read; 3 forced runs are not used"
+    two = Experiment(Path("there"), (*runs, run(hold_out=True)))
+    said = left_out(two, [runs[0], runs[3]])
+    assert said == "2 runs read; 2 forced runs and 1 run held out are not used"
 
 
 def test_a_long_hold_before_the_release_does_no_harm(tmp_path: Path) -> None:

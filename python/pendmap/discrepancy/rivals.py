@@ -36,15 +36,15 @@ REFITTED: Final = 4
 
 CONTAINS: Final = 0.99
 """An effect with a shape of its own that does the same to within this cosine has the other one as a
-special case: it is no other explanation."""
-
-SPECIAL: Final = 0.06
-"""Odds of such an effect against its special case that was found, where it does as well: 10 of 162
-blind names that had one were it, in another run of the benchmark 9 of 154. Its shape would have to
-be where it cannot be told from the simpler one."""
+special case: it stands in no class with it."""
 
 BETTER: Final = 3.84
 """Unless its shape gains more than this (95 % point of chi-squared): then it may be the truth."""
+
+SPECIAL: Final = 0.06
+"""Odds of an effect against its special case that was found, where it does as well: 10 of 162
+blind names that had one were it, in another run of the benchmark 9 of 154. Its shape would have to
+be where it cannot be told from the simpler one."""
 
 
 @dataclasses.dataclass(frozen=True)

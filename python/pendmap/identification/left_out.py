@@ -31,8 +31,8 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     for run in experiment.runs:
         if any(run is each for each in read):
             continue
-        # Where runs held out are read all the same, that is no reason.
-        held = run.hold_out and not any(each.hold_out for each in read)
+        # Where runs held out are read all the same, that is no reason for a forced one.
+        held = run.hold_out and (run.kind == "free" or not any(each.hold_out for each in read))
         why = "held out" if held else "forced"
         if run.kind == "free" and not run.hold_out:
             why = "of peaks alone" if run.peaks_only else "shorter" if run.moves else STILL
