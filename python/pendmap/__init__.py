@@ -27,6 +27,7 @@ from pendmap.model.library import EffectDefinition, EffectParameter, effects
 if TYPE_CHECKING:
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins, basins_of
+    from pendmap.orbits import orbit
     from pendmap.records import (
         Experiment,
         Finding,
@@ -66,6 +67,7 @@ __all__ = [
     "load_formulas",
     "load_model",
     "noise_floor",
+    "orbit",
     "read_experiment",
     "save",
     "save_model",
@@ -85,6 +87,7 @@ _HOMES = {
     "basins_of": "maps",
     "load": "store",
     "noise_floor": "records",
+    "orbit": "orbits",
     "read_experiment": "records",
     "save": "store",
     "simulate": "trajectory",

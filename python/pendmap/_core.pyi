@@ -16,6 +16,7 @@ __all__ = [
     "fit_rows",
     "fit_runs",
     "formula",
+    "orbits",
     "period",
     "simd",
     "simd_available",
@@ -91,6 +92,14 @@ def basins_list(
     theta: _Floats,
     velocity: _Floats,
     choices: _Choices,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def orbits(
+    parameters: _Parameters,
+    winding: tuple[int, int],
+    theta: _Axis,
+    velocity: _Axis,
+    threads: int,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def fit_runs(

@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap import _core
+from pendmap import _core, orbit_table
 from pendmap.model import without_dimensions
-from pendmap.model.units import RATE, TIME, VELOCITY, Units
+from pendmap.model.units import RATE, Units
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
 from pendmap.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
     from pendmap.model import Pendulum, Rig
 
@@ -130,46 +129,11 @@ def complete(
 
 
 def table(attractors: list[dict[str, Any]], count: int, units: Units) -> dict[str, Any]:
-    """The attractors and their stroboscopic points as variables."""
-
-    def column(key: str, none: float) -> list[float]:
-        return [none if a[key] is None else a[key] for a in attractors]
-
-    def measured(key: str, power: int) -> NDArray[np.float64]:
-        values: NDArray[np.float64] = np.array(column(key, np.nan), dtype=float)
-        return np.asarray(units.given(values, power))
-
-    multipliers = np.full((len(attractors), 2, 2), np.nan)
-    for row, attractor in zip(multipliers, attractors, strict=True):
-        for k, pair in enumerate(attractor["multipliers"]):
-            row[k] = pair
-    closed = [a["points"][0] if a["n"] is not None else (np.nan, np.nan) for a in attractors]
-    fraction = np.array([a["fraction"] for a in attractors], dtype=float)
-    points = [(k + 1, *p) for k, a in enumerate(attractors) for p in a["points"]]
-    flat = np.array(points, dtype=float).reshape(-1, 3)
+    """The attractors with their shares of ``count`` starts, and their points, as variables."""
     one = "attractor"
-    flat[:, 2] = units.given(flat[:, 2], VELOCITY)
-    speed = units.given(np.array([c[1] for c in closed], dtype=float), VELOCITY)
-    of_velocity = {"units": units.of_velocity}
+    fraction = np.array([a["fraction"] for a in attractors], dtype=float)
     return {
-        "id": (one, np.arange(1, len(attractors) + 1, dtype=np.int32)),
-        "kind": (one, np.array([a["kind"] for a in attractors], dtype=str)),
-        "n": (one, np.array(column("n", 0), dtype=np.int32), {"comment": "0: no meaning"}),
-        "w": (one, np.array(column("w", 0), dtype=np.int32)),
-        "theta_point": (one, np.array([c[0] for c in closed], dtype=float), {"units": "rad"}),
-        "velocity_point": (one, speed, of_velocity),
-        "period": (one, measured("period", TIME), {"units": units.of_time}),
-        "exponent": (one, measured("exponent", RATE), {"units": units.of_rate}),
-        "exponent_stderr": (one, measured("exponent_stderr", RATE), {"units": units.of_rate}),
+        **orbit_table.table(attractors, units, one),
         "fraction": (one, fraction),
         "stderr": (one, np.sqrt(fraction * (1 - fraction) / max(count, 1))),
-        "twin": (
-            one,
-            np.array(column("twin", 0), dtype=np.int32),
-            {"comment": "number of the mirror image; its own where symmetric, 0 if not known"},
-        ),
-        "multipliers": ((one, "eigenvalue", "part"), multipliers, {"comment": "part: re, im"}),
-        "point_attractor": ("point", flat[:, 0].astype(np.int32)),
-        "point_theta": ("point", flat[:, 1], {"units": "rad"}),
-        "point_velocity": ("point", flat[:, 2], of_velocity),
     }

@@ -43,7 +43,7 @@ pub struct Attractor {
 }
 
 impl Attractor {
-    /// From a stable closed orbit.
+    /// From a closed orbit; one that does not attract is described alike.
     #[must_use]
     pub fn periodic(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Self {
         let period = orbit.n as f64 * pendulum.period();
@@ -86,6 +86,16 @@ impl Attractor {
             name: String::new(),
             twin: None,
         }
+    }
+
+    /// Whether all multipliers lie inside the unit circle; without damping, where none can, whether
+    /// they lie on it as a pair.
+    #[must_use]
+    pub fn is_stable(&self, pendulum: &Pendulum) -> bool {
+        if pendulum.is_dissipative() {
+            return self.multipliers.iter().all(|m| m.norm() < 1.0);
+        }
+        self.multipliers.iter().all(|m| m.im != 0.0)
     }
 
     /// Whether friction holds it: a set, not an orbit.

@@ -6,6 +6,7 @@
 //! - [`label`]: every start to the attractor that captures it
 //! - [`layers`]: turns and exponents over a fixed time
 //! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
+//! - [`orbits`]: all closed orbits of one period and winding
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
@@ -13,6 +14,7 @@ pub mod basins;
 pub mod control;
 pub mod label;
 pub mod layers;
+pub mod orbits;
 pub mod reliability;
 pub mod starts;
 pub mod texture;

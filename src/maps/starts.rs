@@ -37,7 +37,19 @@ impl Axis {
     /// The centre of cell `i`.
     #[must_use]
     pub fn centre(&self, i: usize) -> f64 {
-        self.low + (i as f64 + 0.5) * (self.high - self.low) / self.count as f64
+        self.between(i as f64)
+    }
+
+    /// The value so many cells after the centre of the first one.
+    #[must_use]
+    pub fn between(&self, cells: f64) -> f64 {
+        self.low + (cells + 0.5) * (self.high - self.low) / self.count as f64
+    }
+
+    /// Whether a value lies between the bounds.
+    #[must_use]
+    pub fn holds(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
     }
 }
 

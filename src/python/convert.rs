@@ -45,7 +45,7 @@ pub fn basin_map<'py>(py: Python<'py>, map: BasinMap) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-fn attractor_dict<'py>(
+pub fn attractor_dict<'py>(
     py: Python<'py>,
     attractor: &Attractor,
     fraction: f64,

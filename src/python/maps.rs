@@ -11,7 +11,7 @@ use crate::maps::basins::{Options, basins};
 use crate::maps::starts::{Axis, Starts};
 
 /// `(low, high, count)` as Python hands it over.
-type AxisTuple = (f64, f64, usize);
+pub type AxisTuple = (f64, f64, usize);
 
 /// Numerical choices as Python hands them over.
 #[derive(FromPyObject)]

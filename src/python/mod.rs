@@ -8,6 +8,7 @@ mod fit;
 mod library;
 mod maps;
 mod motion;
+mod orbits;
 mod watch;
 
 use pyo3::prelude::*;
@@ -116,6 +117,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(maps::basins_grid, module)?)?;
     module.add_function(wrap_pyfunction!(maps::basins_list, module)?)?;
+    module.add_function(wrap_pyfunction!(orbits::orbits, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_rows, module)?)?;

@@ -8,7 +8,8 @@
 //! - [`formulas`]: effects that users write; [`rewritten`]: the library's as such
 //! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_counts`]: parameters from records
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
-//! - [`tangent`], [`orbits`], [`bifurcations`]: derivatives, closed orbits, where they change
+//! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
+//!   they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
 //! - [`maps`], [`layers`], [`threads`]: whole planes
 //! - [`properties`]: what holds for every pendulum
@@ -36,6 +37,7 @@ mod input;
 mod lanes;
 mod layers;
 mod maps;
+mod orbit_search;
 mod orbits;
 mod order;
 mod properties;

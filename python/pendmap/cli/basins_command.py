@@ -118,29 +118,8 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _attractor(dataset: xr.Dataset, k: int) -> dict[str, Any]:
-    row = dataset.isel(attractor=k)
-    n = int(row["n"])
-    closed = n > 0
-    multipliers = [[float(x) for x in pair] for pair in row["multipliers"].values]
-    multipliers = [pair for pair in multipliers if pair[0] == pair[0]]
-    mine = dataset["point_attractor"].values == int(row["id"])
-    points = zip(
-        dataset["point_theta"].values[mine], dataset["point_velocity"].values[mine], strict=True
-    )
-    return {
-        "id": int(row["id"]),
-        "name": str(row["attractor"].values),
-        "kind": str(row["kind"].values),
-        "n": n if closed else None,
-        "w": int(row["w"]) if closed else None,
-        "theta": float(row["theta_point"]),
-        "velocity": float(row["velocity_point"]),
-        "points": [list(point) for point in points] if closed else None,
-        "multipliers": multipliers or None,
-        "exponent": float(row["exponent"]),
-        "exponent_stderr": float(row["exponent_stderr"]),
-        "period": float(row["period"]),
-        "fraction": float(row["fraction"]),
-        "stderr": float(row["stderr"]),
-        "twin": int(row["twin"]) or None,
-    }
+    from pendmap.orbit_table import row
+
+    own = dataset.isel(attractor=k)
+    shares = {name: float(own[name]) for name in ("fraction", "stderr")}
+    return row(dataset, "attractor", k) | shares

@@ -1,0 +1,93 @@
+"""The figure of closed orbits: their paths and stroboscopic points in the phase plane."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.lines import Line2D
+
+from pendmap.errors import InputError
+from pendmap.figures import style
+from pendmap.figures.sheet import Panel, Sheet
+from pendmap.model.units import VELOCITY, Units
+from pendmap.pictures import layers as layering
+from pendmap.pictures import orbits as drawn
+from pendmap.pictures import plane
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from pendmap.pictures.orbits import Closed
+
+__all__ = ["figure"]
+
+THETA = (-math.pi, math.pi)
+
+
+def figure(
+    dataset: xr.Dataset,
+    *,
+    layer: str | None,
+    size: tuple[float, float] | None,
+    dpi: float,
+    colormap: str | None,
+) -> Figure:
+    """Return the figure of closed orbits; see :func:`pendmap.figures.draw`."""
+    if layer is not None:
+        raise InputError(f"no layer {layer!r}: a figure of orbits has one part")
+    if colormap is not None:
+        raise InputError(f"colormap {colormap!r}: a figure of orbits has no colour map")
+    orbits = drawn.closed(dataset)
+    units = Units.of(dataset.attrs)
+    velocity = drawn.speeds(orbits, dataset)
+    low, high = (units.bare(end, VELOCITY) for end in velocity)
+    named = sorted(orbits, key=lambda one: one.id)[: drawn.MOST]
+    texts = [one.text for one in named]
+    handles: list[Any] = [_handle(one) for one in named]
+    if len(orbits) > len(named):
+        texts.append(f"and {len(orbits) - len(named)} more")
+        handles.append(Line2D([], [], linestyle="none"))
+    sheet = Sheet(
+        [Panel()],
+        ratio=min(max((high - low) / (2 * math.pi), 0.6), 1.1),
+        title=drawn.title(dataset),
+        subtitle=layering.parameters(dataset.attrs),
+        handles=handles,
+        texts=texts,
+        labels=(style.widest(*velocity), style.widest(*THETA, angle=True)),
+        size=size,
+        dpi=dpi,
+    )
+    axes = sheet.axes[0]
+    for one in orbits:
+        _orbit(axes, one)
+    style.phase_plane(axes, THETA, velocity, units)
+    return sheet.figure
+
+
+def _look(one: Closed) -> dict[str, Any]:
+    """Return how an orbit looks: full where it is stable; broken, and points empty, where not."""
+    return {
+        "color": one.colour,
+        "linestyle": "-" if one.stable else (0, (4.0, 2.0)),
+        "linewidth": 1.6 if one.stable else 1.0,
+        "marker": "o",
+        "markersize": 5.0,
+        "markeredgewidth": 1.0,
+        "markeredgecolor": style.INK,
+        "markerfacecolor": one.colour if one.stable else "white",
+    }
+
+
+def _handle(one: Closed) -> Line2D:
+    return Line2D([], [], **_look(one))
+
+
+def _orbit(axes: Axes, one: Closed) -> None:
+    look = _look(one)
+    axes.plot(one.path[:, 0], one.path[:, 1], **(look | {"marker": ""}))
+    at = plane.copies(one.points, *THETA)
+    axes.plot(at[:, 0], at[:, 1], zorder=4, clip_on=False, **(look | {"linestyle": "none"}))

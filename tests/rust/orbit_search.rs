@@ -1,0 +1,177 @@
+//! All closed orbits of a box, stable and not, against the known ones.
+
+use std::f64::consts::{PI, TAU};
+
+use pendmap::error::Error;
+use pendmap::integrate::accuracy::distance;
+use pendmap::maps::control::Control;
+use pendmap::maps::orbits::{Orbits, Request, orbits};
+use pendmap::maps::starts::Axis;
+use pendmap::model::Pendulum;
+use pendmap::orbit::newton::{RESIDUAL, find};
+use pendmap::orbit::{PeriodicOrbit, PoincareMap};
+
+use crate::support::{driven, undriven};
+use crate::truths::{attractors, list, number, truths};
+
+fn request(n: usize, w: i64, cells: usize) -> Request {
+    Request {
+        n,
+        w,
+        theta: Axis::new("theta", -PI, PI, cells).expect("an axis"),
+        velocity: Axis::new("velocity", -4.0, 4.0, cells).expect("an axis"),
+        threads: 0,
+    }
+}
+
+fn all(pendulum: &Pendulum, n: usize, w: i64) -> Orbits {
+    orbits(pendulum, &request(n, w, 120), &Control::default()).expect("a search")
+}
+
+fn same(a: &[PeriodicOrbit], b: &[PeriodicOrbit]) -> bool {
+    a.len() == b.len() && a.iter().all(|o| b.iter().any(|p| p.contains(o.points[0], 1e-9)))
+}
+
+#[test]
+fn every_known_attractor_is_among_them() {
+    for known in attractors() {
+        let found = all(&known.pendulum, known.n, known.w).closed;
+        let own = found.iter().find(|orbit| orbit.contains(known.points[0], 1e-9));
+        let own = own.unwrap_or_else(|| panic!("{:?} of {}", (known.n, known.w), found.len()));
+        assert!(own.is_stable() && own.residual < RESIDUAL);
+        for orbit in &found {
+            assert_eq!((orbit.n, orbit.w), (known.n, known.w));
+        }
+    }
+}
+
+#[test]
+fn a_rotation_has_its_saddle_and_no_orbit_stands_twice() {
+    // Born in one fold, the two are all rotations of period 1 in one sense.
+    let pendulum = driven(0.1, 1.0, 2.0);
+    let found = all(&pendulum, 1, 1).closed;
+    assert_eq!(found.len(), 2);
+    assert_eq!(found.iter().filter(|o| o.is_stable()).count(), 1);
+    let saddle = found.iter().find(|o| !o.is_stable()).expect("the other one");
+    assert!(saddle.multipliers.0[0].re > 1.0);
+    let mirrored = all(&pendulum, 1, -1).closed;
+    let images: Vec<PeriodicOrbit> = found.iter().map(|o| o.mirrored().0).collect();
+    assert!(same(&images, &mirrored));
+}
+
+#[test]
+fn a_finer_grid_finds_no_more() {
+    for (p, omega) in [(0.6, 2.0), (1.0, 2.0), (1.7, 0.87), (1.3, 1.8)] {
+        let pendulum = driven(0.1, p, omega);
+        for (n, w) in [(1, 0), (2, 0), (1, 1), (2, 1), (2, 2)] {
+            let [coarse, fine] = [120, 240].map(|cells| {
+                orbits(&pendulum, &request(n, w, cells), &Control::default()).expect("a search")
+            });
+            let counts = (coarse.closed.len(), fine.closed.len());
+            assert!(same(&coarse.closed, &fine.closed), "p = {p}, {:?}: {counts:?}", (n, w));
+        }
+    }
+}
+
+#[test]
+fn fixed_points_add_up() {
+    // On the cylinder the Lefschetz number of a map that every motion enters is 0: as many fixed
+    // points of index +1 as of index -1, all windings together.
+    for (gamma, p, omega) in [(0.1, 1.0, 2.0), (0.1, 1.7, 0.87), (0.2, 0.3, 1.4), (0.1, 2.0, 2.0)] {
+        let pendulum = driven(gamma, p, omega);
+        let mut sum = 0;
+        let mut count = 0;
+        for w in -4..=4 {
+            let mut box_of = request(1, w, 160);
+            box_of.velocity = Axis::new("velocity", -9.0, 9.0, 360).expect("an axis");
+            for orbit in orbits(&pendulum, &box_of, &Control::default()).expect("it").closed {
+                let m = orbit.monodromy[0];
+                let index = (1.0 - m.trace() + m.determinant()).signum();
+                sum += index as i32;
+                count += 1;
+            }
+        }
+        assert!(count >= 2, "hanging and upright rest at least");
+        assert_eq!(sum, 0, "{count} fixed points at p = {p}");
+    }
+}
+
+#[test]
+fn through_friction_the_known_ones_come_out() {
+    for (key, n, w) in [("rotation", 1, 1), ("oscillation", 2, 0)] {
+        for entry in list(&truths()["coulomb_forced"][key]) {
+            let value = |name: &str| number(&entry[name]);
+            let pendulum = driven(value("gamma"), value("p"), value("omega"))
+                .with_friction(value("theta_r"))
+                .expect("in range");
+            let found = all(&pendulum, n, w).closed;
+            let at = [value("theta"), value("v")];
+            let own = found.iter().find(|o| o.contains(at, 1e-8));
+            assert!(own.is_some_and(PeriodicOrbit::is_stable), "{key}: {at:?} of {}", found.len());
+            // What friction holds is a set, no orbit.
+            let held = |o: &PeriodicOrbit| o.points.iter().all(|p| p[1] == 0.0);
+            assert!(!found.iter().any(held));
+        }
+    }
+}
+
+#[test]
+fn without_drive_there_are_rests_and_the_running_state() {
+    let pendulum = undriven(0.1, 0.4);
+    let rests = all(&pendulum, 1, 0).closed;
+    let mut angles: Vec<f64> = rests.iter().map(|o| o.points[0][0]).collect();
+    angles.sort_by(f64::total_cmp);
+    let hanging = 0.4_f64.asin();
+    assert_eq!(angles.len(), 2);
+    assert!((angles[0] - hanging).abs() < 1e-10 && (angles[1] - (PI - hanging)).abs() < 1e-10);
+    let running = all(&pendulum, 1, 1).running;
+    assert_eq!(running.len(), 1);
+    assert!(all(&pendulum, 1, -1).running.is_empty());
+    assert!(all(&pendulum, 2, 1).running.is_empty());
+}
+
+#[test]
+fn a_box_limits_where_they_are_looked_for() {
+    let pendulum = driven(0.1, 1.0, 2.0);
+    let everywhere = all(&pendulum, 1, 1).closed;
+    let only = everywhere[0].points[0];
+    let mut small = request(1, 1, 20);
+    small.theta = Axis::new("theta", only[0] - 0.2, only[0] + 0.2, 20).expect("an axis");
+    small.velocity = Axis::new("velocity", only[1] - 0.2, only[1] + 0.2, 20).expect("an axis");
+    let found = orbits(&pendulum, &small, &Control::default()).expect("a search").closed;
+    assert_eq!(found.len(), 1);
+    assert!(found[0].contains(only, 1e-10));
+    // A turn further on it is the same box.
+    small.theta = Axis::new("theta", only[0] - 0.2 + TAU, only[0] + 0.2 + TAU, 20).expect("it");
+    let again = orbits(&pendulum, &small, &Control::default()).expect("a search").closed;
+    assert!(again.len() == 1 && distance(again[0].points[0], only) < 1e-9);
+}
+
+#[test]
+fn what_is_asked_for_wrongly_is_refused() {
+    let control = Control::default();
+    let pendulum = driven(0.1, 1.0, 2.0);
+    for n in [0, 65] {
+        let refused = orbits(&pendulum, &request(n, 0, 20), &control);
+        assert!(matches!(refused, Err(Error::Range { name: "n", .. })));
+    }
+    control.cancel();
+    assert!(matches!(orbits(&pendulum, &request(1, 0, 20), &control), Err(Error::Interrupted)));
+}
+
+#[test]
+fn newton_alone_finds_no_orbit_that_the_search_has_not() {
+    let pendulum = driven(0.1, 1.3, 2.0);
+    let map = PoincareMap::new(&pendulum);
+    let known = all(&pendulum, 2, 0).closed;
+    let mut met = 0;
+    for start in crate::support::spread(400, PI, 3.0) {
+        let Some(orbit) = find(&map, start, 2, f64::INFINITY) else { continue };
+        let inside = orbit.points.iter().any(|p| p[1].abs() < 4.0);
+        if (orbit.n, orbit.w) == (2, 0) && inside {
+            met += 1;
+            assert!(known.iter().any(|o| o.contains(orbit.points[0], 1e-8)), "{:?}", orbit.points);
+        }
+    }
+    assert!(met > 20 && !known.is_empty());
+}
