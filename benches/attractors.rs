@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use pendmap::attractor::Catalogue;
+use pendmap::attractor::{Catalogue, Effort};
 use pendmap::integrate::accuracy::choose;
 use pendmap::lanes::Path;
 use pendmap::maps::starts::{Axis, Starts};
@@ -30,7 +30,7 @@ fn search(criterion: &mut Criterion) {
         let (strobe, _) = choose(&pendulum, &starts, 1e-6, path).expect("steps");
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                let mut catalogue = Catalogue::new(&strobe);
+                let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
                 catalogue.search(&strobe, black_box(&starts), 1000, &AtomicBool::new(false));
                 assert_eq!(catalogue.attractors.len(), count, "attractors at {name}");
             });

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins, basins_of
     from pendmap.orbits import orbit
+    from pendmap.planes import parameter_map
     from pendmap.records import (
         Experiment,
         Finding,
@@ -68,6 +69,7 @@ __all__ = [
     "load_model",
     "noise_floor",
     "orbit",
+    "parameter_map",
     "read_experiment",
     "save",
     "save_model",
@@ -88,6 +90,7 @@ _HOMES = {
     "load": "store",
     "noise_floor": "records",
     "orbit": "orbits",
+    "parameter_map": "planes",
     "read_experiment": "records",
     "save": "store",
     "simulate": "trajectory",

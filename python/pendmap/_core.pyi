@@ -17,6 +17,8 @@ __all__ = [
     "fit_runs",
     "formula",
     "orbits",
+    "parameter_map",
+    "parameter_names",
     "period",
     "simd",
     "simd_available",
@@ -99,6 +101,17 @@ def orbits(
     winding: tuple[int, int],
     theta: _Axis,
     velocity: _Axis,
+    threads: int,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def parameter_names(parameters: _Parameters) -> list[str]: ...
+def parameter_map(
+    parameters: _Parameters,
+    axes: tuple[_Range, _Range],
+    theta: _Floats,
+    velocity: _Floats,
+    tol: float,
+    bound: int | None,
     threads: int,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...

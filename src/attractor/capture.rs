@@ -8,7 +8,7 @@ use super::trap::{Band, Ellipse};
 use crate::integrate::block::Block;
 use crate::integrate::{State, Strobe};
 use crate::lanes::sine::wrap;
-use crate::lanes::{Isa, Job, Lane, Real, dispatch};
+use crate::lanes::{Isa, Job, Lane, dispatch};
 
 /// All regions that capture.
 #[derive(Clone, Debug, Default)]
@@ -354,12 +354,23 @@ impl Job for Heights<'_> {
     type Output = f64;
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) -> f64 {
+        if self.height.len() == S::Few::WIDTH {
+            self.of::<S::Few>(isa)
+        } else {
+            self.of::<S::Lanes>(isa)
+        }
+    }
+}
+
+impl Heights<'_> {
+    #[inline(always)]
+    fn of<L: Lane>(self, token: L::Token) -> f64 {
         let mut lowest = f64::INFINITY;
         let mut at = 0;
         while at < self.height.len() {
-            let (half_turns, whole) = wrap(S::Lanes::load(isa, &self.block.half_turns[at..]));
-            let kick = S::Lanes::load(isa, &self.block.kick[at..]);
-            let mut height = S::Lanes::splat(isa, f64::INFINITY);
+            let (half_turns, whole) = wrap(L::load(token, &self.block.half_turns[at..]));
+            let kick = L::load(token, &self.block.kick[at..]);
+            let mut height = L::splat(token, f64::INFINITY);
             for e in self.ellipses {
                 let x = half_turns - half_turns.like(e.centre[0]);
                 let y = kick - half_turns.like(e.centre[1]);
@@ -368,13 +379,12 @@ impl Job for Heights<'_> {
                 height = y1.mul_add(y1, y2 * y2).min(height);
             }
             half_turns.store(&mut self.block.half_turns[at..]);
-            (S::Lanes::load(isa, &self.block.turns[at..]) + whole)
-                .store(&mut self.block.turns[at..]);
+            (L::load(token, &self.block.turns[at..]) + whole).store(&mut self.block.turns[at..]);
             height.store(&mut self.height[at..]);
-            for h in &self.height[at..at + S::Lanes::WIDTH] {
+            for h in &self.height[at..at + L::WIDTH] {
                 lowest = if *h < lowest { *h } else { lowest };
             }
-            at += S::Lanes::WIDTH;
+            at += L::WIDTH;
         }
         lowest
     }

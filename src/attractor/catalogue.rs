@@ -140,6 +140,12 @@ impl Attractor {
         }
     }
 
+    /// What stays when a catalogue is sorted anew: the bits of the first point.
+    #[must_use]
+    pub fn mark(&self) -> [u64; 2] {
+        self.points.first().map_or([0; 2], |p| p.map(f64::to_bits))
+    }
+
     /// Mean angle of the cycle's points, each wrapped; its sign tells asymmetric twins apart.
     fn lean(&self) -> f64 {
         self.points.iter().map(|p| p[0]).sum::<f64>() / self.points.len().max(1) as f64

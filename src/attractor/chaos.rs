@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::find::LONGEST_CYCLE;
+use super::effort::Effort;
 use super::kind::Kind;
 use super::trap::Band;
 use crate::integrate::Strobe;
@@ -12,14 +12,10 @@ use crate::integrate::accuracy::distance;
 use crate::integrate::block::Block;
 use crate::integrate::stroboscopic::State;
 
-/// Cells of the occupancy picture along the angle and along the velocity.
-const CELLS: [usize; 2] = [96, 96];
 /// Stroboscopic points that are kept as a picture of the set.
 const KEPT: usize = 2000;
 /// Trajectories that draw the curve of a quasi-periodic set.
 const CURVES: usize = 32;
-/// Periods over which turns over the top are watched step by step.
-const WATCHED: usize = 400;
 /// Trajectories that are watched so.
 const FOLLOWED: usize = 16;
 /// An exponent this many standard errors above zero is positive.
@@ -52,19 +48,20 @@ pub struct ChaoticSet {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     occupied: Vec<bool>,
+    side: usize,
     speed: f64,
 }
 
 impl Region {
-    fn new(speed: f64) -> Self {
-        Self { occupied: vec![false; CELLS[0] * CELLS[1]], speed }
+    fn new(side: usize, speed: f64) -> Self {
+        Self { occupied: vec![false; side * side], side, speed }
     }
 
     fn cell(&self, state: State) -> Option<usize> {
-        let x = (state[0] / TAU + 0.5).rem_euclid(1.0) * CELLS[0] as f64;
-        let y = (0.5 * state[1] / self.speed + 0.5) * CELLS[1] as f64;
-        let inside = y >= 0.0 && y < CELLS[1] as f64;
-        inside.then(|| y as usize * CELLS[0] + (x as usize).min(CELLS[0] - 1))
+        let x = (state[0] / TAU + 0.5).rem_euclid(1.0) * self.side as f64;
+        let y = (0.5 * state[1] / self.speed + 0.5) * self.side as f64;
+        let inside = y >= 0.0 && y < self.side as f64;
+        inside.then(|| y as usize * self.side + (x as usize).min(self.side - 1))
     }
 
     fn mark(&mut self, state: State) {
@@ -109,12 +106,13 @@ pub fn sets(
     states: &[State],
     lost: &[bool],
     watch: usize,
+    effort: &Effort,
     cancel: &AtomicBool,
 ) -> Vec<ChaoticSet> {
-    let Some(walks) = walk(strobe, states, watch, cancel) else { return Vec::new() };
+    let Some(walks) = walk(strobe, states, watch, effort.cells, cancel) else { return Vec::new() };
     let mut groups: Vec<(Vec<usize>, Region)> = Vec::new();
     for (i, walk) in walks.iter().enumerate() {
-        if walk.closes() || 2 * walk.outside > watch {
+        if walk.closes(effort.longest_cycle) || 2 * walk.outside > watch {
             continue;
         }
         let mut joined = (vec![i], walk.region.clone());
@@ -137,7 +135,7 @@ pub fn sets(
         .filter(|(members, _)| !members.iter().any(|i| lost[*i]))
         .filter_map(|(members, region)| {
             let walks: Vec<&Walk> = members.iter().map(|i| &walks[*i]).collect();
-            describe(strobe, &walks, region, watch)
+            describe(strobe, &walks, region, watch, effort)
         })
         .collect()
 }
@@ -157,8 +155,8 @@ struct Walk {
 impl Walk {
     /// Whether it repeats itself: a start exactly on an orbit that does not attract, such as upright
     /// or hanging rest, stays there for want of a perturbation.
-    fn closes(&self) -> bool {
-        (1..=LONGEST_CYCLE).any(|n| {
+    fn closes(&self, longest: usize) -> bool {
+        (1..=longest).any(|n| {
             self.points.len() > 2 * n
                 && self.points.iter().zip(&self.points[n..]).all(|(a, b)| distance(*a, *b) < SAME)
         })
@@ -170,6 +168,7 @@ fn walk(
     strobe: &Strobe,
     states: &[State],
     periods: usize,
+    side: usize,
     cancel: &AtomicBool,
 ) -> Option<Vec<Walk>> {
     let count = states.len();
@@ -182,7 +181,7 @@ fn walk(
     let mut walks: Vec<Walk> = states
         .iter()
         .map(|_| Walk {
-            region: Region::new(speed),
+            region: Region::new(side, speed),
             points: Vec::new(),
             turns: 0.0,
             outside: 0,
@@ -228,6 +227,7 @@ fn describe(
     members: &[&Walk],
     region: Region,
     watch: usize,
+    effort: &Effort,
 ) -> Option<ChaoticSet> {
     if strobe.pendulum.is_autonomous() {
         // A flow in the plane has no chaos; what is left here has not settled yet.
@@ -261,7 +261,7 @@ fn describe(
     if mean < floor.max(SIGNIFICANCE * stderr) {
         return None;
     }
-    let (kind, sense) = turns_over_the_top(strobe, members);
+    let (kind, sense) = turns_over_the_top(strobe, members, effort.turning);
     Some(ChaoticSet {
         kind,
         sense,
@@ -284,7 +284,7 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
 }
 
 /// Follows the members step by step: passages over the top in one sense, both, or none.
-fn turns_over_the_top(strobe: &Strobe, members: &[&Walk]) -> (Kind, i64) {
+fn turns_over_the_top(strobe: &Strobe, members: &[&Walk], periods: usize) -> (Kind, i64) {
     let ends: Vec<State> = members.iter().filter_map(|m| m.points.last().copied()).collect();
     let (theta, velocity): (Vec<f64>, Vec<f64>) = ends.iter().map(|s| (s[0], s[1])).unzip();
     let width = strobe.block_width(FOLLOWED);
@@ -296,7 +296,7 @@ fn turns_over_the_top(strobe: &Strobe, members: &[&Walk]) -> (Kind, i64) {
     let mut last: Vec<i64> = block.half_turns[..followed].iter().map(|x| well(*x)).collect();
     let mut before = vec![None::<i64>; followed];
     let mut turned = vec![[false; 2]; followed];
-    for _ in 0..WATCHED {
+    for _ in 0..periods {
         for k in 0..strobe.steps() {
             strobe.step(&mut block, k);
             for i in 0..followed {

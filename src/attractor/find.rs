@@ -5,36 +5,36 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::capture::{self, Fate, Traps};
 use super::catalogue::{Attractor, arrange};
 use super::chaos::{self, ChaoticSet, Region};
+use super::effort::Effort;
 use super::kind::Kind;
 use super::rest;
+use super::returns::{escape_speed, near_returns, nearest_return, tracks};
 use super::trap::{self, Band, Ellipse, ellipses};
-use crate::integrate::accuracy::{distance, wrapped};
+use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, Strobe};
-use crate::model::effects::Action;
-use crate::model::{Effect, Pendulum};
+use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
 
-/// Longest cycle that is looked for, in forcing periods.
-pub const LONGEST_CYCLE: usize = 32;
-/// Stroboscopic points that come back this near are taken to Newton's method.
-const NEAR: f64 = 0.03;
 /// Newton's method may not wander further than this from where the trajectory was.
 const REACH: f64 = 0.3;
-/// Failures of Newton's method after which a round gives up.
-const TRIES: usize = 24;
-/// Periods before the first cycle test; each later round is twice as long as the one before.
-const FIRST_ROUND: u32 = 32;
-/// Trajectories that nothing has captured are watched for this many times the first bound more.
-pub const WATCH: u32 = 4;
 /// Damping must shrink a motion by this power of e, were it not driven, before what is left can be
 /// called chaos.
 const LEAST_DECAY: f64 = 20.0;
-/// So many times faster than the drive and gravity no resonance with either can hold a rotation.
-const ESCAPE: f64 = 10.0;
-/// Of the trajectories left over, so many are watched.
-const WATCHED: usize = 256;
+/// Points nearer than this are of one orbit.
+const SAME: f64 = 1e-6;
+
+/// How a start of a search ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ending {
+    /// Nothing has captured it.
+    Open(State),
+    /// On the attractor with this [`Attractor::mark`].
+    Captured([u64; 2]),
+    /// Left the range of numbers, or gains speed for ever.
+    Failed,
+}
 
 /// What a search has found so far.
 #[derive(Clone, Debug)]
@@ -47,6 +47,7 @@ pub struct Catalogue {
     pub regions: Vec<(usize, Region)>,
     /// Longest time to capture that the searches saw, in periods.
     pub longest_settle: u32,
+    effort: Effort,
     orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
     rotations: Vec<(Rotation, Option<Band>)>,
     rests: Vec<f64>,
@@ -56,7 +57,7 @@ pub struct Catalogue {
 impl Catalogue {
     /// What is known without a search: the running states of an undriven pendulum.
     #[must_use]
-    pub fn new(strobe: &Strobe) -> Self {
+    pub fn new(strobe: &Strobe, effort: Effort) -> Self {
         let band = |r: &Rotation| Band::around(strobe, &r.curve, 0);
         let rotations = running_states(&strobe.pendulum);
         let mut empty = Self {
@@ -64,6 +65,7 @@ impl Catalogue {
             traps: Traps::default(),
             regions: Vec::new(),
             longest_settle: 0,
+            effort,
             orbits: Vec::new(),
             rotations: rotations.into_iter().map(|r| (r.clone(), band(&r))).collect(),
             rests: rest::centres(&strobe.pendulum),
@@ -73,12 +75,7 @@ impl Catalogue {
         empty
     }
 
-    /// Searches from `starts`: every trajectory runs until a known attractor captures it, it is
-    /// found to close on a new one, or `bound` periods are over.
-    ///
-    /// Those left over are watched for four times as long again. If then still none of a
-    /// set of them has been captured and their exponent is positive, the set is a chaotic attractor;
-    /// else they stay undecided. Returns whether anything new was found.
+    /// Searches from `starts`; see [`Catalogue::endings`]. Returns whether anything new was found.
     pub fn search(
         &mut self,
         strobe: &Strobe,
@@ -86,53 +83,111 @@ impl Catalogue {
         bound: u32,
         cancel: &AtomicBool,
     ) -> bool {
-        if !strobe.pendulum.is_dissipative() {
-            return false;
-        }
         let known = self.attractors.len();
-        let map = PoincareMap::new(&strobe.pendulum);
-        let mut alive: Vec<State> = starts.to_vec();
-        let fastest = escape_speed(&strobe.pendulum);
-        let (mut elapsed, mut round) = (0, FIRST_ROUND);
-        while elapsed < bound && !alive.is_empty() && !cancel.load(Ordering::Relaxed) {
-            let length = round.min(bound - elapsed);
-            alive = self.run(strobe, &alive, length, elapsed, cancel);
-            alive.retain(|state| state[1].abs() <= fastest);
-            elapsed += length;
-            round *= 2;
-            if self.find_cycles(strobe, &map, &alive, cancel) {
-                // What the new traps hold is captured at once.
-                alive = self.run(strobe, &alive, FIRST_ROUND, elapsed, cancel);
-            }
-        }
-        if !alive.is_empty() && !cancel.load(Ordering::Relaxed) {
-            self.watch(strobe, &alive, bound, cancel);
-        }
+        self.endings(strobe, starts, bound, cancel);
         self.attractors.len() > known
     }
 
-    /// Advances `alive` by `length` periods; those still free come back.
+    /// Searches from `starts`: every trajectory runs until a known attractor captures it, it is
+    /// found to close on a new one, or `bound` periods are over.
+    ///
+    /// Those left over are watched for some times as long again ([`Effort::watch`]). If then still
+    /// none of a set of them has been captured and their exponent is positive, the set is a chaotic
+    /// attractor; else they stay undecided. Returns how each start ended.
+    pub fn endings(
+        &mut self,
+        strobe: &Strobe,
+        starts: &[State],
+        bound: u32,
+        cancel: &AtomicBool,
+    ) -> Vec<Ending> {
+        let mut endings: Vec<Ending> = starts.iter().map(|s| Ending::Open(*s)).collect();
+        if !strobe.pendulum.is_dissipative() {
+            return endings;
+        }
+        let map = self.map(strobe);
+        let fastest = escape_speed(&strobe.pendulum);
+        let (mut elapsed, mut round) = (0, self.effort.first_round);
+        let mut alive = !starts.is_empty();
+        while elapsed < bound && alive && !cancel.load(Ordering::Relaxed) {
+            let length = round.min(bound - elapsed);
+            self.run(strobe, &mut endings, length, elapsed, cancel);
+            for ending in &mut endings {
+                if matches!(ending, Ending::Open(state) if state[1].abs() > fastest) {
+                    *ending = Ending::Failed;
+                }
+            }
+            elapsed += length;
+            round *= 2;
+            let free = open(&endings);
+            if self.find_cycles(strobe, &map, &free, cancel) {
+                // What the new traps hold is captured at once.
+                self.run(strobe, &mut endings, self.effort.first_round, elapsed, cancel);
+            }
+            alive = endings.iter().any(|e| matches!(e, Ending::Open(_)));
+        }
+        if alive && !cancel.load(Ordering::Relaxed) {
+            self.watch(strobe, &open(&endings), bound, cancel);
+        }
+        endings
+    }
+
+    /// Newton's method from points of orbits of a pendulum that is nearly this one, each with its period;
+    /// those from which it finds no orbit that attracts come back.
+    pub fn take_over(
+        &mut self,
+        strobe: &Strobe,
+        orbits: &[(State, usize)],
+        cancel: &AtomicBool,
+    ) -> Vec<State> {
+        let map = self.map(strobe);
+        let mut left = Vec::new();
+        for (point, n) in orbits {
+            let orbit = newton::find(&map, *point, *n, REACH).filter(|o| attracts(strobe, o));
+            match orbit {
+                Some(orbit) if self.knows(&orbit) => {}
+                Some(orbit) => {
+                    self.admit(strobe, orbit, cancel);
+                }
+                None => left.push(*point),
+            }
+        }
+        self.rebuild(&strobe.pendulum);
+        left
+    }
+
+    /// The map that orbits close under.
+    fn map(&self, strobe: &Strobe) -> PoincareMap {
+        if self.effort.precise {
+            PoincareMap::new(&strobe.pendulum)
+        } else {
+            PoincareMap::of_steps(strobe)
+        }
+    }
+
+    /// Advances the open ones of `endings` by `length` periods.
     fn run(
         &mut self,
         strobe: &Strobe,
-        alive: &[State],
+        endings: &mut [Ending],
         length: u32,
         elapsed: u32,
         cancel: &AtomicBool,
-    ) -> Vec<State> {
+    ) {
+        let alive = open(endings);
         let outcomes =
-            capture::outcomes(strobe, &self.traps, length, alive, cancel).unwrap_or_default();
-        let mut free = Vec::new();
-        for outcome in outcomes {
-            match outcome.fate {
-                Fate::Open => free.push(outcome.state),
-                Fate::Captured(_) => {
+            capture::outcomes(strobe, &self.traps, length, &alive, cancel).unwrap_or_default();
+        let free = endings.iter_mut().filter(|e| matches!(e, Ending::Open(_)));
+        for (ending, outcome) in free.zip(outcomes) {
+            *ending = match outcome.fate {
+                Fate::Open => Ending::Open(outcome.state),
+                Fate::Captured(attractor) => {
                     self.longest_settle = self.longest_settle.max(elapsed + outcome.periods);
+                    Ending::Captured(self.attractors[attractor].mark())
                 }
-                Fate::Failed => {}
-            }
+                Fate::Failed => Ending::Failed,
+            };
         }
-        free
     }
 
     /// Looks for cycles that the trajectories close in on; whether a new one was found.
@@ -146,22 +201,11 @@ impl Catalogue {
         alive: &[State],
         cancel: &AtomicBool,
     ) -> bool {
-        let mut returns: Vec<(f64, State, usize)> = Vec::new();
-        for track in tracks(strobe, alive) {
-            if strobe.friction && track.iter().all(|state| state[1] == 0.0) {
-                // Held at every period's end: no orbit, and every n would fit.
-                continue;
-            }
-            let near = (1..=LONGEST_CYCLE)
-                .map(|n| (distance(track[n], track[0]), track[0], n))
-                .filter(|r| r.0 < NEAR);
-            returns.extend(near);
-        }
-        returns.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        let returns = near_returns(strobe, alive, self.effort.longest_cycle);
         let (mut found, mut tries) = (Vec::new(), 0);
         for (_, start, n) in returns {
             let held = |e: &Ellipse| e.height([wrapped(start[0]), start[1]]) < 1.0;
-            if tries == TRIES || cancel.load(Ordering::Relaxed) {
+            if tries == self.effort.tries || cancel.load(Ordering::Relaxed) {
                 break;
             }
             if found.iter().any(held) {
@@ -169,11 +213,7 @@ impl Catalogue {
             }
             tries += 1;
             let Some(orbit) = newton::find(map, start, n, REACH) else { continue };
-            let held = |p: &State| p[1] == 0.0 && strobe.equation.holds_for_ever(p[0]);
-            if !orbit.is_stable()
-                || (strobe.friction && orbit.points.iter().any(held))
-                || self.orbits.iter().any(|(o, _)| o.contains(orbit.points[0], 1e-6))
-            {
+            if !attracts(strobe, &orbit) || self.knows(&orbit) {
                 continue;
             }
             let traps = self.admit(strobe, orbit, cancel);
@@ -195,14 +235,14 @@ impl Catalogue {
         orbit: PeriodicOrbit,
         cancel: &AtomicBool,
     ) -> Vec<Ellipse> {
-        let own = ellipses(strobe, &orbit, cancel);
+        let own = ellipses(strobe, &orbit, &self.effort.trap, cancel);
         if own.is_empty() {
             return own;
         }
         let mut traps = own.clone();
         let (image, moved) = orbit.mirrored();
         let symmetric = strobe.pendulum.is_mirror_symmetric();
-        if symmetric && !orbit.contains(image.points[0], 1e-6) {
+        if symmetric && !orbit.contains(image.points[0], SAME) {
             let twins = trap::mirrored(&own, moved);
             traps.extend(&twins);
             self.orbits.push((image, twins));
@@ -213,9 +253,9 @@ impl Catalogue {
 
     /// Decides what the trajectories that nothing captured are.
     fn watch(&mut self, strobe: &Strobe, alive: &[State], bound: u32, cancel: &AtomicBool) {
-        let stride = alive.len().div_ceil(WATCHED);
+        let stride = alive.len().div_ceil(self.effort.watched);
         let sample: Vec<State> = alive.iter().step_by(stride).copied().collect();
-        let length = WATCH * bound;
+        let length = self.effort.watch * bound;
         // Nearly conservative motion takes longer than this to show where it ends.
         let watched = strobe.pendulum.period() * f64::from(bound + length);
         if strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
@@ -228,10 +268,11 @@ impl Catalogue {
         if lost.iter().all(|l| *l) {
             return;
         }
-        let new: Vec<ChaoticSet> = chaos::sets(strobe, &sample, &lost, length as usize, cancel)
-            .into_iter()
-            .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
-            .collect();
+        let new: Vec<ChaoticSet> =
+            chaos::sets(strobe, &sample, &lost, length as usize, &self.effort, cancel)
+                .into_iter()
+                .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
+                .collect();
         if !new.is_empty() {
             self.sets.extend(new);
             self.rebuild(&strobe.pendulum);
@@ -269,6 +310,11 @@ impl Catalogue {
         self.regions = regions;
     }
 
+    /// Whether this orbit is one of those found.
+    fn knows(&self, orbit: &PeriodicOrbit) -> bool {
+        self.orbits.iter().any(|(o, _)| o.contains(orbit.points[0], SAME))
+    }
+
     /// The index of the one chaotic attractor, if there is no other attractor at all.
     #[must_use]
     pub fn only_chaos(&self) -> Option<usize> {
@@ -282,6 +328,26 @@ impl Catalogue {
     #[must_use]
     pub fn has_chaos(&self) -> bool {
         self.attractors.iter().any(|a| a.kind.is_chaotic())
+    }
+
+    /// The attractors that open trajectories belong to, where Newton's method from a near return leads to
+    /// a known orbit, or the region of a known set holds the last points.
+    #[must_use]
+    pub fn place(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
+        let map = self.map(strobe);
+        let longest = self.effort.longest_cycle;
+        let place = |track: &Vec<State>| {
+            let nearest = nearest_return(track, longest);
+            let orbit = nearest.and_then(|(_, start, n)| newton::find(&map, start, n, REACH));
+            let known = orbit.and_then(|orbit| {
+                let own = |a: &Attractor| {
+                    a.n.is_some() && a.points.iter().any(|p| orbit.contains(*p, SAME))
+                };
+                self.attractors.iter().position(own)
+            });
+            known.or_else(|| self.region_of(&track[1..]))
+        };
+        tracks(strobe, states, longest).iter().map(place).collect()
     }
 
     /// The attractor without trap in whose region a trajectory's last points lie.
@@ -300,34 +366,17 @@ impl ChaoticSet {
     }
 }
 
-/// The speed at which nothing holds a rotation back any more: where the torque is greater than all
-/// friction and nothing grows with the velocity, faster motions gain speed for ever. Infinite
-/// otherwise.
-fn escape_speed(pendulum: &Pendulum) -> f64 {
-    let constant = |e: &Effect| {
-        !e.is(&[Action::Velocity, Action::Kinked, Action::SlidingFriction, Action::LoadedFriction])
-    };
-    let held = pendulum.gamma > 0.0
-        || !pendulum.effects.iter().all(constant)
-        || pendulum.torque.abs() <= pendulum.equation().hold(0.0);
-    if held {
-        return f64::INFINITY;
-    }
-    ESCAPE * (pendulum.motion().omega + pendulum.greatest_pull().sqrt())
+/// Whether an orbit is stable, and none of its points one that friction holds for ever.
+fn attracts(strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
+    let held = |p: &State| p[1] == 0.0 && strobe.equation.holds_for_ever(p[0]);
+    orbit.is_stable() && !(strobe.friction && orbit.points.iter().any(held))
 }
 
-/// The next stroboscopic points of each trajectory, its own first.
-fn tracks(strobe: &Strobe, states: &[State]) -> Vec<Vec<State>> {
-    let mut theta: Vec<f64> = states.iter().map(|s| s[0]).collect();
-    let mut velocity: Vec<f64> = states.iter().map(|s| s[1]).collect();
-    let mut turns = vec![0.0; states.len()];
-    let mut tracks: Vec<Vec<State>> = states.iter().map(|s| vec![*s]).collect();
-    for _ in 0..LONGEST_CYCLE {
-        // Lengths agree, so this cannot fail.
-        let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
-        for (track, (a, b)) in tracks.iter_mut().zip(theta.iter().zip(&velocity)) {
-            track.push([*a, *b]);
-        }
-    }
-    tracks
+/// The states that nothing has captured.
+fn open(endings: &[Ending]) -> Vec<State> {
+    let state = |ending: &Ending| match ending {
+        Ending::Open(state) => Some(*state),
+        _ => None,
+    };
+    endings.iter().filter_map(state).collect()
 }

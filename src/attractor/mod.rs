@@ -1,6 +1,7 @@
 //! Attractors: how they are found, told apart, named and recognised.
 //!
 //! - [`find`]: the search, from starts to a catalogue
+//! - [`effort`]: how much that spends
 //! - [`kind`]: what a motion looks like
 //! - [`catalogue`]: keys, names, twins
 //! - [`trap`]: regions that nothing leaves
@@ -10,11 +11,14 @@
 pub mod capture;
 pub mod catalogue;
 pub mod chaos;
+pub mod effort;
 pub mod find;
 pub mod kind;
 mod rest;
+mod returns;
 pub mod trap;
 
 pub use catalogue::Attractor;
-pub use find::Catalogue;
+pub use effort::Effort;
+pub use find::{Catalogue, Ending};
 pub use kind::Kind;

@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
+use super::effort::Sampling;
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, Strobe};
 use crate::orbit::PeriodicOrbit;
@@ -41,15 +42,9 @@ impl Ellipse {
     }
 }
 
-/// Points of a cycle that get an ellipse.
-const MOST_POINTS: usize = 8;
-/// Directions that are sampled.
-const RAYS: usize = 64;
-/// Levels that are sampled, each `RATIO` of the one before in radius.
+/// Half widths of a band that are sampled, each `RATIO` of the one before.
 const LEVELS: usize = 54;
 const RATIO: f64 = 0.82;
-/// Returns after which a sample must be lower: any of these will do.
-const RETURNS: [usize; 4] = [1, 2, 3, 4];
 /// Of the linear shrinking, so much must be left in the nonlinear map.
 const LEFT: f64 = 0.2;
 /// Ellipses need not shrink faster than this, however strong the damping.
@@ -62,22 +57,30 @@ const MARGIN: f64 = 0.9;
 /// The ellipses of the points of `orbit`, empty where sampling finds no level that is safe or
 /// `cancel` was set.
 ///
-/// Of long cycles the first eight points will do: a trajectory passes there once a cycle.
 /// Ellipses that cross `theta = pi` stand a second time, one turn on.
 #[must_use]
-pub fn ellipses(strobe: &Strobe, orbit: &PeriodicOrbit, cancel: &AtomicBool) -> Vec<Ellipse> {
+pub fn ellipses(
+    strobe: &Strobe,
+    orbit: &PeriodicOrbit,
+    sampling: &Sampling,
+    cancel: &AtomicBool,
+) -> Vec<Ellipse> {
     let mut traps = Vec::new();
     let shrink = orbit.multipliers.largest().sqrt().max(LEAST_SHRINK);
     let lower = 1.0 - LEFT * (1.0 - shrink);
     let points = orbit.points.iter().zip(&orbit.monodromy).enumerate();
-    for (point, (centre, monodromy)) in points.take(MOST_POINTS) {
+    for (point, (centre, monodromy)) in points.take(sampling.points) {
         let Some(root) = lyapunov_root(&(monodromy / shrink)) else { return Vec::new() };
         if cancel.load(Ordering::Relaxed) {
             return Vec::new();
         }
-        let Some(radius) = safe_radius(strobe, orbit.n, *centre, &root, lower) else {
-            return Vec::new();
-        };
+        let widest = 3.0 / extent(&root);
+        let part = sampling.ratio.powi(sampling.levels as i32);
+        let from = |round: usize| widest * part.powi(round as i32);
+        let radius = (0..sampling.rounds).find_map(|round| {
+            safe_radius(strobe, orbit.n, *centre, &root, lower, sampling, from(round))
+        });
+        let Some(radius) = radius else { return Vec::new() };
         let shape = root.map(|x| x / radius);
         let reach = radius * extent(&root);
         for turn in [-TAU, 0.0, TAU] {
@@ -130,22 +133,24 @@ fn extent(root: &[f64; 3]) -> f64 {
     (1.0 + (b / c).powi(2)).sqrt() / a
 }
 
-/// The largest sampled radius within which every sample comes back lower.
+/// The largest radius from `widest` inwards within which every sample comes back lower.
 fn safe_radius(
     strobe: &Strobe,
     n: usize,
     centre: State,
     root: &[f64; 3],
     lower: f64,
+    sampling: &Sampling,
+    widest: f64,
 ) -> Option<f64> {
     let [a, b, c] = *root;
-    let widest = 3.0 / extent(root);
-    let radii: Vec<f64> = (0..LEVELS).map(|k| widest * RATIO.powi(k as i32)).collect();
-    let count = RAYS * LEVELS;
+    let Sampling { rays, levels, ratio, returns, .. } = *sampling;
+    let radii: Vec<f64> = (0..levels).map(|k| widest * ratio.powi(k as i32)).collect();
+    let count = rays * levels;
     let (mut theta, mut velocity) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for radius in &radii {
-        for ray in 0..RAYS {
-            let angle = TAU * (ray as f64 + 0.5) / RAYS as f64;
+        for ray in 0..rays {
+            let angle = TAU * (ray as f64 + 0.5) / rays as f64;
             let dv = radius * angle.sin() / c;
             theta.push(centre[0] + (radius * angle.cos() - b * dv) / a);
             velocity.push(centre[1] + dv);
@@ -153,16 +158,16 @@ fn safe_radius(
     }
     let mut turns = vec![0.0; count];
     let mut best: Option<f64> = None;
-    for _ in RETURNS {
+    for _ in 0..returns {
         strobe.advance(&mut theta, &mut velocity, &mut turns, n).ok()?;
         let height = |i: usize| {
             let (x, y) = (wrapped(theta[i] - centre[0]), velocity[i] - centre[1]);
             (a * x + b * y).hypot(c * y)
         };
         // From the smallest level outward, up to the first one with a sample that rises.
-        let safe = (0..LEVELS)
+        let safe = (0..levels)
             .rev()
-            .take_while(|k| (0..RAYS).all(|ray| height(k * RAYS + ray) < lower * radii[*k]))
+            .take_while(|k| (0..rays).all(|ray| height(k * rays + ray) < lower * radii[*k]))
             .last();
         if let Some(k) = safe {
             let radius = MARGIN * radii[k];

@@ -8,7 +8,7 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
-use super::runner::Runner;
+use super::runner::{Runner, smooth};
 use super::stroboscopic::Strobe;
 use super::ticket::Ticket;
 use crate::lanes::sine::wrap;
@@ -105,12 +105,13 @@ impl Block {
 }
 
 impl Strobe {
-    /// Number of trajectories of a block for `count` of them: one bundle of lanes, or with events so
-    /// many that those of a step fill the lanes of their queue.
+    /// Number of trajectories of a block for `count` of them: one bundle of lanes, a small one for a
+    /// handful, or with events so many that those of a step fill the lanes of their queue.
     #[must_use]
     pub fn block_width(&self, count: usize) -> usize {
-        let [wide, both] = dispatch::run(self.path, Widths);
+        let [few, wide, both] = dispatch::run(self.path, Widths);
         match (self.route, self.events, self.extra) {
+            (Route::Smooth, false, false) if count <= few => few,
             (Route::Smooth, false, false) => wide,
             (_, true, _) => count.clamp(1, WITH_EVENTS).next_multiple_of(both),
             _ => both,
@@ -133,16 +134,17 @@ impl Strobe {
     }
 }
 
-/// The width of a bundle, and the least that holds whole bundles of either kind.
+/// The width of a small bundle and of a whole one, and the least that holds whole bundles of
+/// either kind.
 struct Widths;
 
 impl Job for Widths {
-    type Output = [usize; 2];
+    type Output = [usize; 3];
     #[inline(always)]
-    fn run<S: Isa>(self, _: S) -> [usize; 2] {
+    fn run<S: Isa>(self, _: S) -> [usize; 3] {
         let (wide, narrow) = (S::Lanes::WIDTH, S::Narrow::WIDTH);
         let both = (1..=narrow).map(|k| k * wide).find(|w| w % narrow == 0);
-        [wide, both.unwrap_or(wide * narrow)]
+        [S::Few::WIDTH, wide, both.unwrap_or(wide * narrow)]
     }
 }
 
@@ -156,8 +158,12 @@ impl Job for Steps<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
-        let runner = Runner::<S::Lanes, S::Narrow>::new(self.strobe, (isa, isa));
-        runner.run(self.block, self.range);
+        let Self { strobe, block, range } = self;
+        if block.kick.len() == S::Few::WIDTH && strobe.route == Route::Smooth && !strobe.extra {
+            smooth::<S::Few>(strobe, isa, block, range);
+            return;
+        }
+        Runner::<S::Lanes, S::Narrow>::new(strobe, (isa, isa)).run(block, range);
     }
 }
 

@@ -7,7 +7,7 @@ use super::stroboscopic::{Strobe, same_length};
 use super::tangent::Tangent;
 use crate::error::Error;
 use crate::lanes::sine::{Fine, wrap};
-use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, Real, dispatch};
+use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
 use crate::model::pendulum::Route;
 
 /// Distance of a state's shadow: its square and rounding over it are as small.
@@ -115,8 +115,19 @@ impl Job for Stretch<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
+        if self.turns.len() <= S::Few::WIDTH {
+            self.of::<S::Few>(isa)
+        } else {
+            self.of::<S::Narrow>(isa)
+        }
+    }
+}
+
+impl Stretch<'_> {
+    #[inline(always)]
+    fn of<L: Lane>(self, token: L::Token) {
         let schedule = &self.strobe.schedule;
-        let width = S::Narrow::WIDTH;
+        let width = L::WIDTH;
         let mut buffers: [Buffer; 5] = std::array::from_fn(|_| Buffer::default());
         let mut start = 0;
         while start < self.turns.len() {
@@ -129,18 +140,18 @@ impl Job for Stretch<'_> {
             let mut product = [1.0; MAX_WIDTH];
             for _ in 0..self.periods {
                 let theta = Tangent {
-                    value: S::Narrow::load(isa, &buffers[0].0),
-                    slope: [S::Narrow::load(isa, &buffers[3].0)],
+                    value: L::load(token, &buffers[0].0),
+                    slope: [L::load(token, &buffers[3].0)],
                 };
                 let velocity = Tangent {
-                    value: S::Narrow::load(isa, &buffers[1].0),
-                    slope: [S::Narrow::load(isa, &buffers[4].0)],
+                    value: L::load(token, &buffers[1].0),
+                    slope: [L::load(token, &buffers[4].0)],
                 };
                 let mut lanes = Moving::new(schedule, theta, velocity);
                 lanes.run::<Fine>(schedule);
                 let velocity = lanes.velocity(schedule);
                 let (wrapped, whole) = wrap(lanes.half_turns.value);
-                let turns = S::Narrow::load(isa, &buffers[2].0) + whole;
+                let turns = L::load(token, &buffers[2].0) + whole;
                 wrapped.scale(PI).store(&mut buffers[0].0);
                 velocity.value.store(&mut buffers[1].0);
                 turns.store(&mut buffers[2].0);

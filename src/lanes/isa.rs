@@ -13,6 +13,8 @@ pub trait Isa: Simd {
     type Lanes: Lane<Token = Self>;
     /// The same for numbers with a derivative, which need twice the registers.
     type Narrow: Lane<Token = Self>;
+    /// For a handful of trajectories: what one waits for another's work cannot hide.
+    type Few: Lane<Token = Self>;
     /// One trajectory with the same arithmetic, bit for bit.
     type Single: Lane<Token = ()>;
 
@@ -32,6 +34,7 @@ impl Isa for Scalar {
     const FUSED: bool = false;
     type Lanes = Bundle<Self, 8>;
     type Narrow = Bundle<Self, 6>;
+    type Few = Bundle<Self, 4>;
     type Single = f64;
 
     #[inline(always)]
@@ -66,6 +69,7 @@ mod x86 {
         const FUSED: bool = false;
         type Lanes = Bundle<Self, 6>;
         type Narrow = Bundle<Self, 4>;
+        type Few = Bundle<Self, 4>;
         type Single = f64;
 
         #[inline(always)]
@@ -94,6 +98,7 @@ mod x86 {
         const FUSED: bool = true;
         type Lanes = Bundle<Self, 6>;
         type Narrow = Bundle<Self, 4>;
+        type Few = Bundle<Self, 3>;
         type Single = Fused;
 
         #[inline(always)]
@@ -122,6 +127,7 @@ mod x86 {
         const FUSED: bool = true;
         type Lanes = Bundle<Self, 12>;
         type Narrow = Bundle<Self, 6>;
+        type Few = Bundle<Self, 2>;
         type Single = Fused;
 
         #[inline(always)]

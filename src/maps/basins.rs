@@ -6,8 +6,7 @@ use super::layers::{FiniteTime, finite_time};
 use super::reliability::{Reliability, reliability};
 use super::starts::Starts;
 use super::texture::{Texture, texture};
-use crate::attractor::find::WATCH;
-use crate::attractor::{Attractor, Catalogue};
+use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
 use crate::integrate::{State, Strobe, accuracy};
 use crate::lanes::Path;
@@ -25,7 +24,7 @@ const FURTHER: usize = 6;
 /// what counts as chaos does not depend on it.
 const SEARCH_BOUND: u32 = 1000;
 /// Periods within which nothing may capture a trajectory that counts as chaotic.
-pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + WATCH);
+pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + Effort::THOROUGH.watch);
 /// Where chaos coexists with other attractors, a start is given this many times the longest
 /// settling time that the search saw before it counts as chaotic.
 const PATIENCE: u32 = 10;
@@ -152,7 +151,7 @@ pub fn basins(
     let pool = pool(options.threads)?;
     let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
     let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, path)?;
-    let mut catalogue = Catalogue::new(&strobe);
+    let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
     let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
     let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
     catalogue.search(&strobe, &seeds, SEARCH_BOUND, control.flag());
@@ -239,7 +238,7 @@ fn to_capture(
         }
         let stride = labels.open.len().div_ceil(FURTHER_SAMPLE);
         let states: Vec<State> = labels.open.iter().step_by(stride).map(|(_, s)| *s).collect();
-        let keys: Vec<[u64; 2]> = catalogue.attractors.iter().map(key).collect();
+        let keys: Vec<[u64; 2]> = catalogue.attractors.iter().map(Attractor::mark).collect();
         if !catalogue.search(strobe, &states, SEARCH_BOUND, control.flag()) {
             break;
         }
@@ -247,7 +246,7 @@ fn to_capture(
         // Attractors may have moved in the sorted list: the labels move with them.
         let moved: Vec<i16> = keys
             .iter()
-            .map(|old| catalogue.attractors.iter().position(|a| key(a) == *old))
+            .map(|old| catalogue.attractors.iter().position(|a| a.mark() == *old))
             .map(|at| at.map_or(UNDECIDED, |i| i as i16 + 1))
             .collect();
         for label in labels.label.iter_mut().filter(|l| **l > 0) {
@@ -259,11 +258,6 @@ fn to_capture(
         labels.replace(&picks, again);
     }
     Ok((labels, now))
-}
-
-/// What stays when the catalogue is sorted anew: the bits of the first point.
-fn key(attractor: &Attractor) -> [u64; 2] {
-    attractor.points.first().map_or([0; 2], |p| p.map(f64::to_bits))
 }
 
 /// Periods after which an exponent has stretched one cell to the size of the plane: later the

@@ -7,14 +7,17 @@
 //! - [`layers`]: turns and exponents over a fixed time
 //! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
 //! - [`orbits`]: all closed orbits of one period and winding
+//! - [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
 pub mod basins;
+pub mod cell;
 pub mod control;
 pub mod label;
 pub mod layers;
 pub mod orbits;
+pub mod parameter_map;
 pub mod reliability;
 pub mod starts;
 pub mod texture;

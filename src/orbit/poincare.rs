@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::flow::Flow;
 use crate::integrate::tangent::Tangent;
-use crate::integrate::{Moving, Schedule, State};
+use crate::integrate::{Moving, Schedule, State, Strobe};
 use crate::lanes::sine::{Fine, wrap};
 use crate::model::Pendulum;
 use crate::model::pendulum::Route;
@@ -25,11 +25,12 @@ pub struct PoincareMap {
 }
 
 /// Equal steps where gravity, drive, torque and viscous damping are all; else the integrator for any
-/// model.
+/// model; or the steps of a strobe.
 #[derive(Clone, Debug)]
 enum Way {
     Plain(Schedule),
     Any(Box<Flow>),
+    Lanes(Box<Strobe>),
 }
 
 /// An image of the map with its derivative.
@@ -61,6 +62,12 @@ impl PoincareMap {
         Self { pendulum: pendulum.clone(), way }
     }
 
+    /// The map that `strobe` steps: as precise as that, and as quick.
+    #[must_use]
+    pub fn of_steps(strobe: &Strobe) -> Self {
+        Self { pendulum: strobe.pendulum.clone(), way: Way::Lanes(Box::new(strobe.clone())) }
+    }
+
     /// One period on.
     #[must_use]
     pub fn once(&self, state: State) -> Image {
@@ -70,6 +77,7 @@ impl PoincareMap {
                 return Image { product: Some(shrinking), ..flow(schedule, state) };
             }
             Way::Any(flow_of) => flow_of,
+            Way::Lanes(strobe) => return stretched(strobe, state),
         };
         let arrival = flow_of.carry(state, 0.0, self.pendulum.period());
         let [[a, b], [c, d]] = arrival.derivative;
@@ -97,6 +105,33 @@ impl PoincareMap {
             };
         }
         image
+    }
+}
+
+/// One period of `strobe` on, a lane for each column of the derivative.
+fn stretched(strobe: &Strobe, state: State) -> Image {
+    let (mut theta, mut velocity) = ([state[0]; 2], [state[1]; 2]);
+    let (mut turns, mut growth) = ([0.0; 2], [0.0; 2]);
+    let (mut along, mut across) = ([1.0, 0.0], [0.0, 1.0]);
+    // Lengths agree, so this cannot fail.
+    let _ = strobe.stretch(
+        (&mut theta, &mut velocity),
+        &mut turns,
+        (&mut along, &mut across),
+        &mut growth,
+        1,
+    );
+    let size = growth.map(f64::exp);
+    Image {
+        state: [theta[0], velocity[0]],
+        turns: turns[0] as i64,
+        derivative: Matrix2::new(
+            along[0] * size[0],
+            along[1] * size[1],
+            across[0] * size[0],
+            across[1] * size[1],
+        ),
+        product: None,
     }
 }
 

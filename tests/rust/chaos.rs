@@ -3,9 +3,9 @@
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-use pendmap::attractor::Kind;
 use pendmap::attractor::capture::{Fate, outcomes};
 use pendmap::attractor::chaos::sets;
+use pendmap::attractor::{Effort, Kind};
 use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, Strobe};
 use pendmap::maps::basins::{BasinMap, Plane};
@@ -41,7 +41,10 @@ fn what_leaves_its_region_is_no_set() {
     // Where nothing else would have left it out.
     let strobe = Strobe::new(&runaway(), 60, path());
     let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
-    assert!(sets(&strobe, &states, &[false; 6], 200, &AtomicBool::new(false)).is_empty());
+    assert!(
+        sets(&strobe, &states, &[false; 6], 200, &Effort::THOROUGH, &AtomicBool::new(false))
+            .is_empty()
+    );
 }
 
 /// The one chaotic attractor of a plane that has nothing else.

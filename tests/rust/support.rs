@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-use pendmap::attractor::Catalogue;
+use pendmap::attractor::{Catalogue, Effort};
 use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::{Moving, Schedule, State, Strobe};
 use pendmap::lanes::sine::Fine;
@@ -75,7 +75,7 @@ pub fn basins_on_plane(pendulum: &Pendulum, count: usize) -> BasinMap {
 pub fn searched(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Catalogue) {
     let sample = starts.sampled_states(400, 0);
     let (strobe, _) = choose(pendulum, &sample, 1e-6, path).expect("steps");
-    let mut catalogue = Catalogue::new(&strobe);
+    let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
     catalogue.search(&strobe, &sample, 1000, &AtomicBool::new(false));
     (strobe, catalogue)
 }

@@ -22,6 +22,50 @@ use queue::keep;
 /// How much further than its first acceleration takes it a velocity may go within a step.
 const REACH: f64 = 1.25;
 
+/// Steps of a block without events or effects.
+#[inline(always)]
+pub(super) fn smooth<L: Lane>(
+    strobe: &Strobe,
+    token: L::Token,
+    block: &mut Block,
+    range: Range<usize>,
+) {
+    if strobe.fine {
+        smooth_by::<L, Fine>(strobe, token, block, range);
+    } else {
+        smooth_by::<L, Coarse>(strobe, token, block, range);
+    }
+}
+
+#[inline(always)]
+fn smooth_by<L: Lane, D: Degree>(
+    strobe: &Strobe,
+    token: L::Token,
+    block: &mut Block,
+    range: Range<usize>,
+) {
+    let schedule = &strobe.schedule;
+    let steps = &schedule.steps()[range];
+    let mut at = 0;
+    while at < block.kick.len() {
+        let mut lanes = load::<L>(token, block, at);
+        for loads in steps {
+            lanes.step::<D>(loads, schedule.decay);
+        }
+        lanes.half_turns.store(&mut block.half_turns[at..]);
+        lanes.kick.store(&mut block.kick[at..]);
+        at += L::WIDTH;
+    }
+}
+
+#[inline(always)]
+fn load<L: Lane>(token: L::Token, block: &Block, at: usize) -> Moving<L> {
+    Moving {
+        half_turns: L::load(token, &block.half_turns[at..]),
+        kick: L::load(token, &block.kick[at..]),
+    }
+}
+
 /// What runs a block of one pendulum: `Q` is the narrower kind of lanes, for the queue and for
 /// effects.
 pub(super) struct Runner<'a, L: Lane, Q: Lane> {
@@ -44,13 +88,9 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
 
     #[inline(always)]
     pub(super) fn run(&self, block: &mut Block, range: Range<usize>) {
-        let Strobe { route, events, extra, fine, .. } = *self.strobe;
+        let Strobe { route, events, extra, .. } = *self.strobe;
         if route == Route::Smooth && !extra {
-            if fine {
-                self.smooth::<Fine>(block, range);
-            } else {
-                self.smooth::<Coarse>(block, range);
-            }
+            smooth::<L>(self.strobe, self.tokens.0, block, range);
             return;
         }
         if events && range.start == 0 {
@@ -69,30 +109,6 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 block.let_go(time);
                 self.work_off(block, stages);
             }
-        }
-    }
-
-    #[inline(always)]
-    fn load(&self, block: &Block, at: usize) -> Moving<L> {
-        Moving {
-            half_turns: L::load(self.tokens.0, &block.half_turns[at..]),
-            kick: L::load(self.tokens.0, &block.kick[at..]),
-        }
-    }
-
-    #[inline(always)]
-    fn smooth<D: Degree>(&self, block: &mut Block, range: Range<usize>) {
-        let schedule = &self.strobe.schedule;
-        let steps = &schedule.steps()[range];
-        let mut at = 0;
-        while at < block.kick.len() {
-            let mut lanes = self.load(block, at);
-            for loads in steps {
-                lanes.step::<D>(loads, schedule.decay);
-            }
-            lanes.half_turns.store(&mut block.half_turns[at..]);
-            lanes.kick.store(&mut block.kick[at..]);
-            at += L::WIDTH;
         }
     }
 
@@ -128,7 +144,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let one = L::splat(self.tokens.0, 1.0);
         let mut at = 0;
         while at < block.kick.len() {
-            let before = self.load(block, at);
+            let before = load::<L>(self.tokens.0, block, at);
             let mut after = before;
             let sense = one.with_sign_of(before.kick);
             let rubbing = Rubbing(sense.scale(-self.single.theta_r));

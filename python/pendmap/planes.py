@@ -1,0 +1,274 @@
+"""Maps over two parameters: which attractors exist where."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core, checks
+from pendmap.errors import InputError
+from pendmap.grid import Axis, Grid
+from pendmap.model import without_dimensions
+from pendmap.model.units import RATE, VELOCITY
+from pendmap.regimes import kind_of, regimes
+from pendmap.store import FORMAT_VERSION
+from pendmap.summary import of_motion
+from pendmap.varied import varied
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from pendmap.model import Pendulum, Rig
+    from pendmap.model.units import Units
+    from pendmap.varied import Varied
+
+__all__ = ["MOST_STARTS", "STARTS", "parameter_map", "spread"]
+
+STARTS = 9
+"""Initial conditions of a cell where nothing is said."""
+MOST_STARTS = 10_000
+_SPREAD = 1000
+_LISTED = 10
+_PLASTIC = 1.324717957244746
+
+
+def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
+    """Return initial conditions that cover a box evenly: an additive recurrence.
+
+    No two of them are mirror images of one another, so that none is wasted on a symmetric pendulum.
+
+    Parameters
+    ----------
+    grid : Grid
+        The box; its cells do not matter.
+    count : int
+        How many.
+    seed : int
+        Shifts them.
+
+    Returns
+    -------
+    theta, velocity : ndarray, shape (count,)
+    """
+    shift = 0.5 + (seed * 0.6180339887498949) % 1.0
+    # Not the box's centre, where a pendulum hangs at rest and stays however unstable that is.
+    k = 1 + np.arange(count)
+    parts = [(shift + k / _PLASTIC**power) % 1.0 for power in (1, 2)]
+    ends = [(axis.low, axis.high - axis.low) for axis in (grid.theta, grid.velocity)]
+    theta, velocity = (
+        low + width * part for (low, width), part in zip(ends, parts, strict=True)
+    )
+    return theta, velocity
+
+
+def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    ranges: Mapping[str, tuple[float, float, int]],
+    *,
+    starts: int = STARTS,
+    box: Grid | None = None,
+    tol: float = 1e-6,
+    max_periods: int | None = None,
+    threads: int | None = None,
+    seed: int = 0,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """The set of attractors over a plane of two parameters.
+
+    Every cell is searched from the same initial conditions, and from points of its neighbours'
+    attractors: grids become finer from every eighth cell to all, each cell beginning also from what
+    its neighbours on the coarser grid have; then, in two passes, from what the cells beside it have
+    and it lacks. So branches that coexist are followed, and nothing depends on the order of the
+    work. Trajectories run until a stable orbit, found by Newton's method, has captured them. Those
+    that nothing captures are watched for as long again; where none of a set of them ends and their
+    exponent is positive by four standard errors, the set is chaos of its kind. What is left is
+    undecided.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; parameters that vary replace its own.
+    ranges : mapping of str to (float, float, int)
+        Two parameters with first value, last value (both included) and how many: columns, then
+        rows. Any of ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without
+        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI; or
+        ``EFFECT.PARAMETER`` of an effect that the model has.
+    starts : int
+        Initial conditions of each cell.
+    box : Grid, optional
+        Where they lie; by default that of :func:`pendmap.basins`.
+    tol : float
+        As of :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
+        with the period and the drive's pull.
+    max_periods : int, optional
+        Periods after which trajectories begin to be watched; by default until damping would have
+        shrunk a free motion by exp(-40), and 64 to 1000.
+    threads : int, optional
+        Number of threads; by default one a processor. The result does not depend on it.
+    seed : int
+        Shifts the initial conditions.
+    progress : callable, optional
+        Called now and then with the number of cells done and in all.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (row, column): ``regime`` (index into ``regime_kinds`` and ``regime_share``),
+        ``attractors`` (how many coexist, mirror images counted), ``period`` and ``winding`` of the
+        kind that most starts end on (0 for chaos), ``exponent`` (the largest of all attractors),
+        ``undecided`` and ``failed`` (shares of the starts), ``share`` over ``kind`` too. All
+        attractors over ``entry``: ``entry_cell``, ``entry_kind``, ``entry_n``, ``entry_w``,
+        ``entry_theta``, ``entry_velocity``, ``entry_exponent``, ``entry_exponent_stderr``,
+        ``entry_share``. An attractor that only a neighbour led to has the share 0.
+
+    Raises
+    ------
+    InputError
+        If a parameter or value is not allowed, the model has an effect that no map can have, or no
+        step reaches ``tol``.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+
+    References
+    ----------
+    Xu, Wiercigroch & Cartmell (2005), Chaos, Solitons & Fractals 23, 1537.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    columns, rows = varied(model, ranges, 2)
+    starts = checks.whole("starts", starts, 1, MOST_STARTS)
+    seed = checks.whole("seed", seed, 0, checks.MOST_SEED)
+    checks.call("progress", progress)
+    workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
+    bound = None
+    if max_periods is not None:
+        bound = checks.whole("max_periods", max_periods, 1, checks.MOST_PERIODS)
+    reach = units.given(3.0, VELOCITY)
+    if box is None:
+        box = Grid(Axis(-math.pi, math.pi, _SPREAD), Axis(-reach, reach, _SPREAD))
+    checks.of_type("box", box, Grid, "Grid.square(100)")
+    theta, velocity = spread(box, starts, seed)
+    began = time.perf_counter()
+    try:
+        raw = _core.parameter_map(
+            pendulum.parameters,
+            (columns.kernel, rows.kernel),
+            theta,
+            units.bare(velocity, VELOCITY),
+            checks.number("tol", tol),
+            bound,
+            workers,
+            progress,
+        )
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    dataset = _dataset(raw, (columns, rows), units)
+    dataset.attrs = {
+        "kind": "parameter_map",
+        "title": model.title,
+        **model.attributes,
+        "section": model.units.section,
+        "columns": columns.name,
+        "rows": rows.name,
+        "cells": columns.values.size * rows.values.size,
+        "starts": starts,
+        "low_theta": box.theta.low,
+        "high_theta": box.theta.high,
+        "low_velocity": box.velocity.low,
+        "high_velocity": box.velocity.high,
+        "tol": tol,
+        "reached_error": raw["reached_error"],
+        "searched_again": raw["searched_again"],
+        "undecided": float(raw["undecided"].mean()),
+        "failed": float(raw["failed"].mean()),
+        "seed": seed,
+        "seconds": time.perf_counter() - began,
+        "threads": workers or _core.default_threads(),
+        "simd": raw["simd"],
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [*_summary(dataset), *of_motion(model.effects, "attractors are")]
+    dataset.attrs["summary"] = "\n".join(lines)
+    return dataset
+
+
+def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
+    columns, rows = axes
+    shape = (rows.values.size, columns.values.size)
+    dims = (rows.name, columns.name)
+    cells = shape[0] * shape[1]
+    cell, n, w, own = raw["cell"], raw["n"], raw["w"], raw["share"]
+    names = [
+        kind_of(kind, int(period), int(turns))
+        for kind, period, turns in zip(raw["kind"], n, w, strict=True)
+    ]
+    sets, regime, frequency = regimes(names, cell, cells)
+    kinds = sorted({name for one in sets for name in one if name in set(names)})
+    share = np.zeros((len(kinds), cells))
+    place = {name: k for k, name in enumerate(kinds)}
+    which = np.array([place[name] for name in names], dtype=np.intp)
+    np.add.at(share, (which, cell), own)
+    exponent = np.full(cells, np.nan)
+    np.fmax.at(exponent, cell, raw["exponent"])
+    period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
+    # The kind that most starts end on; of equals the one that comes first.
+    leading = share[which, cell]
+    for k in np.lexsort((-np.arange(cell.size), leading)):
+        period[cell[k]], winding[cell[k]] = n[k], abs(w[k]) if n[k] else 0
+    speed = units.given(raw["velocity"], VELOCITY)
+    rate = {"units": units.of_rate}
+    data: dict[str, Any] = {
+        "regime": (dims, regime.reshape(shape)),
+        "regime_share": ("set", frequency),
+        "regime_kinds": ("set", np.array([json.dumps(one) for one in sets], dtype=str)),
+        "attractors": (dims, np.bincount(cell, minlength=cells).astype(np.int16).reshape(shape)),
+        "period": (dims, period.reshape(shape), {"units": "forcing periods"}),
+        "winding": (dims, winding.reshape(shape), {"units": "turns"}),
+        "exponent": (dims, units.given(exponent, RATE).reshape(shape), rate),
+        "undecided": (dims, raw["undecided"].reshape(shape)),
+        "failed": (dims, raw["failed"].reshape(shape)),
+        "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
+        "entry_cell": ("entry", cell),
+        "entry_kind": ("entry", which.astype(np.int16), {"comment": "index into kind"}),
+        "entry_n": ("entry", n, {"comment": "0: no meaning"}),
+        "entry_w": ("entry", w),
+        "entry_theta": ("entry", raw["theta"], {"units": "rad"}),
+        "entry_velocity": ("entry", speed, {"units": units.of_velocity}),
+        "entry_exponent": ("entry", units.given(raw["exponent"], RATE), rate),
+        "entry_exponent_stderr": ("entry", units.given(raw["exponent_stderr"], RATE), rate),
+        "entry_share": ("entry", own),
+    }
+    coordinates = {
+        axis.name: (axis.name, axis.values, axis.attributes) for axis in (columns, rows)
+    }
+    return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
+
+
+def _summary(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    count = dataset.sizes["set"]
+    lines = [f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."]
+    for k in range(min(count, _LISTED)):
+        kinds = json.loads(str(dataset["regime_kinds"].values[k]))
+        lines.append(f"{100 * float(dataset['regime_share'][k]):.3g} %: {', '.join(kinds)}.")
+    if count > _LISTED:
+        rest = float(dataset["regime_share"][_LISTED:].sum())
+        lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
+    for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
+        if a[key] > 0:
+            lines.append(f"{100 * a[key]:.3g} % of the starts {word}.")
+    lines.append(
+        f"{counted(a['starts'], 'start')} a cell; {counted(a['searched_again'], 'cell')} searched "
+        f"again for what a neighbour has; error after 5 periods {a['reached_error']:.2g}; "
+        f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
+    )
+    return lines

@@ -1,0 +1,162 @@
+"""A parameter that varies: which of the model's it is, and its values."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap import _core, checks
+from pendmap.errors import InputError
+from pendmap.model import without_dimensions
+from pendmap.model.rig import COUNTERPARTS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.model import Effect, Pendulum, Rig
+
+__all__ = ["Varied", "varied"]
+
+_UNITS = {"c_over_m": "1/s", "Omega": "rad/s", "Tr": "rad/s2", "phi": "rad", "phase": "rad"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Varied:
+    """A parameter and the values that it takes.
+
+    Attributes
+    ----------
+    name : str
+        ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque`` or ``phase``, without dimensions; of a
+        :class:`pendmap.Rig` also ``Omega``, ``c_over_m``, ``Tr`` and ``phi`` in SI; or
+        ``EFFECT.PARAMETER``, in the model's own units.
+    values : ndarray, shape (N,)
+        Ascending, evenly spaced, in those units.
+    index : int
+        Its place in the core's list of parameters.
+    bare : ndarray, shape (N,)
+        The values without dimensions.
+    unit : str
+        The unit of ``values``; empty where they have none.
+    """
+
+    name: str
+    values: NDArray[np.float64]
+    index: int
+    bare: NDArray[np.float64]
+    unit: str
+
+    @property
+    def kernel(self) -> tuple[int, list[float]]:
+        """It as the core takes it."""
+        return self.index, self.bare.tolist()
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a coordinate."""
+        return {"units": self.unit or "1", "long_name": self.name}
+
+
+def varied(
+    model: Pendulum | Rig, ranges: Mapping[str, Sequence[float]], count: int
+) -> tuple[Varied, ...]:
+    """Return the parameters that vary, each with its values.
+
+    Parameters
+    ----------
+    model : Pendulum or Rig
+        Whose they are.
+    ranges : mapping of str to (float, float, int)
+        First and last value, both included, and how many values.
+    count : int
+        How many parameters there must be.
+
+    Raises
+    ------
+    InputError
+        If there are more or fewer, the model has none of that name, or a value is outside its
+        range.
+    """
+    if not isinstance(ranges, dict) or len(ranges) != count:
+        given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else checks.shown(ranges)
+        example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
+        few = dict(list(example.items())[:count])
+        raise InputError(f"what varies is {given or 'nothing'}: allowed is a mapping like {few}")
+    found = tuple(_one(model, name, given) for name, given in ranges.items())
+    places = [one.index for one in found]
+    if len(set(places)) < len(places):
+        raise InputError(f"{found[0].name} and {found[1].name} are one parameter: allowed are two")
+    return found
+
+
+def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
+    pendulum, units = without_dimensions(model)
+    known = _core.parameter_names(pendulum.parameters)
+    powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
+    if units.si:
+        own = {si: (bare, power) for bare, (si, power) in COUNTERPARTS.items()}
+        powers |= {si: own[si] for si in ("c_over_m", "Omega", "phi", "Tr")}
+    effects = {e.name: e for e in model.effects}
+    shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
+    if name not in powers and name not in shared:
+        allowed = ", ".join([*powers, *shared])
+        raise InputError(
+            f"{checks.shown(name)} is no parameter of this model: allowed are {allowed}"
+        )
+    values = _values(name, given)
+    if name in powers:
+        bare, power = powers[name]
+        plain, unit = units.bare(values, power), _UNITS.get(name, "")
+    else:
+        bare, unit = name, ""
+        which, parameter = name.split(".", 1)
+        entries = effects[which].definition["parameters"]
+        if units.si and any(entry["power_of_w0_less"] == parameter for entry in entries):
+            raise InputError(
+                f"{name} changes the units of others: allowed with a model without dimensions"
+            )
+        bared = [_set(effects[which], parameter, float(x)).bare(units) for x in values]
+        plain = np.array([effect.parameters[parameter] for effect in bared])
+        if units.si:
+            unit = next(entry["unit"] for entry in entries if entry["name"] == parameter)
+    if known.count(bare) > 1:
+        raise InputError(f"{name} is there {known.count(bare)} times: allowed is a single one")
+    for value in (plain[0], plain[-1]):
+        _check(pendulum, bare, float(value), name)
+    return Varied(name, values, known.index(bare), plain, unit)
+
+
+def _values(name: str, given: object) -> NDArray[np.float64]:
+    allowed = f"allowed is (first, last, how many), like {name}=(0.5, 2.0, 100)"
+    if not isinstance(given, tuple | list) or len(given) != 3:  # noqa: PLR2004
+        raise InputError(f"{name} is {checks.shown(given)}: {allowed}")
+    low, high = (checks.number(name, end) for end in given[:2])
+    count = checks.whole(f"{name}: how many", given[2], 1, checks.MOST_CELLS)
+    if not (low < high and math.isfinite(high - low)) and not (count == 1 and low == high):
+        raise InputError(f"{name} is {low:g} to {high:g}: {allowed}, the lower one first")
+    return np.linspace(low, high, count)
+
+
+def _check(pendulum: Pendulum, bare: str, value: float, name: str) -> None:
+    """Refuse a value that no pendulum has."""
+    try:
+        if "." not in bare:
+            dataclasses.replace(pendulum, **{bare: value})
+            return
+        which, parameter = bare.split(".", 1)
+        effects = [_set(e, parameter, value) if e.name == which else e for e in pendulum.effects]
+        dataclasses.replace(pendulum, effects=tuple(effects))
+    except InputError as error:
+        raise InputError(f"{name} = {value:g}: {error}") from None
+
+
+def _set(effect: Effect, parameter: str, value: float) -> Effect:
+    """Return an effect with another value for one of its parameters."""
+    return dataclasses.replace(
+        effect, parameters={**effect.parameters, parameter: value}, ci95={}
+    )

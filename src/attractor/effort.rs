@@ -1,0 +1,71 @@
+//! How much a search for attractors spends.
+
+/// How much a search for attractors spends: the thorough one of a single plane of starts, the brisk
+/// one of each of many thousand pendulums.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Whether orbits are polished on the precise map, to rounding of the exact motion. Else they are
+    /// orbits of the steps that the trajectories take, as far from the exact ones as those err.
+    pub precise: bool,
+    /// Longest cycle that is looked for, in forcing periods.
+    pub longest_cycle: usize,
+    /// Periods before the first cycle test; each later round is twice as long as the one before.
+    pub first_round: u32,
+    /// Failures of Newton's method after which a round gives up.
+    pub tries: usize,
+    /// Of the trajectories left over, so many are watched.
+    pub watched: usize,
+    /// Trajectories that nothing has captured are watched for this many times the first bound more.
+    pub watch: u32,
+    /// Periods over which turns over the top are watched step by step.
+    pub turning: usize,
+    /// Cells along each side of the picture of where a set lives: enough for its points to fill what it
+    /// visits.
+    pub cells: usize,
+    /// How far traps reach.
+    pub trap: Sampling,
+}
+
+/// How the reach of an ellipse is sampled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Points of a cycle that get an ellipse: a trajectory passes there once a cycle.
+    pub points: usize,
+    /// Directions.
+    pub rays: usize,
+    /// Levels, each `ratio` of the one before in radius.
+    pub levels: usize,
+    /// What that is.
+    pub ratio: f64,
+    /// So many further times as many levels, where the ones before were all too wide.
+    pub rounds: usize,
+    /// After one to so many returns a sample must be lower: any of these will do.
+    pub returns: usize,
+}
+
+impl Effort {
+    /// Of a single pendulum.
+    pub const THOROUGH: Self = Self {
+        precise: true,
+        longest_cycle: 32,
+        first_round: 32,
+        tries: 24,
+        watched: 256,
+        watch: 4,
+        turning: 400,
+        cells: 96,
+        trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
+    };
+    /// Of one among thousands.
+    pub const BRISK: Self = Self {
+        precise: false,
+        longest_cycle: 16,
+        first_round: 24,
+        tries: 6,
+        watched: 16,
+        watch: 1,
+        turning: 60,
+        cells: 20,
+        trap: Sampling { points: 4, rays: 16, levels: 10, ratio: 0.55, rounds: 2, returns: 2 },
+    };
+}

@@ -1,0 +1,248 @@
+//! One pendulum among many: its attractors from a few starts, and from those of pendulums like it.
+
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
+
+use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
+use crate::error::Error;
+use crate::integrate::accuracy::{choose, distance, error_reached};
+use crate::integrate::{State, Strobe};
+use crate::lanes::Path;
+use crate::model::Pendulum;
+use crate::orbit::PoincareMap;
+use crate::orbit::newton::{self, PeriodicOrbit};
+
+/// Points of like orbits of like pendulums are nearer than this.
+const LIKE: f64 = 0.25;
+/// Points nearer than this are of one orbit.
+const SAME: f64 = 1e-6;
+/// Newton's method may not wander further than this from an orbit of a neighbour.
+const REACH: f64 = 0.3;
+/// Trajectories run until viscous damping alone would have shrunk them by this power of e, and are
+/// watched as long again; ...
+const DECAY: f64 = 40.0;
+/// ... in periods between these.
+const BOUNDS: [f64; 2] = [64.0, 1000.0];
+/// Hints that a search takes at the most.
+const MOST_HINTS: usize = 16;
+
+/// An attractor of a cell.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// What it is.
+    pub attractor: Attractor,
+    /// Share of the cell's starts that end on it.
+    pub share: f64,
+}
+
+/// What is known of one pendulum.
+#[derive(Clone, Debug, Default)]
+pub struct Cell {
+    /// Its attractors.
+    pub found: Vec<Found>,
+    /// Share of the starts that nothing captured within the bound.
+    pub open: f64,
+    /// Share of the starts that left the range of numbers.
+    pub failed: f64,
+}
+
+/// A point of an attractor of another cell; its period, none where it does not close.
+#[derive(Clone, Copy, Debug)]
+pub struct Hint {
+    point: State,
+    n: Option<usize>,
+    w: i64,
+}
+
+/// How every cell is searched.
+#[derive(Clone, Debug)]
+pub struct Search {
+    /// Where the trajectories start.
+    pub starts: Vec<State>,
+    /// Periods after which a search begins to watch what is left; by default what damping asks for.
+    pub bound: Option<u32>,
+    /// Length of a step times the root of the greatest pull, at most.
+    pub step: f64,
+    /// The instruction set.
+    pub path: Path,
+}
+
+impl Search {
+    /// With the longest step that keeps the error within `tol` on all of `samples`, and the greatest
+    /// error that it makes there, as [`error_reached`] defines it on the starts `probes`.
+    ///
+    /// # Errors
+    /// As [`choose`].
+    pub fn calibrated(
+        starts: Vec<State>,
+        bound: Option<u32>,
+        samples: &[Pendulum],
+        probes: &[State],
+        tol: f64,
+    ) -> Result<(Self, f64), Error> {
+        let path = Path::choose()?;
+        let mut step = f64::INFINITY;
+        for pendulum in samples {
+            let (strobe, _) = choose(pendulum, probes, tol, path)?;
+            step = step.min(measure(pendulum) / strobe.steps() as f64);
+        }
+        let search = Self { starts, bound, step, path };
+        let error = |pendulum: &Pendulum| error_reached(&search.strobe(pendulum), probes);
+        let reached = samples.iter().map(error).fold(0.0, f64::max);
+        Ok((search, reached))
+    }
+
+    /// The stroboscopic map of a cell.
+    #[must_use]
+    pub fn strobe(&self, pendulum: &Pendulum) -> Strobe {
+        let steps = (measure(pendulum) / self.step * (1.0 - 1e-12)).ceil().max(1.0);
+        Strobe::new(pendulum, steps as usize, self.path)
+    }
+
+    /// The attractors of `pendulum`: rests, orbits that `hints` lead to, and where the starts end.
+    #[must_use]
+    pub fn cell(&self, pendulum: &Pendulum, hints: &[Hint], cancel: &AtomicBool) -> Cell {
+        let strobe = self.strobe(pendulum);
+        let mut catalogue = Catalogue::new(&strobe, Effort::BRISK);
+        // At rest nothing moves it away, however unstable: such points are no starts.
+        catalogue.take_over(&strobe, &[([0.0, 0.0], 1), ([PI, 0.0], 1)], cancel);
+        let (cycles, mut further): (Vec<Hint>, Vec<Hint>) =
+            hints.iter().partition(|hint| hint.n.is_some());
+        let cycles: Vec<(State, usize)> =
+            cycles.iter().filter_map(|hint| Some((hint.point, hint.n?))).collect();
+        let lost = catalogue.take_over(&strobe, &cycles, cancel);
+        further.extend(lost.into_iter().map(|point| Hint { point, n: None, w: 0 }));
+        let mut starts = self.starts.clone();
+        starts.extend(further.iter().map(|hint| hint.point));
+        let bound = self.bound.unwrap_or_else(|| bound(pendulum));
+        let endings = catalogue.endings(&strobe, &starts, bound, cancel);
+        self.told(&strobe, &catalogue, &endings)
+    }
+
+    /// Those of `hints` that promise what `cell` does not have: chaos of its kind, a stable orbit that Newton's
+    /// method finds from there, or an orbit of that period and winding that may have changed into another.
+    #[must_use]
+    pub fn promising(&self, pendulum: &Pendulum, cell: &Cell, hints: Vec<Hint>) -> Vec<Hint> {
+        let symmetric = pendulum.is_mirror_symmetric();
+        let unlike =
+            |hint: &Hint| !cell.found.iter().any(|f| hint.is_like(&f.attractor, symmetric));
+        let hints: Vec<Hint> = hints.into_iter().filter(unlike).collect();
+        if hints.is_empty() {
+            return hints;
+        }
+        let strobe = self.strobe(pendulum);
+        let map = PoincareMap::of_steps(&strobe);
+        let promises = |hint: &Hint| {
+            let Some(n) = hint.n else { return true };
+            let orbit = newton::find(&map, hint.point, n, REACH).filter(PeriodicOrbit::is_stable);
+            let Some(orbit) = orbit else { return !cell.has(n, hint.w) };
+            let has = |orbit: &PeriodicOrbit| {
+                let own = |p: &State| orbit.contains(*p, SAME);
+                cell.found
+                    .iter()
+                    .any(|f| f.attractor.n.is_some() && f.attractor.points.iter().any(own))
+            };
+            !has(&orbit)
+        };
+        hints.into_iter().filter(promises).collect()
+    }
+
+    /// Shares of the starts; an attractor that only a hint led to has none.
+    fn told(&self, strobe: &Strobe, catalogue: &Catalogue, endings: &[Ending]) -> Cell {
+        let open: Vec<State> = endings
+            .iter()
+            .filter_map(|e| if let Ending::Open(state) = e { Some(*state) } else { None })
+            .collect();
+        let mut placed = catalogue.place(strobe, &open).into_iter();
+        let at: HashMap<[u64; 2], usize> =
+            catalogue.attractors.iter().enumerate().map(|(i, a)| (a.mark(), i)).collect();
+        let mut counts = vec![0_usize; catalogue.attractors.len()];
+        let (mut undecided, mut failed) = (0, 0);
+        for (k, ending) in endings.iter().enumerate() {
+            let end = match ending {
+                Ending::Captured(mark) => at.get(mark).copied(),
+                Ending::Open(_) => placed.next().flatten(),
+                Ending::Failed => None,
+            };
+            if k >= self.starts.len() {
+                continue;
+            }
+            match (end, ending) {
+                (Some(i), _) => counts[i] += 1,
+                (None, Ending::Failed) => failed += 1,
+                (None, _) => undecided += 1,
+            }
+        }
+        let share = |count: usize| count as f64 / self.starts.len().max(1) as f64;
+        let found = catalogue
+            .attractors
+            .iter()
+            .zip(&counts)
+            // Sets at rest are known beforehand: those that no start reaches are left out.
+            .filter(|(attractor, count)| **count > 0 || !attractor.is_held())
+            .map(|(attractor, count)| {
+                let mut attractor = attractor.clone();
+                attractor.points.truncate(attractor.n.unwrap_or(1));
+                Found { attractor, share: share(*count) }
+            })
+            .collect();
+        Cell { found, open: share(undecided), failed: share(failed) }
+    }
+}
+
+impl Cell {
+    /// Points of the attractors of `others`, each kind of orbit once.
+    #[must_use]
+    pub fn hints<'a>(others: impl Iterator<Item = &'a Self>, symmetric: bool) -> Vec<Hint> {
+        let mut hints: Vec<Hint> = Vec::new();
+        for found in others.flat_map(|cell| &cell.found) {
+            let Some(hint) = Hint::of(&found.attractor) else { continue };
+            if hints.len() < MOST_HINTS
+                && !hints.iter().any(|h| h.is_like(&found.attractor, symmetric))
+            {
+                hints.push(hint);
+            }
+        }
+        hints
+    }
+
+    /// Whether it has an orbit of that period and winding, in either sense.
+    fn has(&self, n: usize, w: i64) -> bool {
+        let alike = |a: &Attractor| a.n == Some(n) && a.w.map(i64::abs) == Some(w.abs());
+        self.found.iter().any(|f| alike(&f.attractor))
+    }
+}
+
+impl Hint {
+    /// None from a rest, which every search looks at.
+    fn of(attractor: &Attractor) -> Option<Self> {
+        if matches!(attractor.kind, Kind::Rest | Kind::InvertedRest) {
+            return None;
+        }
+        let point = *attractor.points.first()?;
+        Some(Self { point, n: attractor.n, w: attractor.w.unwrap_or(attractor.sense) })
+    }
+
+    /// Whether an attractor is like the one it comes from, or like its mirror image where there is
+    /// one.
+    fn is_like(&self, attractor: &Attractor, symmetric: bool) -> bool {
+        let w = attractor.w.unwrap_or(attractor.sense);
+        let image = [-self.point[0], -self.point[1]];
+        let near = |point: State| attractor.points.iter().any(|p| distance(*p, point) < LIKE);
+        let either =
+            |sign: i64, point: State| w == sign * self.w && (self.n.is_none() || near(point));
+        self.n == attractor.n && (either(1, self.point) || (symmetric && either(-1, image)))
+    }
+}
+
+/// Periods that a trajectory is given.
+fn bound(pendulum: &Pendulum) -> u32 {
+    let periods = 2.0 * DECAY / (pendulum.damping_rate() * pendulum.period());
+    periods.clamp(BOUNDS[0], BOUNDS[1]).ceil() as u32
+}
+
+/// The length of a period, in units in which steps are equally hard.
+fn measure(pendulum: &Pendulum) -> f64 {
+    pendulum.period() * pendulum.greatest_pull().sqrt()
+}
