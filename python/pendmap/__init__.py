@@ -25,6 +25,7 @@ from pendmap.model import (
 from pendmap.model.library import EffectDefinition, EffectParameter, effects
 
 if TYPE_CHECKING:
+    from pendmap.diagrams import bifurcation
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins, basins_of
     from pendmap.orbits import orbit
@@ -63,6 +64,7 @@ __all__ = [
     "advance",
     "basins",
     "basins_of",
+    "bifurcation",
     "effects",
     "load",
     "load_formulas",
@@ -87,6 +89,7 @@ _HOMES = {
     "advance": "trajectory",
     "basins": "maps",
     "basins_of": "maps",
+    "bifurcation": "diagrams",
     "load": "store",
     "noise_floor": "records",
     "orbit": "orbits",

@@ -42,6 +42,7 @@ _Parameters: TypeAlias = tuple[
     Sequence[tuple[str | _Formula, Sequence[float]]],
 ]
 _Axis: TypeAlias = tuple[float, float, int]
+_Range: TypeAlias = tuple[int, Sequence[float]]
 _Floats: TypeAlias = NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int, int], object]
 
@@ -110,6 +111,17 @@ def parameter_map(
     axes: tuple[_Range, _Range],
     theta: _Floats,
     velocity: _Floats,
+    tol: float,
+    bound: int | None,
+    threads: int,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def bifurcation(
+    parameters: _Parameters,
+    axis: _Range,
+    theta: _Floats,
+    velocity: _Floats,
+    first: tuple[float, float] | None,
     tol: float,
     bound: int | None,
     threads: int,

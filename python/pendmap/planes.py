@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core, checks
+from pendmap.cell_search import STARTS, CellSearch
 from pendmap.errors import InputError
-from pendmap.grid import Axis, Grid
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, VELOCITY
 from pendmap.regimes import kind_of, regimes
@@ -26,47 +25,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap.grid import Grid
     from pendmap.model import Pendulum, Rig
     from pendmap.model.units import Units
     from pendmap.varied import Varied
 
-__all__ = ["MOST_STARTS", "STARTS", "parameter_map", "spread"]
+__all__ = ["entries", "parameter_map", "undecided"]
 
-STARTS = 9
-"""Initial conditions of a cell where nothing is said."""
-MOST_STARTS = 10_000
-_SPREAD = 1000
 _LISTED = 10
-_PLASTIC = 1.324717957244746
-
-
-def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
-    """Return initial conditions that cover a box evenly: an additive recurrence.
-
-    No two of them are mirror images of one another, so that none is wasted on a symmetric pendulum.
-
-    Parameters
-    ----------
-    grid : Grid
-        The box; its cells do not matter.
-    count : int
-        How many.
-    seed : int
-        Shifts them.
-
-    Returns
-    -------
-    theta, velocity : ndarray, shape (count,)
-    """
-    shift = 0.5 + (seed * 0.6180339887498949) % 1.0
-    # Not the box's centre, where a pendulum hangs at rest and stays however unstable that is.
-    k = 1 + np.arange(count)
-    parts = [(shift + k / _PLASTIC**power) % 1.0 for power in (1, 2)]
-    ends = [(axis.low, axis.high - axis.low) for axis in (grid.theta, grid.velocity)]
-    theta, velocity = (
-        low + width * part for (low, width), part in zip(ends, parts, strict=True)
-    )
-    return theta, velocity
 
 
 def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -144,28 +110,19 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     model = pendulum
     pendulum, units = without_dimensions(model)
     columns, rows = varied(model, ranges, 2)
-    starts = checks.whole("starts", starts, 1, MOST_STARTS)
-    seed = checks.whole("seed", seed, 0, checks.MOST_SEED)
     checks.call("progress", progress)
-    workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
-    bound = None
-    if max_periods is not None:
-        bound = checks.whole("max_periods", max_periods, 1, checks.MOST_PERIODS)
-    reach = units.given(3.0, VELOCITY)
-    if box is None:
-        box = Grid(Axis(-math.pi, math.pi, _SPREAD), Axis(-reach, reach, _SPREAD))
-    checks.of_type("box", box, Grid, "Grid.square(100)")
-    theta, velocity = spread(box, starts, seed)
+    search = CellSearch(starts, box, tol, max_periods, threads, seed)
+    theta, velocity = search.initial(units)
     began = time.perf_counter()
     try:
         raw = _core.parameter_map(
             pendulum.parameters,
             (columns.kernel, rows.kernel),
             theta,
-            units.bare(velocity, VELOCITY),
-            checks.number("tol", tol),
-            bound,
-            workers,
+            velocity,
+            tol,
+            max_periods,
+            search.workers,
             progress,
         )
     except ValueError as error:
@@ -179,20 +136,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         "columns": columns.name,
         "rows": rows.name,
         "cells": columns.values.size * rows.values.size,
-        "starts": starts,
-        "low_theta": box.theta.low,
-        "high_theta": box.theta.high,
-        "low_velocity": box.velocity.low,
-        "high_velocity": box.velocity.high,
-        "tol": tol,
-        "reached_error": raw["reached_error"],
-        "searched_again": raw["searched_again"],
-        "undecided": float(raw["undecided"].mean()),
-        "failed": float(raw["failed"].mean()),
-        "seed": seed,
+        **search.attributes(raw, units),
         "seconds": time.perf_counter() - began,
-        "threads": workers or _core.default_threads(),
-        "simd": raw["simd"],
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
@@ -224,8 +169,6 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
     leading = share[which, cell]
     for k in np.lexsort((-np.arange(cell.size), leading)):
         period[cell[k]], winding[cell[k]] = n[k], abs(w[k]) if n[k] else 0
-    speed = units.given(raw["velocity"], VELOCITY)
-    rate = {"units": units.of_rate}
     data: dict[str, Any] = {
         "regime": (dims, regime.reshape(shape)),
         "regime_share": ("set", frequency),
@@ -233,24 +176,54 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
         "attractors": (dims, np.bincount(cell, minlength=cells).astype(np.int16).reshape(shape)),
         "period": (dims, period.reshape(shape), {"units": "forcing periods"}),
         "winding": (dims, winding.reshape(shape), {"units": "turns"}),
-        "exponent": (dims, units.given(exponent, RATE).reshape(shape), rate),
+        "exponent": (
+            dims,
+            units.given(exponent, RATE).reshape(shape),
+            {"units": units.of_rate},
+        ),
         "undecided": (dims, raw["undecided"].reshape(shape)),
         "failed": (dims, raw["failed"].reshape(shape)),
         "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
-        "entry_cell": ("entry", cell),
-        "entry_kind": ("entry", which.astype(np.int16), {"comment": "index into kind"}),
-        "entry_n": ("entry", n, {"comment": "0: no meaning"}),
-        "entry_w": ("entry", w),
+        **entries(raw, which, units),
+    }
+    coordinates = {axis.name: (axis.name, axis.values, axis.attributes) for axis in (columns, rows)}
+    return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
+
+
+def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[str, Any]:
+    """Return all attractors of all cells as variables over ``entry``.
+
+    Parameters
+    ----------
+    raw : dict
+        As the core gives them.
+    kind : ndarray
+        Place of each one's kind in the dataset's list.
+    units : Units
+        What the numbers are to be counted in.
+    """
+    rate = {"units": units.of_rate}
+    speed = {"units": units.of_velocity}
+    return {
+        "entry_cell": ("entry", raw["cell"]),
+        "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
+        "entry_n": ("entry", raw["n"], {"comment": "0: no meaning"}),
+        "entry_w": ("entry", raw["w"]),
         "entry_theta": ("entry", raw["theta"], {"units": "rad"}),
-        "entry_velocity": ("entry", speed, {"units": units.of_velocity}),
+        "entry_velocity": ("entry", units.given(raw["velocity"], VELOCITY), speed),
         "entry_exponent": ("entry", units.given(raw["exponent"], RATE), rate),
         "entry_exponent_stderr": ("entry", units.given(raw["exponent_stderr"], RATE), rate),
-        "entry_share": ("entry", own),
+        "entry_share": ("entry", raw["share"]),
     }
-    coordinates = {
-        axis.name: (axis.name, axis.values, axis.attributes) for axis in (columns, rows)
-    }
-    return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
+
+
+def undecided(attributes: Mapping[str, Any]) -> list[str]:
+    """Return what a summary says of starts that end nowhere."""
+    return [
+        f"{100 * attributes[key]:.3g} % of the starts {word}."
+        for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
+        if attributes[key] > 0
+    ]
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
@@ -263,9 +236,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
-    for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
-        if a[key] > 0:
-            lines.append(f"{100 * a[key]:.3g} % of the starts {word}.")
+    lines += undecided(a)
     lines.append(
         f"{counted(a['starts'], 'start')} a cell; {counted(a['searched_again'], 'cell')} searched "
         f"again for what a neighbour has; error after 5 periods {a['reached_error']:.2g}; "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from typing import TYPE_CHECKING
 
@@ -84,7 +85,7 @@ def regimes(
     bounds = np.searchsorted(cell, np.arange(cells + 1))
     own = [
         tuple(sorted(set(names[low:high]), key=order)) or (UNDECIDED,)
-        for low, high in zip(bounds[:-1], bounds[1:], strict=True)
+        for low, high in itertools.pairwise(bounds)
     ]
     counted = Counter(own)
     sets = sorted(counted, key=lambda one: (-counted[one], [order(name) for name in one]))

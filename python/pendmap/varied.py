@@ -146,7 +146,7 @@ def _check(pendulum: Pendulum, bare: str, value: float, name: str) -> None:
     """Refuse a value that no pendulum has."""
     try:
         if "." not in bare:
-            dataclasses.replace(pendulum, **{bare: value})
+            dataclasses.replace(pendulum, **{bare: value})  # type: ignore[arg-type]
             return
         which, parameter = bare.split(".", 1)
         effects = [_set(e, parameter, value) if e.name == which else e for e in pendulum.effects]
@@ -157,6 +157,4 @@ def _check(pendulum: Pendulum, bare: str, value: float, name: str) -> None:
 
 def _set(effect: Effect, parameter: str, value: float) -> Effect:
     """Return an effect with another value for one of its parameters."""
-    return dataclasses.replace(
-        effect, parameters={**effect.parameters, parameter: value}, ci95={}
-    )
+    return dataclasses.replace(effect, parameters={**effect.parameters, parameter: value}, ci95={})

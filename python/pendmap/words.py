@@ -17,9 +17,9 @@ LONG_AGO: Final = 1e3
 """Seconds from which six digits are no longer milliseconds."""
 
 
-def counted(count: int, noun: str) -> str:
-    """Return ``1 period``, ``2 periods``."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+def counted(count: int, noun: str, several: str = "") -> str:
+    """Return ``1 period``, ``2 periods``; ``several`` is the plural where that takes no s."""
+    return f"{count} {noun}" if count == 1 else f"{count} {several or noun + 's'}"
 
 
 def moment(time: float) -> str:

@@ -32,6 +32,8 @@ pub struct ChaoticSet {
     pub kind: Kind,
     /// Sense of its turns: 1, -1, or 0 for both or none.
     pub sense: i64,
+    /// How many of the trajectories belong to it.
+    pub members: usize,
     /// Sampled stroboscopic points.
     pub points: Vec<State>,
     /// Largest Lyapunov exponent per unit of tau.
@@ -249,6 +251,7 @@ fn describe(
         return Some(ChaoticSet {
             kind: Kind::QuasiperiodicRotation,
             sense: first.turns.signum() as i64,
+            members: members.len(),
             points,
             exponent: 0.0,
             exponent_stderr: stderr / period,
@@ -265,6 +268,7 @@ fn describe(
     Some(ChaoticSet {
         kind,
         sense,
+        members: members.len(),
         points,
         exponent: mean / period,
         exponent_stderr: stderr / period,

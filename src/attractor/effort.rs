@@ -17,6 +17,9 @@ pub struct Effort {
     pub watched: usize,
     /// Trajectories that nothing has captured are watched for this many times the first bound more.
     pub watch: u32,
+    /// A set of fewer trajectories than this is proved once more: from so many of its points, for as
+    /// long again, nothing may be captured.
+    pub proved: usize,
     /// Periods over which turns over the top are watched step by step.
     pub turning: usize,
     /// Cells along each side of the picture of where a set lives: enough for its points to fill what it
@@ -52,6 +55,7 @@ impl Effort {
         tries: 24,
         watched: 256,
         watch: 4,
+        proved: 0,
         turning: 400,
         cells: 96,
         trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
@@ -64,8 +68,9 @@ impl Effort {
         tries: 6,
         watched: 16,
         watch: 1,
+        proved: 16,
         turning: 60,
         cells: 20,
-        trap: Sampling { points: 4, rays: 16, levels: 10, ratio: 0.55, rounds: 2, returns: 2 },
+        trap: Sampling { points: 3, rays: 12, levels: 8, ratio: 0.5, rounds: 2, returns: 2 },
     };
 }

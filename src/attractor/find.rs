@@ -272,11 +272,24 @@ impl Catalogue {
             chaos::sets(strobe, &sample, &lost, length as usize, &self.effort, cancel)
                 .into_iter()
                 .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
+                .filter(|new| self.stays(strobe, new, length, cancel))
                 .collect();
         if !new.is_empty() {
             self.sets.extend(new);
             self.rebuild(&strobe.pendulum);
         }
+    }
+
+    /// Whether a set of few trajectories is more than a transient that happens to last.
+    fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
+        let proved = self.effort.proved;
+        if set.members >= proved || set.band.is_some() {
+            return true;
+        }
+        let stride = set.points.len().div_ceil(proved).max(1);
+        let points: Vec<State> = set.points.iter().step_by(stride).copied().collect();
+        capture::outcomes(strobe, &self.traps, length, &points, cancel)
+            .is_some_and(|outcomes| outcomes.iter().all(|o| matches!(o.fate, Fate::Open)))
     }
 
     /// Attractors, traps and regions anew from orbits, rotations and sets.

@@ -5,10 +5,8 @@ use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
-use crate::error::Error;
-use crate::integrate::accuracy::{choose, distance, error_reached};
+use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
-use crate::lanes::Path;
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
@@ -62,77 +60,42 @@ pub struct Search {
     pub starts: Vec<State>,
     /// Periods after which a search begins to watch what is left; by default what damping asks for.
     pub bound: Option<u32>,
-    /// Length of a step times the root of the greatest pull, at most.
-    pub step: f64,
-    /// The instruction set.
-    pub path: Path,
+    /// Points that are kept of an attractor that does not close.
+    pub kept: usize,
 }
 
 impl Search {
-    /// With the longest step that keeps the error within `tol` on all of `samples`, and the greatest
-    /// error that it makes there, as [`error_reached`] defines it on the starts `probes`.
-    ///
-    /// # Errors
-    /// As [`choose`].
-    pub fn calibrated(
-        starts: Vec<State>,
-        bound: Option<u32>,
-        samples: &[Pendulum],
-        probes: &[State],
-        tol: f64,
-    ) -> Result<(Self, f64), Error> {
-        let path = Path::choose()?;
-        let mut step = f64::INFINITY;
-        for pendulum in samples {
-            let (strobe, _) = choose(pendulum, probes, tol, path)?;
-            step = step.min(measure(pendulum) / strobe.steps() as f64);
-        }
-        let search = Self { starts, bound, step, path };
-        let error = |pendulum: &Pendulum| error_reached(&search.strobe(pendulum), probes);
-        let reached = samples.iter().map(error).fold(0.0, f64::max);
-        Ok((search, reached))
-    }
-
-    /// The stroboscopic map of a cell.
+    /// The attractors of a pendulum: rests, orbits that `hints` lead to, and where the starts end.
     #[must_use]
-    pub fn strobe(&self, pendulum: &Pendulum) -> Strobe {
-        let steps = (measure(pendulum) / self.step * (1.0 - 1e-12)).ceil().max(1.0);
-        Strobe::new(pendulum, steps as usize, self.path)
-    }
-
-    /// The attractors of `pendulum`: rests, orbits that `hints` lead to, and where the starts end.
-    #[must_use]
-    pub fn cell(&self, pendulum: &Pendulum, hints: &[Hint], cancel: &AtomicBool) -> Cell {
-        let strobe = self.strobe(pendulum);
-        let mut catalogue = Catalogue::new(&strobe, Effort::BRISK);
+    pub fn cell(&self, strobe: &Strobe, hints: &[Hint], cancel: &AtomicBool) -> Cell {
+        let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
         // At rest nothing moves it away, however unstable: such points are no starts.
-        catalogue.take_over(&strobe, &[([0.0, 0.0], 1), ([PI, 0.0], 1)], cancel);
+        catalogue.take_over(strobe, &[([0.0, 0.0], 1), ([PI, 0.0], 1)], cancel);
         let (cycles, mut further): (Vec<Hint>, Vec<Hint>) =
             hints.iter().partition(|hint| hint.n.is_some());
         let cycles: Vec<(State, usize)> =
             cycles.iter().filter_map(|hint| Some((hint.point, hint.n?))).collect();
-        let lost = catalogue.take_over(&strobe, &cycles, cancel);
+        let lost = catalogue.take_over(strobe, &cycles, cancel);
         further.extend(lost.into_iter().map(|point| Hint { point, n: None, w: 0 }));
         let mut starts = self.starts.clone();
         starts.extend(further.iter().map(|hint| hint.point));
-        let bound = self.bound.unwrap_or_else(|| bound(pendulum));
-        let endings = catalogue.endings(&strobe, &starts, bound, cancel);
-        self.told(&strobe, &catalogue, &endings)
+        let bound = self.bound.unwrap_or_else(|| bound(&strobe.pendulum));
+        let endings = catalogue.endings(strobe, &starts, bound, cancel);
+        self.told(strobe, &catalogue, &endings)
     }
 
     /// Those of `hints` that promise what `cell` does not have: chaos of its kind, a stable orbit that Newton's
     /// method finds from there, or an orbit of that period and winding that may have changed into another.
     #[must_use]
-    pub fn promising(&self, pendulum: &Pendulum, cell: &Cell, hints: Vec<Hint>) -> Vec<Hint> {
-        let symmetric = pendulum.is_mirror_symmetric();
+    pub fn promising(&self, strobe: &Strobe, cell: &Cell, hints: Vec<Hint>) -> Vec<Hint> {
+        let symmetric = strobe.pendulum.is_mirror_symmetric();
         let unlike =
             |hint: &Hint| !cell.found.iter().any(|f| hint.is_like(&f.attractor, symmetric));
         let hints: Vec<Hint> = hints.into_iter().filter(unlike).collect();
         if hints.is_empty() {
             return hints;
         }
-        let strobe = self.strobe(pendulum);
-        let map = PoincareMap::of_steps(&strobe);
+        let map = PoincareMap::of_steps(strobe);
         let promises = |hint: &Hint| {
             let Some(n) = hint.n else { return true };
             let orbit = newton::find(&map, hint.point, n, REACH).filter(PeriodicOrbit::is_stable);
@@ -183,7 +146,7 @@ impl Search {
             .filter(|(attractor, count)| **count > 0 || !attractor.is_held())
             .map(|(attractor, count)| {
                 let mut attractor = attractor.clone();
-                attractor.points.truncate(attractor.n.unwrap_or(1));
+                attractor.points.truncate(attractor.n.unwrap_or(self.kept));
                 Found { attractor, share: share(*count) }
             })
             .collect();
@@ -240,9 +203,4 @@ impl Hint {
 fn bound(pendulum: &Pendulum) -> u32 {
     let periods = 2.0 * DECAY / (pendulum.damping_rate() * pendulum.period());
     periods.clamp(BOUNDS[0], BOUNDS[1]).ceil() as u32
-}
-
-/// The length of a period, in units in which steps are equally hard.
-fn measure(pendulum: &Pendulum) -> f64 {
-    pendulum.period() * pendulum.greatest_pull().sqrt()
 }

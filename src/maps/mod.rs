@@ -7,11 +7,13 @@
 //! - [`layers`]: turns and exponents over a fixed time
 //! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
 //! - [`orbits`]: all closed orbits of one period and winding
-//! - [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
+//! - [`resolution`], [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
+//! - [`bifurcation`]: along one parameter, all attractors, and one followed up and down
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
 pub mod basins;
+pub mod bifurcation;
 pub mod cell;
 pub mod control;
 pub mod label;
@@ -19,5 +21,6 @@ pub mod layers;
 pub mod orbits;
 pub mod parameter_map;
 pub mod reliability;
+pub mod resolution;
 pub mod starts;
 pub mod texture;

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::cell::{Cell, Search};
 use super::control::{Control, pool};
+use super::resolution::Resolution;
 use super::starts::Starts;
 use crate::error::Error;
 use crate::integrate::State;
@@ -19,8 +20,6 @@ use crate::model::Pendulum;
 const COARSEST: usize = 8;
 /// Passes in which neighbours exchange their attractors.
 const EXCHANGES: usize = 2;
-/// Cells along each side whose step error is measured.
-const MEASURED: usize = 5;
 /// Starts of that measurement.
 const PROBES: usize = 100;
 
@@ -45,6 +44,8 @@ pub struct Request {
     /// Periods after which a trajectory that nothing captures is watched for as long again; by default
     /// what damping asks for.
     pub bound: Option<u32>,
+    /// Points that are kept of an attractor that does not close.
+    pub kept: usize,
     /// Workers; 0 for one a processor.
     pub threads: usize,
 }
@@ -54,30 +55,46 @@ pub struct Request {
 pub struct ParameterMap {
     /// Rows of equal second parameter, the first value first.
     pub cells: Vec<Cell>,
-    /// The greatest error on the sampled cells.
-    pub reached_error: f64,
     /// Cells that were searched once more for what a neighbour has.
     pub searched_again: usize,
-    /// The instruction set.
-    pub path: Path,
+    /// How long steps were.
+    pub resolution: Resolution,
 }
 
 /// A grid of pendulums.
-struct Plane<'a> {
-    base: &'a Pendulum,
-    axes: &'a [Range; 2],
+#[derive(Clone, Copy, Debug)]
+pub struct Plane<'a> {
+    /// What does not vary.
+    pub base: &'a Pendulum,
+    /// Columns and rows.
+    pub axes: &'a [Range; 2],
 }
 
 impl Plane<'_> {
-    fn size(&self) -> [usize; 2] {
+    /// How many columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
         [self.axes[0].values.len(), self.axes[1].values.len()]
     }
 
-    fn pendulum(&self, cell: usize) -> Pendulum {
+    /// Column and row of a cell.
+    #[must_use]
+    pub fn place(&self, cell: usize) -> [usize; 2] {
         let columns = self.size()[0];
+        [cell % columns, cell / columns]
+    }
+
+    /// The cell at a column and row.
+    #[must_use]
+    pub fn cell(&self, column: usize, row: usize) -> usize {
+        row * self.size()[0] + column
+    }
+
+    /// The pendulum of a cell.
+    #[must_use]
+    pub fn pendulum(&self, cell: usize) -> Pendulum {
         let mut pendulum = self.base.clone();
-        let at = [cell % columns, cell / columns];
-        for (axis, at) in self.axes.iter().zip(at) {
+        for (axis, at) in self.axes.iter().zip(self.place(cell)) {
             pendulum.set_parameter(axis.index, axis.values[at]);
         }
         pendulum
@@ -86,7 +103,7 @@ impl Plane<'_> {
     /// Those cells at the distance `stride` in both directions, or in one, that exist.
     fn neighbours(&self, cell: usize, stride: usize, diagonal: bool) -> Vec<usize> {
         let [columns, rows] = self.size();
-        let (i, j) = (cell % columns, cell / columns);
+        let [i, j] = self.place(cell);
         let mut found = Vec::with_capacity(8);
         for b in [j.checked_sub(stride), Some(j), Some(j + stride)] {
             for a in [i.checked_sub(stride), Some(i), Some(i + stride)] {
@@ -121,17 +138,13 @@ pub fn parameter_map(
         return Err(Error::Range { name, value: 0.0, allowed: "1 or more" });
     }
     let pool = pool(request.threads)?;
-    let samples: Vec<Pendulum> = sampled(columns)
-        .into_iter()
-        .flat_map(|i| sampled(rows).into_iter().map(move |j| j * columns + i))
-        .map(|cell| plane.pendulum(cell))
-        .collect();
     let probes = Starts::List(request.starts.clone()).sampled_states(PROBES, 0);
-    let (search, reached_error) = pool.install(|| {
-        Search::calibrated(request.starts.clone(), request.bound, &samples, &probes, request.tol)
-    })?;
+    let path = Path::choose()?;
+    let resolution = pool.install(|| Resolution::new(&plane, &probes, request.tol, path))?;
+    let search =
+        Search { starts: request.starts.clone(), bound: request.bound, kept: request.kept };
+    let strobe = |cell: usize| resolution.strobe(&plane.pendulum(cell), plane.place(cell));
     control.begin(count);
-    let symmetric = |pendulum: &Pendulum| pendulum.is_mirror_symmetric();
     let mut cells: Vec<Option<Cell>> = vec![None; count];
     let mut stride = COARSEST;
     while stride > 0 {
@@ -144,11 +157,11 @@ pub fn parameter_map(
         let found: Vec<Cell> = pool.install(|| {
             let one = |cell: &usize| {
                 control.check()?;
-                let pendulum = plane.pendulum(*cell);
+                let strobe = strobe(*cell);
                 let around = plane.neighbours(*cell, stride, true);
                 let others = around.iter().filter_map(|other| known[*other].as_ref());
-                let hints = Cell::hints(others, symmetric(&pendulum));
-                let cell = search.cell(&pendulum, &hints, control.flag());
+                let hints = Cell::hints(others, strobe.pendulum.is_mirror_symmetric());
+                let cell = search.cell(&strobe, &hints, control.flag());
                 control.add(1);
                 Ok(cell)
             };
@@ -166,17 +179,17 @@ pub fn parameter_map(
         let again: Vec<(usize, Cell)> = pool.install(|| {
             let one = |cell: usize| {
                 control.check()?;
-                let pendulum = plane.pendulum(cell);
-                let symmetric = symmetric(&pendulum);
+                let strobe = strobe(cell);
+                let symmetric = strobe.pendulum.is_mirror_symmetric();
                 let around = plane.neighbours(cell, 1, false);
                 let theirs = Cell::hints(around.iter().map(|c| &known[*c]), symmetric);
-                let lacking = search.promising(&pendulum, &known[cell], theirs);
+                let lacking = search.promising(&strobe, &known[cell], theirs);
                 if lacking.is_empty() {
                     return Ok(None);
                 }
                 let mut hints = Cell::hints(std::iter::once(&known[cell]), symmetric);
                 hints.extend(lacking);
-                Ok(Some((cell, search.cell(&pendulum, &hints, control.flag()))))
+                Ok(Some((cell, search.cell(&strobe, &hints, control.flag()))))
             };
             (0..count)
                 .into_par_iter()
@@ -189,12 +202,5 @@ pub fn parameter_map(
         }
     }
     control.check()?;
-    Ok(ParameterMap { cells, reached_error, searched_again, path: search.path })
-}
-
-/// Places spread over a side, its ends among them.
-fn sampled(count: usize) -> Vec<usize> {
-    let mut places: Vec<usize> = (0..MEASURED).map(|k| k * (count - 1) / (MEASURED - 1)).collect();
-    places.dedup();
-    places
+    Ok(ParameterMap { cells, searched_again, resolution })
 }

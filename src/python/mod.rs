@@ -121,6 +121,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(orbits::orbits, module)?)?;
     module.add_function(wrap_pyfunction!(planes::parameter_names, module)?)?;
     module.add_function(wrap_pyfunction!(planes::parameter_map, module)?)?;
+    module.add_function(wrap_pyfunction!(planes::bifurcation, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_rows, module)?)?;

@@ -7,6 +7,7 @@ use pyo3::types::PyDict;
 use super::watch::watched;
 use super::{Parameters, pendulum};
 use crate::integrate::State;
+use crate::maps::bifurcation as diagram;
 use crate::maps::cell::{Cell, Found};
 use crate::maps::parameter_map::{Range, Request, parameter_map as search};
 
@@ -38,12 +39,73 @@ pub fn parameter_map<'py>(
     let range = |(index, values): RangeTuple| Range { index, values };
     let starts: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
-    let request = Request { axes: [range(axes.0), range(axes.1)], starts, tol, bound, threads };
+    let request =
+        Request { axes: [range(axes.0), range(axes.1)], starts, tol, bound, kept: 1, threads };
     let map = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
     let dict = attractors_of(py, &map.cells)?;
-    dict.set_item("reached_error", map.reached_error)?;
+    dict.set_item("reached_error", map.resolution.reached_error)?;
     dict.set_item("searched_again", map.searched_again)?;
-    dict.set_item("simd", map.path.name())?;
+    dict.set_item("simd", crate::lanes::Path::choose()?.name())?;
+    Ok(dict)
+}
+
+/// The attractors along one parameter, their points, and what is followed up and down.
+#[pyfunction]
+#[pyo3(signature = (parameters, axis, theta, velocity, first, tol, bound, threads, progress=None))]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
+pub fn bifurcation<'py>(
+    py: Python<'py>,
+    parameters: Parameters,
+    axis: RangeTuple,
+    theta: PyReadonlyArray1<'py, f64>,
+    velocity: PyReadonlyArray1<'py, f64>,
+    first: Option<(f64, f64)>,
+    tol: f64,
+    bound: Option<u32>,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let pendulum = pendulum(parameters)?;
+    let starts: Vec<State> =
+        theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
+    let request = diagram::Request {
+        axis: Range { index: axis.0, values: axis.1 },
+        starts,
+        first: first.map(|(theta, velocity)| [theta, velocity]),
+        tol,
+        bound,
+        threads,
+    };
+    let found = watched(py, progress.as_ref(), |control| {
+        diagram::bifurcation(&pendulum, &request, control)
+    })?;
+    let dict = attractors_of(py, &found.map.cells)?;
+    dict.set_item("reached_error", found.map.resolution.reached_error)?;
+    dict.set_item("searched_again", found.map.searched_again)?;
+    dict.set_item("simd", crate::lanes::Path::choose()?.name())?;
+    let all = found.map.cells.iter().flat_map(|cell| &cell.found).enumerate();
+    let points: Vec<(i32, State)> = all
+        .flat_map(|(i, f)| f.attractor.points.iter().map(move |point| (i as i32, *point)))
+        .collect();
+    let column = |k: usize| -> Vec<f64> { points.iter().map(|(_, p)| p[k]).collect() };
+    let owner: Vec<i32> = points.iter().map(|(i, _)| *i).collect();
+    dict.set_item("point_entry", owner.into_pyarray(py))?;
+    dict.set_item("point_theta", column(0).into_pyarray(py))?;
+    dict.set_item("point_velocity", column(1).into_pyarray(py))?;
+    for (name, followed) in [("up", &found.up), ("down", &found.down)] {
+        let on: Vec<i32> = followed.iter().map(|f| f.on.map_or(-1, |k| k as i32)).collect();
+        dict.set_item(name, on.into_pyarray(py))?;
+        let loose: Vec<(i32, State)> = followed
+            .iter()
+            .enumerate()
+            .flat_map(|(k, f)| f.loose.iter().map(move |point| (k as i32, *point)))
+            .collect();
+        let value: Vec<i32> = loose.iter().map(|(k, _)| *k).collect();
+        let column = |k: usize| -> Vec<f64> { loose.iter().map(|(_, p)| p[k]).collect() };
+        dict.set_item(format!("{name}_value"), value.into_pyarray(py))?;
+        dict.set_item(format!("{name}_theta"), column(0).into_pyarray(py))?;
+        dict.set_item(format!("{name}_velocity"), column(1).into_pyarray(py))?;
+    }
     Ok(dict)
 }
 

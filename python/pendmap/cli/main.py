@@ -23,6 +23,8 @@ _COMMANDS = {
     "effects": "Show the library of effects: formula, parameters, which data reveal each.",
     "simulate": "Integrate one trajectory: time history, phase plane, Poincaré section.",
     "basins": "Map the basins of attraction.",
+    "map": "Map which attractors exist over two parameters.",
+    "bifurcation": "Draw stroboscopic points against a parameter, with hysteresis.",
     "orbit": "Find all periodic orbits of one period and winding, stable and unstable.",
     "look": "Say what a record holds: channels, rate, noise, releases, what is odd about it.",
     "identify": "Find natural frequency, damping and friction in a free decay, by every method.",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.types import NUMBER
+from pendmap.cli.types import NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
 from pendmap.model.quantities import check
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     Command = Callable[..., Any]
 
-__all__ = ["model_from", "model_options", "rig_from"]
+__all__ = ["model_from", "model_options", "rig_from", "varied_model_options"]
 
 _BARE = {
     "gamma": "Viscous damping c/(m w0).",
@@ -35,8 +36,40 @@ _SI = {
 _SAME = {"stroke_mm": "p", "frequency_hz": "omega"}
 
 
+def varied_model_options(function: Command) -> Command:
+    """Add the same, where parameters may be ranges: ``ranges`` holds those, in the order typed."""
+
+    @functools.wraps(function)
+    def with_ranges(**given: Any) -> Any:  # noqa: ANN401 (as the command)
+        ranges: dict[str, AxisText] = {}
+        for name, value in list(given.items()):
+            if name in _BARE and isinstance(value, AxisText):
+                ranges[name], given[name] = value, None
+            for other, span in value if name == "vary" else ():
+                if other in ranges:
+                    raise click.UsageError(f"--vary {other}: is there twice, allowed is once")
+                ranges[other] = span
+        given.pop("vary")
+        return function(**given, ranges=ranges)
+
+    vary = click.option(
+        "--vary",
+        nargs=2,
+        multiple=True,
+        type=(str, RANGE),
+        metavar="NAME A:B:N",
+        help="A parameter that varies, N values from A to B: p, omega, ..., EFFECT.PARAMETER; of a"
+        " model in SI also Omega, c_over_m, Tr, phi.",
+    )
+    return _options(vary(with_ranges), NUMBER_OR_RANGE)
+
+
 def model_options(function: Command) -> Command:
     """Add the parameters of the pendulum, the presets and the model file."""
+    return _options(function, NUMBER)
+
+
+def _options(function: Command, kind: click.ParamType[Any]) -> Command:
     model = click.option(
         "--model",
         "model",
@@ -54,7 +87,7 @@ def model_options(function: Command) -> Command:
         default = getattr(Pendulum(), name, None)
         function = click.option(
             f"--{name.replace('_', '-')}",
-            type=NUMBER,
+            type=kind if name in _BARE else NUMBER,
             default=None,
             help=text if default is None else f"{text}  [default: {default:g}]",
         )(function)

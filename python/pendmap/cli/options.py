@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.checks import MOST_THREADS
+from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
-from pendmap.cli.types import OutputFile, Whole
+from pendmap.cli.types import NUMBER, OutputFile, Whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -19,7 +19,14 @@ if TYPE_CHECKING:
     Command = Callable[..., Any]
     Decorator = Callable[[Command], Command]
 
-__all__ = ["RESULTS", "Outputs", "check_view", "output_options", "progress_options"]
+__all__ = [
+    "RESULTS",
+    "Outputs",
+    "check_view",
+    "output_options",
+    "progress_options",
+    "search_options",
+]
 
 
 def progress_options(function: Command) -> Command:
@@ -29,6 +36,28 @@ def progress_options(function: Command) -> Command:
     )
     quiet = click.option("--quiet", is_flag=True, help="No progress, no summary.")
     return threads(quiet(function))
+
+
+def search_options(function: Command) -> Command:
+    """Add what the search for attractors at each of many parameters takes."""
+    for option in (
+        click.option(
+            "--seed", type=Whole(0, MOST_SEED), default=0, help="Shifts the starts.  [default: 0]"
+        ),
+        click.option(
+            "--max-periods",
+            type=Whole(1, MOST_PERIODS),
+            help="Bound after which a start is watched.  [default: as damping asks]",
+        ),
+        click.option(
+            "--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]"
+        ),
+        click.option(
+            "--starts", type=Whole(1, MOST_CELLS), default=9, help="Starts each.  [default: 9]"
+        ),
+    ):
+        function = option(function)
+    return function
 
 
 RESULTS = (".nc", ".zarr")

@@ -14,7 +14,16 @@ from pendmap.checks import MOST_CELLS, shown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["AXIS", "NUMBER", "AxisText", "OutputFile", "ReportFile", "Whole"]
+__all__ = [
+    "AXIS",
+    "NUMBER",
+    "NUMBER_OR_RANGE",
+    "RANGE",
+    "AxisText",
+    "OutputFile",
+    "ReportFile",
+    "Whole",
+]
 
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
@@ -76,13 +85,15 @@ class AxisText(NamedTuple):
 
 class _Axis(click.ParamType[AxisText]):
     name = "A:B:N"
+    says = "N cells between A and B, like -pi:pi:1000"
+    counts = "cells"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> AxisText:
         if isinstance(value, AxisText):
             return value
-        wanted = "allowed is A:B:N, N cells between A and B, like -pi:pi:1000"
+        wanted = f"allowed is A:B:N, {self.says}"
         parts = str(value).split(":")
         if len(parts) != 3:  # noqa: PLR2004
             self.fail(f"{value!r}: {wanted}", param, ctx)
@@ -93,8 +104,26 @@ class _Axis(click.ParamType[AxisText]):
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
         if not 1 <= count <= MOST_CELLS:
-            self.fail(f"{value!r}: {count} cells, allowed are 1 to {MOST_CELLS}", param, ctx)
+            self.fail(
+                f"{value!r}: {count} {self.counts}, allowed are 1 to {MOST_CELLS}", param, ctx
+            )
         return AxisText(low, high, count)
+
+
+class _Range(_Axis):
+    says = "N values from A to B, both included, like 0.5:2:100"
+    counts = "values"
+
+
+class _NumberOrRange(click.ParamType[float | AxisText]):
+    name = "number|A:B:N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float | AxisText:
+        if isinstance(value, AxisText) or ":" in str(value):
+            return RANGE.convert(value, param, ctx)
+        return NUMBER.convert(value, param, ctx)
 
 
 class OutputFile(click.ParamType[Path]):
@@ -159,3 +188,5 @@ def _writable(path: Path) -> bool:
 
 NUMBER = _Number()
 AXIS = _Axis()
+RANGE = _Range()
+NUMBER_OR_RANGE = _NumberOrRange()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, orbits, style, trajectory
+from pendmap.figures import basins, diagrams, orbits, planes, style, trajectory
 from pendmap.figures import runs as runs_figure
 from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
@@ -43,7 +43,13 @@ __all__ = [
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
 
-_KINDS = {"basins": basins.figure, "orbits": orbits.figure, "trajectory": trajectory.figure}
+_KINDS = {
+    "basins": basins.figure,
+    "bifurcation": diagrams.figure,
+    "orbits": orbits.figure,
+    "parameter_map": planes.figure,
+    "trajectory": trajectory.figure,
+}
 
 
 def draw(  # noqa: PLR0913 (all of these a user may choose)

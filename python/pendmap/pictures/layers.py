@@ -10,12 +10,13 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.model import Effect
+from pendmap.model.rig import COUNTERPARTS
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.words import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     import xarray as xr
 
@@ -28,6 +29,7 @@ __all__ = [
     "refuse_lists",
     "reliable",
     "settles",
+    "symbol",
     "unit",
     "warning",
     "what",
@@ -191,17 +193,24 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
     }[layer]
 
 
-def parameters(attrs: Mapping[Any, Any]) -> str:
+def symbol(name: str, unit: str = "1") -> str:
+    """Return the symbol of a parameter with its unit, a blank between them."""
+    own = _SYMBOLS.get(name) or _SI_SYMBOLS.get(name, (name.replace("_", " "), ""))[0]
+    return own if unit in ("", "1") else f"{own} ({unit})"
+
+
+def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
     """Return the model's parameters in one line, in its units, then its effects.
 
     Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
-    there is no frequency and no phase.
+    there is no frequency and no phase; nor do those of ``without``, which vary.
     """
-    driven = float(attrs.get("p", 1.0)) != 0.0
+    driven = float(attrs.get("p", 1.0)) != 0.0 or "p" in without
     units = Units.of(attrs)
     symbols = _SI_SYMBOLS if units.si else {key: (text, "") for key, text in _SYMBOLS.items()}
     always = {"w0", "gamma", "c_over_m", "p", *(("omega", "Omega") if driven else ())}
-    never = set() if driven else {"omega", "phase", "Omega", "phi"}
+    never = set(without) | (set() if driven else {"omega", "phase", "Omega", "phi"})
+    never |= {COUNTERPARTS[name][0] for name in without if name in COUNTERPARTS}
     parts = [
         f"{symbol} = {float(attrs[key]):.6g} {unit}".rstrip().replace("-", "\N{MINUS SIGN}")
         for key, (symbol, unit) in symbols.items()

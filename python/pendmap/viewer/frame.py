@@ -38,6 +38,12 @@ INK = (150, 150, 150)
 SIDE = 1000.0
 """Width of a frame on the screen, in the view's own units."""
 
+SHORT = 8
+"""Letters of a name that has room beside the ticks."""
+
+PLAIN = 0.8
+"""Height over width of a frame that is no phase plane."""
+
 TIMELINE = "sim_time"
 
 
@@ -45,7 +51,7 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     """Return an empty recording, identified by the dataset's content."""
     attrs = {str(k): v for k, v in dataset.attrs.items() if k not in ("seconds", "summary")}
     content = hashlib.blake2b(repr(sorted(attrs.items())).encode(), digest_size=12)
-    telling = next(name for name in ("label", "theta", "theta_point") if name in dataset)
+    telling = next(name for name in ("label", "regime", "theta", "theta_point") if name in dataset)
     content.update(np.ascontiguousarray(dataset[telling].values).data)
     return identified(content.hexdigest())
 
@@ -120,15 +126,20 @@ class Frame:
         Range of the velocity.
     units : Units
         What it is counted in.
+    axes : (str, str) or None
+        Names of other quantities, symbol and unit, where it is no phase plane.
     """
 
     x: tuple[float, float]
     y: tuple[float, float]
     units: Units = NONDIMENSIONAL
+    axes: tuple[str, str] | None = None
 
     @property
     def height(self) -> float:
         """Height on the screen: that of the range, but neither a slit nor a tower."""
+        if self.axes:
+            return PLAIN * SIDE
         low, high = (self.units.bare(bound, VELOCITY) for bound in self.y)
         ratio: float = (high - low) / (self.x[1] - self.x[0])
         return SIDE * min(max(ratio, 0.3), 1.3)
@@ -163,7 +174,7 @@ class Frame:
             name=name,
             visual_bounds=rrb.VisualBounds2D(
                 x_range=[-190.0, SIDE + 190.0],
-                y_range=[-100.0 if self.units.si else -60.0, self.height + 150.0 + below],
+                y_range=[-100.0, self.height + 150.0 + below],
             ),
             time_ranges=time_ranges,
         )
@@ -176,7 +187,7 @@ class Frame:
         places: list[list[float]] = []
         labels: list[str] = []
         (across, along), (up, rising) = (
-            plane.short_ticks(*self.x, angle=True),
+            plane.short_ticks(*self.x, angle=self.axes is None),
             plane.short_ticks(*self.y, angle=False),
         )
         for value, label in along:
@@ -190,11 +201,10 @@ class Frame:
             places.append([-55, at - 22])
             labels.append(label)
         # With its unit the velocity's name is too long to stand beside the ticks.
-        places += [[w / 2, h + 75], [60, -80] if self.units.si else [-135, h / 2 - 22]]
-        labels += [
-            plane.shifted(names.ANGLE, across),
-            plane.shifted(names.speed(self.units), up),
-        ]
+        below, beside = self.axes or (names.ANGLE, names.speed(self.units))
+        above = self.units.si or len(beside) > SHORT
+        places += [[w / 2, h + 75], [60, -80] if above else [-135, h / 2 - 22]]
+        labels += [plane.shifted(below, across), plane.shifted(beside, up)]
         thin = rr.Radius.ui_points(0.75)
         stream.log(
             f"{root}/axes/frame", rr.LineStrips2D(lines, colors=[INK], radii=thin), static=True
@@ -205,7 +215,7 @@ class Frame:
         self,
         stream: rr.RecordingStream,
         root: str,
-        image: rr.SegmentationImage | rr.DepthImage,
+        image: rr.SegmentationImage | rr.DepthImage | rr.Image,
         *,
         low: float,
         high: float,

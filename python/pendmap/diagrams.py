@@ -1,0 +1,217 @@
+"""Bifurcation diagrams: attractors along one parameter, all of them, and followed up and down."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core, checks
+from pendmap.branches import branches
+from pendmap.cell_search import STARTS, CellSearch
+from pendmap.errors import InputError
+from pendmap.model import without_dimensions
+from pendmap.model.units import VELOCITY
+from pendmap.planes import entries, undecided
+from pendmap.regimes import kind_of
+from pendmap.store import FORMAT_VERSION
+from pendmap.summary import of_motion
+from pendmap.varied import varied
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from pendmap.grid import Grid
+    from pendmap.model import Pendulum, Rig
+    from pendmap.model.units import Units
+    from pendmap.varied import Varied
+
+__all__ = ["bifurcation"]
+
+_LISTED = 12
+
+
+def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    ranges: Mapping[str, tuple[float, float, int]],
+    *,
+    start: tuple[float, float] | None = None,
+    starts: int = STARTS,
+    box: Grid | None = None,
+    tol: float = 1e-6,
+    max_periods: int | None = None,
+    threads: int | None = None,
+    seed: int = 0,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """Stroboscopic points of the attractors against one parameter.
+
+    At every value all attractors are searched as by :func:`pendmap.parameter_map`: from several
+    starts, and from what neighbouring values have. Besides, one motion is followed as the parameter
+    slowly grows, and one as it falls: at each value it goes on from where it was, moved by 1e-6,
+    until it has arrived on an attractor. Where the two differ there is hysteresis.
+
+    Attractors at neighbouring values that are alike (same kind, period and winding, points near one
+    another) make a branch. At a bifurcation one branch ends and others begin.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; the parameter that varies replaces its own.
+    ranges : mapping of str to (float, float, int)
+        One parameter with first value, last value (both included) and how many; names as of
+        :func:`pendmap.parameter_map`.
+    start : (float, float), optional
+        Angle and velocity from which both sweeps start; by default each on the attractor that most
+        starts end on there.
+    starts, box, tol, max_periods, threads, seed, progress
+        As of :func:`pendmap.parameter_map`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
+        ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with ``entry_branch``;
+        branches over ``branch``: ``branch_kind``, ``branch_first``, ``branch_last``; ``up`` and
+        ``down`` over the parameter: the entry that the sweep is on, -1 where that is none of them;
+        its points there over ``loose``.
+
+    Raises
+    ------
+    InputError
+        If a parameter or value is not allowed, the model has an effect that no map can have, or no
+        step reaches ``tol``.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    (axis,) = varied(model, ranges, 1)
+    checks.call("progress", progress)
+    search = CellSearch(starts, box, tol, max_periods, threads, seed)
+    theta, velocity = search.initial(units)
+    first = None
+    if start is not None:
+        angle, speed = (checks.number("start", part) for part in start)
+        first = (angle, units.bare(speed, VELOCITY))
+    began = time.perf_counter()
+    try:
+        raw = _core.bifurcation(
+            pendulum.parameters,
+            axis.kernel,
+            theta,
+            velocity,
+            first,
+            tol,
+            max_periods,
+            search.workers,
+            progress,
+        )
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    dataset = _dataset(raw, axis, units)
+    dataset.attrs = {
+        "kind": "bifurcation",
+        "title": model.title,
+        **model.attributes,
+        "section": model.units.section,
+        "varied": axis.name,
+        "points": dataset.sizes["point"],
+        **search.attributes(raw, units),
+        "seconds": time.perf_counter() - began,
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [*_summary(dataset), *of_motion(model.effects, "attractors are")]
+    dataset.attrs["summary"] = "\n".join(lines)
+    return dataset
+
+
+def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
+    names = [
+        kind_of(kind, int(n), int(w))
+        for kind, n, w in zip(raw["kind"], raw["n"], raw["w"], strict=True)
+    ]
+    kinds = sorted(set(names))
+    which = np.array([kinds.index(name) for name in names], dtype=np.intp)
+    found = branches(raw, axis.values.size)
+    owner = raw["point_entry"]
+    value = axis.values[raw["cell"]] if raw["cell"].size else np.empty(0)
+    speed = {"units": units.of_velocity}
+    ends = np.array([[own[0], own[-1]] for own in found.members], dtype=np.intp).reshape(-1, 2)
+    loose = {
+        key: np.concatenate([raw[f"up_{key}"], raw[f"down_{key}"]])
+        for key in ("value", "theta", "velocity")
+    }
+    data: dict[str, Any] = {
+        **entries(raw, which, units),
+        "entry_branch": ("entry", found.of_entry),
+        "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
+        "branch_w": ("branch", raw["w"][ends[:, 0]]),
+        "branch_first": ("branch", value[ends[:, 0]], axis.attributes),
+        "branch_last": ("branch", value[ends[:, 1]], axis.attributes),
+        "point_entry": ("point", owner),
+        "point_value": ("point", value[owner], axis.attributes),
+        "point_theta": ("point", raw["point_theta"], {"units": "rad"}),
+        "point_velocity": ("point", units.given(raw["point_velocity"], VELOCITY), speed),
+        "up": (axis.name, raw["up"], {"comment": "entry, -1: none"}),
+        "down": (axis.name, raw["down"], {"comment": "entry, -1: none"}),
+        "undecided": (axis.name, raw["undecided"]),
+        "failed": (axis.name, raw["failed"]),
+        "loose_sweep": (
+            "loose",
+            np.repeat([1, -1], [raw["up_value"].size, raw["down_value"].size]),
+        ),
+        "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
+        "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
+        "loose_velocity": ("loose", units.given(loose["velocity"], VELOCITY), speed),
+    }
+    coordinates = {
+        axis.name: (axis.name, axis.values, axis.attributes),
+        "kind": ("kind", np.array(kinds, dtype=str)),
+    }
+    return xr.Dataset(data, coords=coordinates)
+
+
+def _summary(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    name = a["varied"]
+    values = dataset[name].values
+    count = dataset.sizes["branch"]
+    joined = counted(count, "branch", "branches")
+    lines = [
+        f"{name} = {values[0]:g} to {values[-1]:g}: {counted(values.size, 'value')}, {joined}."
+    ]
+    first, last = dataset["branch_first"].values, dataset["branch_last"].values
+    longest = np.argsort(-(last - first), kind="stable")[:_LISTED]
+    for k in sorted(longest, key=lambda k: (first[k], last[k])):
+        kind = str(dataset["kind"].values[int(dataset["branch_kind"][k])])
+        sense = {1: ", forward", -1: ", backward"}.get(int(np.sign(dataset["branch_w"][k])), "")
+        lines.append(f"{kind}{sense}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
+    if count > _LISTED:
+        lines.append(f"{count - _LISTED} shorter branches are in the result.")
+    lines += _hysteresis(dataset, name)
+    lines += undecided(a)
+    lines.append(
+        f"{counted(a['starts'], 'start')} a value; {counted(a['points'], 'point')}; error after 5 "
+        f"periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "
+        f"{counted(a['threads'], 'thread')}."
+    )
+    return lines
+
+
+def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
+    """Say where the two sweeps are on attractors that differ in kind."""
+    kind = np.append(dataset["entry_kind"].values, -1)
+    differ = kind[dataset["up"].values] != kind[dataset["down"].values]
+    if not differ.any():
+        return ["Up and down are on the same kinds of attractor everywhere."]
+    values = dataset[name].values
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], differ.astype(int), [0]])))
+    spans = sorted(zip(edges[::2], edges[1::2] - 1, strict=True), key=lambda s: s[0] - s[1])[:3]
+    said = ", ".join(f"{values[i]:.4g} to {values[j]:.4g}" for i, j in sorted(spans))
+    more = " and less" if len(edges) > 2 * len(spans) else ""
+    return [f"Up and down differ at {name} = {said}{more}: hysteresis."]

@@ -1,0 +1,121 @@
+"""Bifurcation diagrams as they are drawn: points, exponents and sweeps, coloured by attractor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendmap import palette
+from pendmap.pictures import layers, plane
+from pendmap.pictures.legend import typeset
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+
+__all__ = ["MOST", "Family", "across", "families", "name", "title"]
+
+MOST = 14
+"""Families that a legend names; the rest are drawn in the grey of what has no name."""
+
+LOOSE = "on no attractor found"
+"""What a sweep is called where it has not arrived."""
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """All attractors of a kind, period and winding.
+
+    Attributes
+    ----------
+    name : str
+        ``"rotation 1:+1"``.
+    colour : str
+        ``"#rrggbb"``.
+    points : ndarray, shape (m, 3)
+        Value, angle, velocity.
+    exponents : ndarray, shape (k, 2)
+        Value, largest exponent.
+    up, down : ndarray of bool
+        The values at which the sweeps are on one of them.
+    """
+
+    name: str
+    colour: str
+    points: npt.NDArray[np.float64]
+    exponents: npt.NDArray[np.float64]
+    up: npt.NDArray[np.bool_]
+    down: npt.NDArray[np.bool_]
+
+    @property
+    def text(self) -> str:
+        """Its line in a legend."""
+        return typeset(self.name)
+
+
+def families(dataset: xr.Dataset) -> list[Family]:
+    """Return the families, those that occur at most values first."""
+    kind, n, w, cell = (dataset[f"entry_{key}"].values for key in ("kind", "n", "w", "cell"))
+    keys = np.stack([kind, n, w], axis=1)
+    every, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    which = which.reshape(-1)
+    values = dataset[str(dataset.attrs["varied"])].values
+    owner = dataset["point_entry"].values
+    points = np.stack(
+        [dataset[f"point_{key}"].values for key in ("value", "theta", "velocity")], axis=1
+    )
+    sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
+    found: list[Family] = []
+    for k in np.argsort(-count, kind="stable"):
+        word, period, turns = every[k]
+        called = _name(str(dataset["kind"].values[word]), int(period), int(turns))
+        mine = which == k
+        exponents = np.stack([values[cell[mine]], dataset["entry_exponent"].values[mine]], axis=1)
+        shade = palette.colour(called) if len(found) < MOST else palette.UNNAMED
+        found.append(
+            Family(
+                called,
+                shade,
+                points[mine[owner]],
+                exponents,
+                sweeps["up"] == k,
+                sweeps["down"] == k,
+            )
+        )
+    return found
+
+
+def _name(kind: str, n: int, w: int) -> str:
+    """Return an attractor's name from that of its kind."""
+    family = kind.rpartition(" ")[0]
+    if kind.startswith("oscillation"):
+        return f"oscillation {n}:0"
+    if family == "rotation":
+        return f"rotation {n}:{w:+d}"
+    return f"{kind} {'+' if w > 0 else '-'}" if w and n == 0 else kind
+
+
+def name(dataset: xr.Dataset) -> str:
+    """Return the name of the parameter with its unit."""
+    own = str(dataset.attrs["varied"])
+    return layers.symbol(own, str(dataset[own].attrs.get("units", "1")))
+
+
+def across(dataset: xr.Dataset) -> tuple[float, float]:
+    """Return the outer edges of the parameter's values."""
+    return plane.cell_edges(dataset[str(dataset.attrs["varied"])])
+
+
+def title(dataset: xr.Dataset) -> str:
+    """Return the title of a figure."""
+    return f"Bifurcations over {name(dataset).split(' (')[0]}"
+
+
+def subtitle(dataset: xr.Dataset) -> str:
+    """Return what does not vary."""
+    own = str(dataset.attrs["varied"])
+    count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
+    fixed = layers.parameters(dataset.attrs, [own])
+    return f"{fixed};   {count} values, {starts} starts each"

@@ -1,0 +1,170 @@
+//! The attractors along one parameter: all that coexist, and the one that a slow change follows, up and down.
+
+use super::cell::Cell;
+use super::control::{Control, pool};
+use super::parameter_map::{ParameterMap, Plane, Range, Request as MapRequest, parameter_map};
+use crate::attractor::Attractor;
+use crate::error::Error;
+use crate::integrate::accuracy::distance;
+use crate::integrate::{State, Strobe};
+use crate::model::Pendulum;
+
+/// Points that are kept of an attractor that does not close.
+const KEPT: usize = 200;
+/// Periods between two looks at where what is followed has come.
+const ROUND: usize = 32;
+/// Looks before it counts as on no known orbit.
+const ROUNDS: usize = 12;
+/// So near to a known orbit, a period later too, it has arrived.
+const ARRIVED: f64 = 1e-3;
+/// What is followed is moved by this at every value: no motion stays on an orbit that repels.
+const NUDGE: f64 = 1e-6;
+/// The place of the phase in the list of parameters, which a plane of one row needs.
+const PHASE: usize = 5;
+
+/// What to compute, and how well.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// The parameter and its values.
+    pub axis: Range,
+    /// Where the trajectories of the search start.
+    pub starts: Vec<State>,
+    /// Where what is followed starts, at either end; by default on the attractor that most starts end on.
+    pub first: Option<State>,
+    /// As of [`MapRequest`].
+    pub tol: f64,
+    /// As of [`MapRequest`].
+    pub bound: Option<u32>,
+    /// Workers; 0 for one a processor.
+    pub threads: usize,
+}
+
+/// What is followed, at one value.
+#[derive(Clone, Debug, Default)]
+pub struct Followed {
+    /// The attractor that it is on, as a place among those of all values one after the other.
+    pub on: Option<usize>,
+    /// Its points, where that is none.
+    pub loose: Vec<State>,
+}
+
+/// A bifurcation diagram.
+#[derive(Clone, Debug)]
+pub struct Diagram {
+    /// The attractors at each value.
+    pub map: ParameterMap,
+    /// What a slow increase follows, value by value.
+    pub up: Vec<Followed>,
+    /// What a slow decrease follows, likewise in the order of the values.
+    pub down: Vec<Followed>,
+}
+
+/// All attractors along one parameter, and what is followed from each end to the other.
+///
+/// # Errors
+/// As of [`parameter_map`].
+pub fn bifurcation(
+    base: &Pendulum,
+    request: &Request,
+    control: &Control,
+) -> Result<Diagram, Error> {
+    // A plane of one row: of what varies nowhere any parameter will do.
+    let other = if request.axis.index == PHASE { 0 } else { PHASE };
+    let value = base.parameters()[other].1;
+    let axes = [request.axis.clone(), Range { index: other, values: vec![value] }];
+    let asked = MapRequest {
+        axes,
+        starts: request.starts.clone(),
+        tol: request.tol,
+        bound: request.bound,
+        kept: KEPT,
+        threads: request.threads,
+    };
+    let map = parameter_map(base, &asked, control)?;
+    let plane = Plane { base, axes: &asked.axes };
+    let offset = offsets(&map.cells);
+    let sweep = |order: Vec<usize>| follow(&map, &plane, &offset, order, request.first, control);
+    let count = map.cells.len();
+    let (up, down) = pool(request.threads)?.install(|| {
+        rayon::join(|| sweep((0..count).collect()), || sweep((0..count).rev().collect()))
+    });
+    Ok(Diagram { up: up?, down: down?, map })
+}
+
+/// The place of each cell's first attractor among those of all.
+fn offsets(cells: &[Cell]) -> Vec<usize> {
+    let mut next = 0;
+    let place = |cell: &Cell| {
+        next += cell.found.len();
+        next - cell.found.len()
+    };
+    cells.iter().map(place).collect()
+}
+
+fn follow(
+    map: &ParameterMap,
+    plane: &Plane,
+    offset: &[usize],
+    order: Vec<usize>,
+    first: Option<State>,
+    control: &Control,
+) -> Result<Vec<Followed>, Error> {
+    let mut followed = vec![Followed::default(); map.cells.len()];
+    let leading = order.first().and_then(|cell| leading(&map.cells[*cell]));
+    let mut state = first.or(leading).unwrap_or([NUDGE, NUDGE]);
+    for cell in order {
+        control.check()?;
+        let strobe = map.resolution.strobe(&plane.pendulum(cell), plane.place(cell));
+        let found = &map.cells[cell];
+        state = [state[0] + NUDGE, state[1] + NUDGE];
+        let (on, loose) = settle(&strobe, found, &mut state);
+        followed[cell] = Followed { on: on.map(|k| offset[cell] + k), loose };
+    }
+    Ok(followed)
+}
+
+/// A point of the attractor that most starts end on; of equals the first.
+fn leading(cell: &Cell) -> Option<State> {
+    let most = cell.found.iter().map(|f| f.share).fold(0.0, f64::max);
+    let found = cell.found.iter().find(|f| f.share >= most)?;
+    found.attractor.points.first().copied()
+}
+
+/// Runs `state` until it has arrived on an attractor of the cell, whose place comes back; else its
+/// points.
+fn settle(strobe: &Strobe, cell: &Cell, state: &mut State) -> (Option<usize>, Vec<State>) {
+    for _ in 0..ROUNDS {
+        step(strobe, state, ROUND);
+        let mut next = *state;
+        step(strobe, &mut next, 1);
+        let arrived = |a: &Attractor| {
+            if a.is_held() {
+                let same = (state[0].cos() < 0.0) == (a.points[0][0].cos() < 0.0);
+                return same && state[1] == 0.0 && strobe.equation.holds_for_ever(state[0]);
+            }
+            let near = |s: State| a.points.iter().any(|p| distance(*p, s) < ARRIVED);
+            a.n.is_some() && near(*state) && near(next)
+        };
+        if let Some(k) = cell.found.iter().position(|f| arrived(&f.attractor)) {
+            return (Some(k), Vec::new());
+        }
+    }
+    let chaotic: Vec<usize> =
+        (0..cell.found.len()).filter(|k| cell.found[*k].attractor.kind.is_chaotic()).collect();
+    if let [one] = chaotic[..] {
+        return (Some(one), Vec::new());
+    }
+    let mut loose = Vec::with_capacity(KEPT);
+    for _ in 0..KEPT {
+        step(strobe, state, 1);
+        loose.push(*state);
+    }
+    (None, loose)
+}
+
+fn step(strobe: &Strobe, state: &mut State, periods: usize) {
+    let (mut theta, mut velocity, mut turns) = ([state[0]], [state[1]], [0.0]);
+    // Lengths agree, so this cannot fail.
+    let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, periods);
+    *state = [theta[0], velocity[0]];
+}
