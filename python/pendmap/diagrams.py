@@ -18,7 +18,7 @@ from pendmap.planes import entries, undecided
 from pendmap.regimes import kind_of
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
-from pendmap.varied import varied
+from pendmap.varied import title, varied
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -74,10 +74,10 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     -------
     xarray.Dataset
         Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
-        ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with ``entry_branch``;
-        branches over ``branch``: ``branch_kind``, ``branch_first``, ``branch_last``; ``up`` and
-        ``down`` over the parameter: the entry that the sweep is on, -1 where that is none of them;
-        its points there over ``loose``.
+        ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
+        ``entry_branch``; branches over ``branch``: ``branch_kind``, ``branch_w``,
+        ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the entry that
+        the sweep is on, -1 where that is none of them; its points there over ``loose``.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     dataset = _dataset(raw, axis, units)
     dataset.attrs = {
         "kind": "bifurcation",
-        "title": model.title,
+        "title": title(model, axis),
         **model.attributes,
         "section": model.units.section,
         "varied": axis.name,

@@ -35,6 +35,7 @@ __all__ = [
     "direction",
     "diverging",
     "lap",
+    "parts",
     "rgb",
 ]
 
@@ -172,7 +173,11 @@ def colour(name: str, kind: str | None = None) -> str:
 
 def rgb(name: str, kind: str | None = None) -> tuple[int, int, int]:
     """Return the colour of :func:`colour` as red, green and blue, each 0 to 255."""
-    code = colour(name, kind)
+    return parts(colour(name, kind))
+
+
+def parts(code: str) -> tuple[int, int, int]:
+    """Return red, green and blue of ``"#rrggbb"``."""
     return int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16)
 
 

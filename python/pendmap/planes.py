@@ -17,7 +17,7 @@ from pendmap.model.units import RATE, VELOCITY
 from pendmap.regimes import kind_of, regimes
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
-from pendmap.varied import varied
+from pendmap.varied import title, varied
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     dataset = _dataset(raw, (columns, rows), units)
     dataset.attrs = {
         "kind": "parameter_map",
-        "title": model.title,
+        "title": title(model, columns, rows),
         **model.attributes,
         "section": model.units.section,
         "columns": columns.name,

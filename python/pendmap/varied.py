@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pendmap.model import Effect, Pendulum, Rig
 
-__all__ = ["Varied", "varied"]
+__all__ = ["Varied", "title", "varied"]
 
 _UNITS = {"c_over_m": "1/s", "Omega": "rad/s", "Tr": "rad/s2", "phi": "rad", "phase": "rad"}
 
@@ -92,6 +92,12 @@ def varied(
     if len(set(places)) < len(places):
         raise InputError(f"{found[0].name} and {found[1].name} are one parameter: allowed are two")
     return found
+
+
+def title(model: Pendulum | Rig, *axes: Varied) -> str:
+    """Return the model in one line, and what varies in it."""
+    spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
+    return f"{' and '.join(spans)}; otherwise {model.title}"
 
 
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:

@@ -129,7 +129,6 @@ pub fn parameter_map(
     request: &Request,
     control: &Control,
 ) -> Result<ParameterMap, Error> {
-    base.check_mappable()?;
     let plane = Plane { base, axes: &request.axes };
     let [columns, rows] = plane.size();
     let count = columns * rows;
@@ -137,6 +136,7 @@ pub fn parameter_map(
         let name = if count == 0 { "cells" } else { "starts" };
         return Err(Error::Range { name, value: 0.0, allowed: "1 or more" });
     }
+    (0..count).try_for_each(|cell| plane.pendulum(cell).check_mappable())?;
     let pool = pool(request.threads)?;
     let probes = Starts::List(request.starts.clone()).sampled_states(PROBES, 0);
     let path = Path::choose()?;

@@ -11,7 +11,7 @@
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
 //!   they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
-//! - [`maps`], [`layers`], [`threads`]: whole planes
+//! - [`maps`], [`layers`], [`threads`]: whole planes; [`planes`]: of parameters
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
@@ -40,6 +40,7 @@ mod maps;
 mod orbit_search;
 mod orbits;
 mod order;
+mod planes;
 mod properties;
 mod recorded;
 mod rewritten;

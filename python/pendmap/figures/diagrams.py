@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["figure"]
 
 _SIZE = (7.4, 6.6)
-_LEFT, _RIGHT, _TOP, _BELOW = 0.85, 0.2, 0.98, 0.5
+_LEFT, _RIGHT, _TOP, _BELOW = 0.85, 0.2, 0.78, 0.5
 _STRIP, _GAP, _EXPONENT = 0.42, 0.16, 1.35
 _ROW, _COLUMN = 0.19, 2.1
 _LEAST = (4.5, 4.6)
@@ -61,7 +61,7 @@ def figure(
     width, height = size or _SIZE
     columns = max(1, int((width - _LEFT) / _COLUMN))
     rows = math.ceil(len(texts) / columns)
-    below = _BELOW + _ROW * rows + 0.15
+    below = _BELOW + _ROW * rows + 0.25
     main = height - _TOP - below - _STRIP - _EXPONENT - 2 * _GAP
     if width < _LEAST[0] or main < 1.0:
         least = (_LEAST[0], _LEAST[1] + _ROW * rows)
@@ -89,7 +89,7 @@ def figure(
         handles,
         texts,
         loc="lower left",
-        bbox_to_anchor=(_LEFT / width, 0.06 / height),
+        bbox_to_anchor=(_LEFT / width, 0.12 / height),
         ncols=columns,
         borderpad=0.0,
         borderaxespad=0.0,
@@ -107,7 +107,7 @@ def _points(axes: Axes, dataset: xr.Dataset, every: list[Family], shown: str) ->
     # Where values are far apart a point must be seen.
     size = min(3.0, max(0.9, 200.0 / values.size))
     for one in reversed(every):
-        chaotic = one.name.split(" ")[-1].startswith("chaos") or "chaos" in one.name
+        chaotic = "chaos" in one.name
         axes.plot(
             one.points[:, 0],
             one.points[:, column],

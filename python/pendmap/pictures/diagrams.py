@@ -15,13 +15,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-__all__ = ["MOST", "Family", "across", "families", "name", "title"]
+__all__ = ["MOST", "Family", "across", "families", "name", "subtitle", "title"]
 
 MOST = 14
 """Families that a legend names; the rest are drawn in the grey of what has no name."""
-
-LOOSE = "on no attractor found"
-"""What a sweep is called where it has not arrived."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +45,16 @@ class Family:
     exponents: npt.NDArray[np.float64]
     up: npt.NDArray[np.bool_]
     down: npt.NDArray[np.bool_]
+
+    @property
+    def shade(self) -> str:
+        """The colour in words."""
+        return palette.describe(self.name) if self.colour != palette.UNNAMED else "grey"
+
+    @property
+    def rgb(self) -> tuple[int, int, int]:
+        """The colour as red, green and blue."""
+        return palette.parts(self.colour)
 
     @property
     def text(self) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from pendmap.errors import InputError
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
-from pendmap.viewer import basins, frame, orbits, planes, trajectory
+from pendmap.viewer import basins, diagrams, frame, orbits, planes, trajectory
 from pendmap.viewer.discrepancy import record_discrepancy
 from pendmap.viewer.identification import record_identification
 from pendmap.viewer.window import (
@@ -48,6 +48,7 @@ SUFFIXES = (".rrd",)
 
 _KINDS = {
     "basins": (basins.blueprint, basins.log),
+    "bifurcation": (diagrams.blueprint, diagrams.log),
     "orbits": (orbits.blueprint, orbits.log),
     "parameter_map": (planes.blueprint, planes.log),
     "trajectory": (trajectory.blueprint, trajectory.log),
@@ -61,7 +62,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     ``/turns/data/turns``, ``/exponent/data/exponent`` (those layers that tell something, the
     leading one in front), ``/legend`` and ``/summary``. Of closed orbits: ``/phase/data/NUMBER``
     with ``path`` and ``points``, ``/legend`` and ``/summary``. Of a map over two parameters:
-    ``/kinds/data/kinds``, ``/{exponent,attractors,undecided}/data/values``. Of a trajectory:
+    ``/kinds/data/kinds``, ``/{exponent,attractors,undecided}/data/values``. Of a bifurcation
+    diagram: ``/{bifurcation,velocity,exponent}/data/NUMBER``. Of a trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
     ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
     ``sim_time`` (nondimensional time, shown as seconds) and ``period``.

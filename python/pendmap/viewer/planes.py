@@ -43,7 +43,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     around = _frame(dataset)
     listed = drawn.kinds(dataset)
     around.log(stream, "kinds")
-    context = [(k, kind.name, rgb(kind.colour)) for k, kind in enumerate(listed)]
+    context = [(k, kind.name, palette.parts(kind.colour)) for k, kind in enumerate(listed)]
     stream.log("kinds", rr.AnnotationContext(context), static=True)
     image = drawn.striped(dataset, SIZE, STRIPE)
     stream.log("kinds/data/kinds", around.of_pixels(image.shape), static=True)
@@ -70,11 +70,6 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
         bar = np.linspace(low, high, 256)
         colours = palette.diverging((bar - middle) / half).reshape(256, 1, 3)
         around.bar(stream, one, rr.Image(colours), low=low, high=high)
-
-
-def rgb(colour: str) -> tuple[int, int, int]:
-    """Return ``"#rrggbb"`` as three numbers."""
-    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:

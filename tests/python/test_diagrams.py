@@ -1,0 +1,119 @@
+"""Bifurcation diagrams: branches, sweeps, figures, files, the command; physics is in Rust's."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import pendmap
+from drawn import made, named
+from pendmap import Pendulum, Rig, figures
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
+
+    import xarray as xr
+
+    from conftest import Run
+
+
+@pytest.fixture(scope="module")
+def diagram() -> xr.Dataset:
+    return pendmap.bifurcation(Pendulum(), {"p": (1.2, 1.9, 71)})
+
+
+def test_branches_end_where_their_orbits_do(diagram: xr.Dataset, truths: dict[str, Any]) -> None:
+    known = truths["bifurcations_gamma0.1_omega2"]
+    step = 0.7 / 70
+    kinds = diagram["kind"].values[diagram["branch_kind"].values]
+    rotations = np.flatnonzero((kinds == "rotation 1:1") & (diagram["branch_w"].values == 1))
+    last = diagram["branch_last"].values[rotations].max()
+    assert abs(last - float(known["rot_PD1"]["p"])) < step
+    doubled = np.flatnonzero((kinds == "rotation 2:2") & (diagram["branch_w"].values == 2))
+    first = diagram["branch_first"].values[doubled].min()
+    assert abs(first - float(known["rot_PD1"]["p"])) < step
+    twins = np.flatnonzero(kinds == "oscillation period 2")
+    assert len(twins) == 2  # one goes on through the symmetry breaking, its twin begins there
+    begun = np.sort(diagram["branch_first"].values[twins])
+    assert abs(begun[1] - float(known["osc_SB"]["p"])) < step
+
+
+def test_entries_points_and_branches_fit(diagram: xr.Dataset) -> None:
+    owner = diagram["point_entry"].values
+    values = diagram["p"].values[diagram["entry_cell"].values]
+    assert (diagram["point_value"].values == values[owner]).all()
+    counts = np.bincount(owner, minlength=diagram.sizes["entry"])
+    n = diagram["entry_n"].values
+    assert (counts[n > 0] == n[n > 0]).all()
+    assert (counts[n == 0] > 20).all()
+    for branch in range(diagram.sizes["branch"]):
+        cells = diagram["entry_cell"].values[diagram["entry_branch"].values == branch]
+        assert (np.diff(cells) == 1).all()
+    for sweep in ("up", "down"):
+        on = diagram[sweep].values
+        assert (diagram["entry_cell"].values[on[on >= 0]] == np.flatnonzero(on >= 0)).all()
+
+
+def test_a_sweep_starts_where_it_is_told() -> None:
+    ranges = {"p": (0.5, 0.6, 3)}
+    kinds = []
+    for start in ((1.2, -2.3), (-1.196, 0.29)):
+        found = pendmap.bifurcation(Pendulum(), ranges, start=start)
+        kinds.append(str(found["kind"].values[found["entry_kind"].values[found["up"].values[0]]]))
+    assert kinds == ["rotation 1:1", "oscillation period 2"]
+
+
+def test_in_si_it_is_the_same() -> None:
+    bare = pendmap.bifurcation(Pendulum(), {"omega": (1.9, 2.1, 5)})
+    rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
+    si = pendmap.bifurcation(rig, {"Omega": (9.5, 10.5, 5)})
+    assert si.sizes["entry"] == bare.sizes["entry"]
+    assert np.allclose(si["point_velocity"].values, 5 * bare["point_velocity"].values, atol=1e-6)
+    assert np.allclose(si["entry_exponent"].values, 5 * bare["entry_exponent"].values, atol=1e-6)
+
+
+def test_the_figure_names_its_attractors(diagram: xr.Dataset) -> None:
+    figure = made(diagram)
+    texts = named(figure)
+    assert "rotation 1:+1" in texts
+    assert "tumbling chaos" in texts
+    assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["up \u2192", "\u2190 down"]
+    assert made(diagram, "velocity").axes[0].get_ylabel()
+    with pytest.raises(pendmap.InputError, match="no layer 'labels'"):
+        made(diagram, "labels")
+
+
+@pytest.mark.usefixtures("strict_recordings")
+def test_the_recording(diagram: xr.Dataset, tmp_path: Path) -> None:
+    back = recorded(diagram, tmp_path)
+    assert {"/bifurcation/data/0/points", "/exponent/data/0/points", "/legend"} <= back.static
+
+
+def test_it_comes_back_from_its_file(diagram: xr.Dataset, tmp_path: Path) -> None:
+    back = pendmap.load(pendmap.save(diagram, tmp_path / "b.nc"))
+    assert back.equals(diagram)
+    assert figures.draw(back, tmp_path / "b.svg").stat().st_size > 0
+
+
+def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("bifurcation", "--vary", "p", "0.9:1.4:20")
+    assert run.returncode == 0, run.stderr
+    assert "hysteresis" in run.stdout
+    names = {f"bifurcation.{suffix}" for suffix in ("nc", "png", "rrd")}
+    assert {p.name for p in tmp_path.iterdir()} == names
+    told = json.loads(pendmap_command("bifurcation", "--p", "0.9:1.4:20", "--json").stdout)
+    assert told["points"] > 20
+    assert {"kind", "w", "first", "last"} == told["branches"][0].keys()
+    for words, wanted in (
+        (("bifurcation",), "what varies is nothing"),
+        (("bifurcation", "--p", "0:1:3", "--omega", "1:2:3"), "what varies is p, omega"),
+        (("bifurcation", "--p", "0:1:3", "--theta", "1"), "both, or neither"),
+    ):
+        refused = pendmap_command(*words)
+        assert refused.returncode == 2, words
+        assert wanted in refused.stderr

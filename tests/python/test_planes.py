@@ -1,0 +1,231 @@
+"""Maps over two parameters: regimes, layers, figures, files, the command; physics is in Rust's."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import pendmap
+from drawn import made, named, titles
+from pendmap import Effect, Grid, Pendulum, Rig, figures
+from pendmap.cell_search import spread
+from pendmap.pictures import planes as drawn
+from pendmap.regimes import kind_of, regimes
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+    from conftest import Run
+
+RANGES = {"p": (0.2, 2.0, 10), "omega": (1.4, 2.4, 6)}
+
+
+@pytest.fixture(scope="module")
+def plane() -> xr.Dataset:
+    return pendmap.parameter_map(Pendulum(), RANGES)
+
+
+def by_cell(plane: xr.Dataset) -> Any:  # noqa: ANN401 (an array of words)
+    """The kinds of each cell in words: numbers of regimes go by their shares."""
+    return plane["regime_kinds"].values[plane["regime"].values]
+
+
+def test_regimes_and_their_shares(plane: xr.Dataset) -> None:
+    assert plane["regime"].dims == ("omega", "p")
+    shares = plane["regime_share"].values
+    assert shares.sum() == pytest.approx(1)
+    assert (np.diff(shares) <= 0).all()
+    counts = np.bincount(plane["regime"].values.ravel())
+    assert np.allclose(counts / 60, shares)
+    # What a cell's attractors are is what its regime says.
+    names, cell = plane["kind"].values, plane["entry_cell"].values
+    for index in range(60):
+        own = {str(names[k]) for k in plane["entry_kind"].values[cell == index]}
+        said = json.loads(str(plane["regime_kinds"].values[plane["regime"].values.ravel()[index]]))
+        assert own == set(said) - {"undecided"}
+    total = plane["share"].sum("kind") + plane["undecided"] + plane["failed"]
+    assert np.allclose(total, 1)
+
+
+def test_layers_are_of_the_attractors(plane: xr.Dataset) -> None:
+    cell, exponent = plane["entry_cell"].values, plane["entry_exponent"].values
+    share = plane["entry_share"].values
+    for index, (largest, many) in enumerate(
+        zip(plane["exponent"].values.ravel(), plane["attractors"].values.ravel(), strict=True)
+    ):
+        mine = cell == index
+        assert many == mine.sum()
+        assert largest == pytest.approx(exponent[mine].max(), nan_ok=True)
+        assert share[mine].sum() <= 1 + 1e-12
+
+
+def test_a_cell_is_the_pendulum_with_its_parameters(plane: xr.Dataset) -> None:
+    there = plane.sel(p=1.0, omega=2.0, method="nearest")
+    model = Pendulum(p=float(there["p"]), omega=float(there["omega"]))
+    basins = pendmap.basins(model, Grid.square(40), check=False)
+    said = json.loads(str(plane["regime_kinds"].values[int(there["regime"])]))
+    closed = {
+        kind_of(str(k), int(n), int(w))
+        for k, n, w in zip(
+            basins["kind"].values, basins["n"].values, basins["w"].values, strict=True
+        )
+    }
+    assert set(said) == closed
+
+
+def test_in_si_it_is_the_same(plane: xr.Dataset) -> None:
+    rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
+    si = pendmap.parameter_map(rig, {"p": (0.2, 2.0, 10), "Omega": (7.0, 12.0, 6)})
+    assert np.mean(by_cell(si) == by_cell(plane)) > 0.9  # long transients end otherwise
+    ours, theirs = 5 * plane["exponent"].values, si["exponent"].values
+    # Rounding parts chaotic trajectories: their exponents are samples.
+    regular = (ours < 0) & (theirs < 0) & (by_cell(si) == by_cell(plane))
+    assert np.allclose(theirs[regular], ours[regular])
+    chaotic = (ours > 0) & (theirs > 0)
+    assert np.allclose(theirs[chaotic], ours[chaotic], rtol=0.3)
+    assert si["Omega"].attrs["units"] == "rad/s"
+
+
+def test_parameters_of_effects_vary_too() -> None:
+    drag = Effect("quadratic_drag", {"q": 0.1})
+    ranges = {"quadratic_drag.q": (0.0, 0.4, 3), "p": (0.7, 1.0, 2)}
+    found = pendmap.parameter_map(Pendulum(effects=(drag,)), ranges, starts=5)
+    free = pendmap.parameter_map(Pendulum(), {"p": (0.7, 1.0, 2), "omega": (2.0, 2.0, 1)}, starts=5)
+    assert (by_cell(found)[:, 0] == by_cell(free)[0]).all()
+    rig = Rig(w0=5.0, p=1.0, Omega=10.0, c_over_m=0.5, effects=(drag,))
+    si = pendmap.parameter_map(
+        rig, {"quadratic_drag.q": (0.0, 0.4, 3), "p": (0.7, 1.0, 2)}, starts=5
+    )
+    assert (by_cell(si) == by_cell(found)).all()
+
+
+@pytest.mark.parametrize(
+    ("ranges", "match"),
+    [
+        ({"p": (0, 1, 3)}, "allowed is a mapping"),
+        ({"p": (0, 1, 3), "Omega": (1, 2, 3)}, "'Omega' is no parameter of this model"),
+        ({"p": (0, 1, 3), "gamma": (-1, 2, 3)}, "gamma = -1: gamma is -1: allowed is 0 or more"),
+        ({"p": (0, 1, 3), "omega": (0, 2, 3)}, "omega is 0: allowed is a number above 0"),
+        ({"p": (1, 0, 3), "omega": (1, 2, 3)}, "the lower one first"),
+        ({"p": (0, math.nan, 3), "omega": (1, 2, 3)}, "p is nan"),
+        ({"p": (0, 1, 0), "omega": (1, 2, 3)}, "how many is 0"),
+        ({"p": (0, 1), "omega": (1, 2, 3)}, "first, last, how many"),
+        ([1, 2], "allowed is a mapping"),
+    ],
+)
+def test_what_is_refused(ranges: Any, match: str) -> None:  # noqa: ANN401 (whatever was given)
+    with pytest.raises(pendmap.InputError, match=match):
+        pendmap.parameter_map(Pendulum(), ranges)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"starts": 0}, "starts is 0"),
+        ({"tol": math.nan}, "tol is nan"),
+        ({"tol": 1.0}, "tol is 1"),
+        ({"max_periods": 0}, "max_periods is 0"),
+        ({"threads": 0}, "threads is 0"),
+        ({"seed": -1}, "seed is -1"),
+        ({"box": 3}, "box"),
+    ],
+)
+def test_what_is_refused_of_the_search(given: dict[str, Any], match: str) -> None:
+    with pytest.raises(pendmap.InputError, match=match):
+        pendmap.parameter_map(Pendulum(), {"p": (0.5, 1, 2), "omega": (2, 2.1, 2)}, **given)
+
+
+def test_effects_that_no_map_can_have_are_refused() -> None:
+    chirp = Pendulum(effects=(Effect("drive_chirp", {"r": 0.001}),))
+    with pytest.raises(pendmap.InputError, match="drive_chirp"):
+        pendmap.parameter_map(chirp, {"p": (0.5, 1, 2), "omega": (2, 2.1, 2)})
+
+
+def test_without_damping_all_is_undecided() -> None:
+    found = pendmap.parameter_map(Pendulum(gamma=0.0), {"p": (0.1, 0.2, 2), "omega": (2, 2.1, 2)})
+    assert json.loads(str(found["regime_kinds"].values[0])) == ["undecided"]
+    assert np.allclose(found["undecided"], 1)
+
+
+def test_names_of_kinds() -> None:
+    assert kind_of("rotation", 2, -2) == "rotation 2:2"
+    assert kind_of("oscillation", 4, 0) == "oscillation period 4"
+    sets, regime, share = regimes(["rest", "rotation 1:1"], np.array([0, 2], dtype=np.int32), 4)
+    assert sets == [("undecided",), ("rest",), ("rotation 1:1",)]
+    assert regime.tolist() == [1, 0, 2, 0]
+    assert share.tolist() == [0.5, 0.25, 0.25]
+
+
+def test_starts_cover_the_box_and_have_no_mirror_images() -> None:
+    theta, velocity = spread(Grid.square(10), 2000)
+    counts, _, _ = np.histogram2d(theta, velocity, bins=5, range=[[-math.pi, math.pi], [-3, 3]])
+    assert counts.min() > 60
+    assert counts.max() < 100
+    nine = np.stack(spread(Grid.square(10), 9), axis=1)
+    apart = np.abs(nine[:, None] + nine[None]).max(axis=2)
+    assert apart.min() > 1e-3
+
+
+def test_the_figure_has_stripes_where_kinds_coexist(plane: xr.Dataset) -> None:
+    figure = made(plane)
+    assert titles(figure)[0].startswith("kinds of attractor")
+    assert any(text.startswith("tumbling chaos:") for text in named(figure))
+    image = drawn.striped(plane, 300, 6)
+    listed = drawn.kinds(plane)
+    rows, columns = (size // cells for size, cells in zip(image.shape, (6, 10), strict=True))
+    for j in range(6):
+        for i in range(10):
+            block = image[j * rows : (j + 1) * rows, i * columns : (i + 1) * columns]
+            seen = {name for k in np.unique(block) for name in listed[k].members}
+            said = json.loads(str(plane["regime_kinds"].values[int(plane["regime"][j, i])]))
+            assert set(said) <= seen
+    for layer in ("exponent", "attractors", "period", "winding", "undecided", "share rest"):
+        assert len(made(plane, layer).axes) == 2
+    with pytest.raises(pendmap.InputError, match="no layer 'nothing'"):
+        made(plane, "nothing")
+
+
+@pytest.mark.usefixtures("strict_recordings")
+def test_the_recording(plane: xr.Dataset, tmp_path: Path) -> None:
+    back = recorded(plane, tmp_path)
+    wanted = {"/kinds/data/kinds", "/exponent/data/values", "/legend", "/summary"}
+    assert wanted <= back.static
+
+
+def test_it_comes_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:
+    for name in ("map.nc", "map.zarr"):
+        back = pendmap.load(pendmap.save(plane, tmp_path / name))
+        assert back.equals(plane)
+    assert figures.draw(back, tmp_path / "map.pdf").stat().st_size > 0
+
+
+def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
+    words = ("map", "--p", "0.2:1.8:4", "--omega", "1.5:2.2:3")
+    run = pendmap_command(*words)
+    assert run.returncode == 0, run.stderr
+    assert {p.name for p in tmp_path.iterdir()} == {"map.nc", "map.png", "map.rrd"}
+    told = json.loads(pendmap_command(*words, "--json").stdout)
+    assert (told["columns"], told["rows"], told["cells"]) == ("p", "omega", 12)
+    assert sum(regime["share"] for regime in told["regimes"]) == pytest.approx(1)
+    named = pendmap_command(
+        "map", "--vary", "omega", "1.5:2.2:3", "--vary", "p", "0.2:1.8:4", "--json"
+    )
+    assert json.loads(named.stdout)["columns"] == "omega"
+    assert pendmap_command("plot", "map.nc", "--layer", "period", "--plot", "a.svg").returncode == 0
+    for words, wanted in (
+        (("map", "--p", "1"), "what varies is nothing"),
+        (("map", "--p", "0:1"), "A:B:N"),
+        (("map", "--p", "0:1:3", "--vary", "p", "0:1:4"), "twice"),
+        (("map", "--p", "0:1:3", "--vary", "drag", "0:1:4"), "drag"),
+    ):
+        refused = pendmap_command(*words)
+        assert refused.returncode == 2, words
+        assert wanted in refused.stderr
+        assert refused.stderr.count("\n") <= 4
