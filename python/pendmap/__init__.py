@@ -25,7 +25,9 @@ from pendmap.model import (
 from pendmap.model.library import EffectDefinition, EffectParameter, effects
 
 if TYPE_CHECKING:
+    from pendmap.exponents import lyapunov
     from pendmap.grid import Axis, Grid
+    from pendmap.lifetimes import lifetime
     from pendmap.maps import basins, basins_of
     from pendmap.orbits import orbit
     from pendmap.records import (
@@ -63,9 +65,11 @@ __all__ = [
     "basins",
     "basins_of",
     "effects",
+    "lifetime",
     "load",
     "load_formulas",
     "load_model",
+    "lyapunov",
     "noise_floor",
     "orbit",
     "read_experiment",
@@ -85,7 +89,9 @@ _HOMES = {
     "advance": "trajectory",
     "basins": "maps",
     "basins_of": "maps",
+    "lifetime": "lifetimes",
     "load": "store",
+    "lyapunov": "exponents",
     "noise_floor": "records",
     "orbit": "orbits",
     "read_experiment": "records",
