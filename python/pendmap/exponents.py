@@ -12,7 +12,7 @@ import xarray as xr
 from pendmap import _core, checks
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
-from pendmap.model.units import RATE, VELOCITY, Units
+from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.orbit_table import table
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
@@ -112,7 +112,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     if not 0 < precision <= _MOST_PRECISION:
         raise InputError(f"precision is {precision:g}: allowed is above 0 up to {_MOST_PRECISION}")
     checks.call("progress", progress)
-    choices = {
+    choices: _core._ExponentChoices = {
         "precision": precision,
         "tol": checks.number("tol", tol),
         "max_periods": None
@@ -147,6 +147,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         "title": model.title,
         **model.attributes,
         "section": model.units.section,
+        "forcing_period": units.given(pendulum.period, TIME),
         "theta0": theta,
         "velocity0": velocity,
         "exponent": units.given(exponent, RATE),

@@ -216,7 +216,7 @@ def _curves(
 ) -> dict[str, Any]:
     """Captures up to each period by each attractor; tails from all beginnings."""
     label, settle = found["label"].values, found["settle_periods"].values
-    last = int(times.max(initial=0)) + 1
+    last = bound if censored else int(times.max(initial=0)) + 1
     elapsed = np.unique(np.linspace(0, last, min(last, _DRAWN) + 1).round().astype(np.int64))
     by = [
         np.searchsorted(np.sort(settle[(label == k) & (settle >= 0)]), elapsed, side="right")
@@ -371,7 +371,7 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
             f"{100 * a['chaotic_share']:.3g} % of the starts end on a chaotic attractor, and are "
             "left out: there chaos persists."
         )
-    if a["censored"]:
+    if a["censored"] and found.attrs["plane"] == "basins":
         lines.append(
             f"{counted(a['censored'], 'start')} of {a['starts']} were alive at the bound of "
             f"{counted(a['max_periods'], 'period')}."
@@ -381,7 +381,7 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
             f"{name} {100 * float(share):.2f} %"
             for name, share in zip(found["attractor"].values, found["fraction"].values, strict=True)
         ]
-        lines.append(f"Captured by {', '.join(shares)}.")
+        lines.append(f"Ended on {', '.join(shares)}.")
     lines.append(
         f"{counted(a['starts'], 'start')}, {counted(a['steps_per_period'], 'step')} a period, "
         f"error reached {a['reached_error']:.1e}, {a['seconds']:.2f} s on "
