@@ -83,9 +83,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     Returns
     -------
     xarray.Dataset
-        ``growth`` over ``elapsed`` periods: the logarithm of the growth of a deviation along the start's own
-        trajectory. Of chaos ``running_exponent`` and ``running_stderr`` over ``averaged``, the
-        periods that each trajectory has been averaged for, and ``finite_time_exponent`` over
+        ``growth`` over ``elapsed`` periods: the logarithm of the growth of a deviation along the
+        start's own trajectory. Of chaos ``running_exponent`` and ``running_stderr`` over
+        ``averaged``, the periods that each trajectory has been averaged for, and ``finite_time_exponent`` over
         ``trajectory`` and ``window``. The attractor with its points, as of :func:`pendmap.basins`.
         Attributes ``exponent``, ``stderr``, ``per_period``, ``end`` (``captured``, ``chaotic``,
         ``undamped``, ``undecided`` or ``failed``), ``transient_periods``, ``second_exponent`` and
@@ -265,7 +265,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(
             f"Largest Lyapunov exponent {value:.6g} +- {a['stderr']:.2g} {per}, "
             f"{a['per_period']:.6g} +- {a['per_period_stderr']:.2g} per period: mean over "
-            f"{counted(a['trajectories'], 'trajectory').replace('trajectorys', 'trajectories')} of "
+            f"{a['trajectories']} trajectories of "
             f"{counted(a['periods'], 'period')} each, {a['dropped_periods']} more dropped before."
         )
         if value > 0:
@@ -301,39 +301,31 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
     a, units = dataset.attrs, Units.of(dataset.attrs)
     speed = units.spoken(format(a["velocity0"], "g"))
     start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"
-    transient = counted(a["transient_periods"], "period")
-    lost = counted(a["lost"], "trajectory").replace("trajectorys", "trajectories")
-    warned = [] if not a["lost"] else [
-        f"What looks chaotic is a transient: {lost} of {a['trajectories']} "
-        "settled on something else. lifetime gives how long it lasts."
-    ]
-    if a["end"] == "captured" and not math.isfinite(a["exponent"]):
-        said = f"{start}: {name}, reached after {transient}. "
-        if len(_pairs(dataset)):
-            return [said + "Its exponent is minus infinity: both multipliers are 0.", *warned]
-        return [
-            said + "Friction holds it for ever: deviations neither grow nor shrink, and it has no "
-            "exponent.",
-            *warned,
-        ]
     if a["end"] == "captured":
-        return [f"{start}: {name}, reached after {transient}.", *warned]
-    if a["end"] == "chaotic":
-        return [
-            f"{start}: {name}; none of the trajectories watched was captured by anything within "
-            f"{a['chaos_bound']} periods, none of these here at their ends."
-        ]
-    if a["end"] == "undamped":
-        return [
-            f"{start}. Without damping there are no attractors: this is the exponent of the motion "
-            "near this start. That of regular motion falls to 0 as ln(tau)/tau."
-        ]
-    if a["end"] == "failed":
-        return [f"{start}: leaves the range of numbers; there is no exponent."]
+        said = f"{start}: {name}, reached after {counted(a['transient_periods'], 'period')}."
+        if a["exponent"] == -math.inf:
+            said += " Its exponent is minus infinity: both multipliers are 0."
+        elif math.isnan(a["exponent"]):
+            said += " Friction holds it for ever: deviations neither grow nor shrink, and it has"
+            said += " no exponent."
+    else:
+        words = {
+            "chaotic": f": {name}; none of the trajectories watched was captured by anything"
+            f" within {a['chaos_bound']} periods, none of these here at their ends.",
+            "undamped": ". Without damping there are no attractors: this is the exponent of the"
+            " motion near this start. That of regular motion falls to 0 as ln(tau)/tau.",
+            "undecided": f": undecided within {counted(a['max_periods'], 'period')}; no exponent"
+            " is given, since a chaotic transient has a positive one too. --max-periods raises"
+            " this bound.",
+            "failed": ": leaves the range of numbers; there is no exponent.",
+        }
+        said = start + words[a["end"]]
+    if not a["lost"]:
+        return [said]
+    lost = f"{a['lost']} of {a['trajectories']} trajectories"
     return [
-        f"{start}: undecided within {counted(a['max_periods'], 'period')}; no exponent is given, "
-        "since a chaotic transient has a positive one too. --max-periods raises this bound.",
-        *warned,
+        said,
+        f"What looks chaotic is a transient: {lost} settled. lifetime says how long it lasts.",
     ]
 
 

@@ -395,11 +395,12 @@ def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
     mean, error = a["mean_periods"], a["stderr"]
     places = max(0, 1 - math.floor(math.log10(error)))
     clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
-    lines = [
+    said = (
         f"Transient chaos lives for {mean:.{places}f} +- {error:.{places}f} periods on average "
         f"({clock}): the tail of {counted(a['tail_captured'], 'capture')} after period "
         f"{a['from_period']}."
-    ]
+    )
+    lines = [said]
     tests = min(a["tail_weibull"], a["tail_steady"])
     if tests < survival.LEVEL:
         lines.append(

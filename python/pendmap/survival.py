@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -163,7 +164,7 @@ def _steady(own: Times, censored: int, left: int, rate: float) -> float:
     edges = np.unique(np.ceil(-np.log(shares) / rate).astype(np.int64))
     edges = np.concatenate([[0], edges[(edges > 0) & (edges < left)], [left]])
     squares = 0.0
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         inside = own[(own > low) & (own <= high)]
         beyond = int((own > high).sum()) + censored
         expected = rate * (float((inside - low).sum()) + beyond * float(high - low))

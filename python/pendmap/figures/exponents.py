@@ -60,10 +60,7 @@ def figure(
     units = Units.of(dataset.attrs)
     handles, texts = _legend(dataset, shown)
     sheet = Sheet(
-        [
-            Panel(title=mark + parts[part][0])
-            for mark, part in zip(marks, shown, strict=False)
-        ],
+        [Panel(title=mark + parts[part][0]) for mark, part in zip(marks, shown, strict=False)],
         ratio=_RATIO,
         title=drawn.title(dataset),
         subtitle=_subtitle(dataset, units),

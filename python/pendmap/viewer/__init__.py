@@ -61,9 +61,9 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Of a basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
     ``/turns/data/turns``, ``/exponent/data/exponent`` (those layers that tell something, the
     leading one in front), ``/legend`` and ``/summary``. Of closed orbits: ``/phase/data/NUMBER``
-    with ``path`` and ``points``, ``/legend`` and ``/summary``. Of an exponent: ``/growth/data/own``,
-    ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or, of a closed orbit,
-    ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a lifetime:
+    with ``path`` and ``points``, ``/legend`` and ``/summary``. Of an exponent:
+    ``/growth/data/own``, ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or,
+    of a closed orbit, ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a lifetime:
     ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
     ``/tail/data/{mean,error,fitted}`` and ``/legend``. Of a trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,

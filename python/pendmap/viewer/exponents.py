@@ -1,4 +1,4 @@
-"""The recording of an exponent: growth along the start, the running mean, the attractor's points."""
+"""The recording of an exponent: growth along the start, the running mean, the attractor."""
 
 from __future__ import annotations
 
