@@ -85,10 +85,11 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     xarray.Dataset
         ``growth`` over ``elapsed`` periods: the logarithm of the growth of a deviation along the
         start's own trajectory. Of chaos ``running_exponent`` and ``running_stderr`` over
-        ``averaged``, the periods that each trajectory has been averaged for, and ``finite_time_exponent`` over
-        ``trajectory`` and ``window``. The attractor with its points, as of :func:`pendmap.basins`.
-        Attributes ``exponent``, ``stderr``, ``per_period``, ``end`` (``captured``, ``chaotic``,
-        ``undamped``, ``undecided`` or ``failed``), ``transient_periods``, ``second_exponent`` and
+        ``averaged``, the periods that each trajectory has been averaged for, and
+        ``finite_time_exponent`` over ``trajectory`` and ``window``. The attractor with its points,
+        as of :func:`pendmap.basins`. Attributes ``exponent``, ``stderr``, ``per_period``, ``end``
+        (``captured``, ``chaotic``, ``undamped``, ``undecided`` or ``failed``),
+        ``transient_periods``, ``second_exponent`` and
         ``kaplan_yorke_dimension`` (of the stroboscopic map's attractor, ``1 + lambda_1 /
         |lambda_2|``); nan where one has no meaning.
 

@@ -226,12 +226,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn capture(
-        &self,
-        catalogue: &Catalogue,
-        start: State,
-        bound: u32,
-    ) -> Result<Outcome, Error> {
+    fn capture(&self, catalogue: &Catalogue, start: State, bound: u32) -> Result<Outcome, Error> {
         let found = outcomes(self.strobe, &catalogue.traps, bound, &[start], self.control.flag());
         found.and_then(|all| all.into_iter().next()).ok_or(Error::Interrupted)
     }
@@ -287,11 +282,10 @@ impl Run<'_> {
             }
             let done = done + new;
             let time = (done * WINDOW) as f64 * period;
-            let means: Vec<f64> =
-                growth.iter().map(|row| row.iter().sum::<f64>() / time).collect();
+            let means: Vec<f64> = growth.iter().map(|row| row.iter().sum::<f64>() / time).collect();
             let (exponent, stderr) = mean_and_error(&means);
-            let enough = done >= LEAST_ROUNDS * ROUND
-                && stderr <= self.request.precision * exponent.abs();
+            let enough =
+                done >= LEAST_ROUNDS * ROUND && stderr <= self.request.precision * exponent.abs();
             if enough || done >= most_windows || !exponent.is_finite() {
                 let ends = bundle.states();
                 let sum = self.sum(&ends)?;

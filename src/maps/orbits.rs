@@ -15,9 +15,9 @@ use crate::error::Error;
 use crate::integrate::{State, accuracy};
 use crate::lanes::Path;
 use crate::model::Pendulum;
+use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
-use crate::orbit::PoincareMap;
 
 /// The longest period that is looked for, in forcing periods.
 pub const LONGEST: usize = 64;
@@ -65,11 +65,7 @@ pub struct Orbits {
 /// # Errors
 /// [`Error::NotMappable`] for effects that a map cannot have, [`Error::Range`] for an `n` out of
 /// range, [`Error::Interrupted`] if `control` was cancelled.
-pub fn orbits(
-    pendulum: &Pendulum,
-    request: &Request,
-    control: &Control,
-) -> Result<Orbits, Error> {
+pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Result<Orbits, Error> {
     pendulum.check_mappable()?;
     if !(1..=LONGEST).contains(&request.n) {
         let value = request.n as f64;
@@ -127,8 +123,7 @@ fn displacements(
     let all: Vec<State> = (0..starts.len()).map(|i| starts.get(i)).collect();
     let mut theta: Vec<f64> = all.iter().map(|s| s[0]).collect();
     let mut velocity: Vec<f64> = all.iter().map(|s| s[1]).collect();
-    let turns =
-        advance(&strobe, &mut theta, &mut velocity, request.n, request.threads, control)?;
+    let turns = advance(&strobe, &mut theta, &mut velocity, request.n, request.threads, control)?;
     let ends = theta.iter().zip(&velocity).zip(turns);
     let gap = |(start, ((theta, velocity), turns)): (&State, ((&f64, &f64), i64))| {
         // The turns are net: rounded from the whole way, of which this is the rest.

@@ -114,7 +114,8 @@ def fit(dataset: xr.Dataset) -> Fit | None:
     periods = np.linspace(begin, max(last, begin + 1), 200)
     first = float(np.interp(begin, everything.periods, np.nan_to_num(everything.share)))
     low, share, high = (
-        first * np.exp(-(periods - begin) / (mean + way * SIGMAS * error)) for way in (-1, 0, 1)
+        first * np.exp((periods - begin) * np.log1p(-1 / max(mean + way * SIGMAS * error, 1.01)))
+        for way in (-1, 0, 1)
     )
     said = f"{written(mean, error)} \N{PLUS-MINUS SIGN} {written(error, error)} periods"
     text = f"tail from period {begin:.0f}: mean lifetime {said}"

@@ -63,8 +63,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     leading one in front), ``/legend`` and ``/summary``. Of closed orbits: ``/phase/data/NUMBER``
     with ``path`` and ``points``, ``/legend`` and ``/summary``. Of an exponent:
     ``/growth/data/own``, ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or,
-    of a closed orbit, ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a lifetime:
-    ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
+    of a closed orbit, ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a
+    lifetime: ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
     ``/tail/data/{mean,error,fitted}`` and ``/legend``. Of a trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
     ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
