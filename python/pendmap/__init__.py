@@ -26,7 +26,9 @@ from pendmap.model.library import EffectDefinition, EffectParameter, effects
 
 if TYPE_CHECKING:
     from pendmap.diagrams import bifurcation
+    from pendmap.exponents import lyapunov
     from pendmap.grid import Axis, Grid
+    from pendmap.lifetimes import lifetime
     from pendmap.maps import basins, basins_of
     from pendmap.orbits import orbit
     from pendmap.planes import parameter_map
@@ -66,9 +68,11 @@ __all__ = [
     "basins_of",
     "bifurcation",
     "effects",
+    "lifetime",
     "load",
     "load_formulas",
     "load_model",
+    "lyapunov",
     "noise_floor",
     "orbit",
     "parameter_map",
@@ -90,7 +94,9 @@ _HOMES = {
     "basins": "maps",
     "basins_of": "maps",
     "bifurcation": "diagrams",
+    "lifetime": "lifetimes",
     "load": "store",
+    "lyapunov": "exponents",
     "noise_floor": "records",
     "orbit": "orbits",
     "parameter_map": "planes",

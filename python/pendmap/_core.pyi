@@ -57,6 +57,13 @@ class _Choices(TypedDict):
     seed: int
     check: bool
 
+class _ExponentChoices(TypedDict):
+    precision: float
+    tol: float
+    max_periods: int | None
+    threads: int
+    seed: int
+
 def simd() -> str: ...
 def simd_available() -> list[str]: ...
 def default_threads() -> int: ...
@@ -127,6 +134,22 @@ def bifurcation(
     threads: int,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def lyapunov(
+    parameters: _Parameters,
+    start: tuple[float, float],
+    choices: _ExponentChoices,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
+def growth(
+    parameters: _Parameters,
+    theta: _Floats,
+    velocity: _Floats,
+    windows: int,
+    window: int,
+    steps_per_period: int,
+    threads: int,
+    progress: _Progress | None = None,
+) -> _Floats: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],

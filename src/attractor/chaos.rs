@@ -277,7 +277,8 @@ fn describe(
     })
 }
 
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
+/// Mean and standard error of values that do not depend on one another.
+pub(crate) fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     if values.len() < 2 {

@@ -15,14 +15,14 @@ use crate::model::Pendulum;
 /// Starts whose step error is measured.
 const ERROR_SAMPLE: usize = 400;
 /// Starts of the first search for attractors.
-const SEARCH_SAMPLE: usize = 400;
+pub(crate) const SEARCH_SAMPLE: usize = 400;
 /// Undecided starts that a further search begins from.
 const FURTHER_SAMPLE: usize = 256;
 /// Further searches at the most.
 const FURTHER: usize = 6;
 /// Periods after which a search begins to watch what is left, whatever bound is set for the starts:
 /// what counts as chaos does not depend on it.
-const SEARCH_BOUND: u32 = 1000;
+pub(crate) const SEARCH_BOUND: u32 = 1000;
 /// Periods within which nothing may capture a trajectory that counts as chaotic.
 pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + Effort::THOROUGH.watch);
 /// Where chaos coexists with other attractors, a start is given this many times the longest
@@ -30,7 +30,7 @@ pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + Effort::THOROUGH.watch);
 const PATIENCE: u32 = 10;
 const LEAST_BOUND: u32 = 200;
 /// The bound where none is given.
-const MAX_PERIODS: u32 = 4000;
+pub(crate) const MAX_PERIODS: u32 = 4000;
 
 /// What to compute, and how well.
 #[derive(Clone, Copy, Debug)]

@@ -6,6 +6,7 @@
 //! - [`label`]: every start to the attractor that captures it
 //! - [`layers`]: turns and exponents over a fixed time
 //! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
+//! - [`lyapunov`]: the largest exponent of what a start reaches; [`growth`]: tangents of many starts
 //! - [`orbits`]: all closed orbits of one period and winding
 //! - [`resolution`], [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
 //! - [`bifurcation`]: along one parameter, all attractors, and one followed up and down
@@ -16,8 +17,10 @@ pub mod basins;
 pub mod bifurcation;
 pub mod cell;
 pub mod control;
+pub mod growth;
 pub mod label;
 pub mod layers;
+pub mod lyapunov;
 pub mod orbits;
 pub mod parameter_map;
 pub mod reliability;

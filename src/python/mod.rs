@@ -4,6 +4,7 @@
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
 mod convert;
+mod exponents;
 mod fit;
 mod library;
 mod maps;
@@ -122,6 +123,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(planes::parameter_names, module)?)?;
     module.add_function(wrap_pyfunction!(planes::parameter_map, module)?)?;
     module.add_function(wrap_pyfunction!(planes::bifurcation, module)?)?;
+    module.add_function(wrap_pyfunction!(exponents::lyapunov, module)?)?;
+    module.add_function(wrap_pyfunction!(exponents::growth, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_rows, module)?)?;

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 from matplotlib import rc_context
 from matplotlib.text import Text
 
-from pendmap.figures import basins, diagrams, orbits, planes, style, trajectory
+from pendmap.figures import (
+    basins,
+    diagrams,
+    exponents,
+    lifetimes,
+    orbits,
+    planes,
+    style,
+    trajectory,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,6 +29,8 @@ def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
         "bifurcation": diagrams,
         "orbits": orbits,
         "parameter_map": planes,
+        "lifetime": lifetimes,
+        "lyapunov": exponents,
         "trajectory": trajectory,
     }
     draw = kinds[dataset.attrs["kind"]].figure

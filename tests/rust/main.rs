@@ -12,6 +12,8 @@
 //!   they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
 //! - [`maps`], [`layers`], [`threads`]: whole planes; [`planes`]: of parameters
+//! - [`exponents`]: how fast neighbouring motions part, through friction too
+//! - [`maps`], [`layers`], [`threads`]: whole planes
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
@@ -24,6 +26,7 @@ mod effects;
 mod effects_in_lanes;
 mod elementary;
 mod exact;
+mod exponents;
 mod fit;
 mod fit_counts;
 mod fit_derivatives;

@@ -26,6 +26,8 @@ _COMMANDS = {
     "map": "Map which attractors exist over two parameters.",
     "bifurcation": "Draw stroboscopic points against a parameter, with hysteresis.",
     "orbit": "Find all periodic orbits of one period and winding, stable and unstable.",
+    "lyapunov": "Find the largest Lyapunov exponent of the attractor that a start reaches.",
+    "lifetime": "Measure how long transient chaos lives, or find that it persists.",
     "look": "Say what a record holds: channels, rate, noise, releases, what is odd about it.",
     "identify": "Find natural frequency, damping and friction in a free decay, by every method.",
     "compare": "Compare a model with records that it was not fitted to.",

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, diagrams, orbits, planes, style, trajectory
+from pendmap.figures import (
+    basins,
+    diagrams,
+    exponents,
+    lifetimes,
+    orbits,
+    planes,
+    style,
+    trajectory,
+)
 from pendmap.figures import runs as runs_figure
 from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
@@ -48,6 +57,8 @@ _KINDS = {
     "bifurcation": diagrams.figure,
     "orbits": orbits.figure,
     "parameter_map": planes.figure,
+    "lifetime": lifetimes.figure,
+    "lyapunov": exponents.figure,
     "trajectory": trajectory.figure,
 }
 
@@ -66,18 +77,22 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     Of a basin map: the labels, with the attractors marked and named with their shares, and the
     settle time beside them; where the labels are unreliable, settle time and net turns lead; where
     labels tell nothing, the net turns and the finite-time exponent. Of closed orbits: their paths
-    and points in the phase plane. Of a trajectory: time history, phase plane, Poincare section.
+    and points in the phase plane. Of a trajectory: time history, phase plane, Poincare section. Of
+    an exponent: growth along the start, the running mean, its distribution. Of a lifetime: the
+    survival curve with its tail, and the mean over where the tail begins.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit`` or ``pendmap.simulate`` returned;
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.lyapunov``, ``pendmap.lifetime`` or
+        ``pendmap.simulate`` returned;
         ``attrs["kind"]`` tells which.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
         Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map;
-        ``history``, ``phase`` or ``section`` of a trajectory.
+        ``history``, ``phase`` or ``section`` of a trajectory; ``growth``, ``average`` or
+        ``distribution`` of an exponent; ``survival`` or ``tail`` of a lifetime.
     size : (float, float), optional
         Width and height in inches; by default as large as the parts need.
     dpi : float, optional

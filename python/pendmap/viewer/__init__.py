@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from pendmap.errors import InputError
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
-from pendmap.viewer import basins, diagrams, frame, orbits, planes, trajectory
+from pendmap.viewer import basins, diagrams, exponents, frame, lifetimes, orbits, planes, trajectory
 from pendmap.viewer.discrepancy import record_discrepancy
 from pendmap.viewer.identification import record_identification
 from pendmap.viewer.window import (
@@ -49,6 +49,8 @@ SUFFIXES = (".rrd",)
 _KINDS = {
     "basins": (basins.blueprint, basins.log),
     "bifurcation": (diagrams.blueprint, diagrams.log),
+    "lifetime": (lifetimes.blueprint, lifetimes.log),
+    "lyapunov": (exponents.blueprint, exponents.log),
     "orbits": (orbits.blueprint, orbits.log),
     "parameter_map": (planes.blueprint, planes.log),
     "trajectory": (trajectory.blueprint, trajectory.log),
@@ -63,7 +65,11 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     leading one in front), ``/legend`` and ``/summary``. Of closed orbits: ``/phase/data/NUMBER``
     with ``path`` and ``points``, ``/legend`` and ``/summary``. Of a map over two parameters:
     ``/kinds/data/kinds``, ``/{exponent,attractors,undecided}/data/values``. Of a bifurcation
-    diagram: ``/{bifurcation,velocity,exponent}/data/NUMBER``. Of a trajectory:
+    diagram: ``/{bifurcation,velocity,exponent}/data/NUMBER``. Of an exponent:
+    ``/growth/data/own``, ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or,
+    of a closed orbit, ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a
+    lifetime: ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
+    ``/tail/data/{mean,error,fitted}`` and ``/legend``. Of a trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
     ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
     ``sim_time`` (nondimensional time, shown as seconds) and ``period``.
@@ -71,7 +77,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit`` or ``pendmap.simulate`` returned;
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.lyapunov``, ``pendmap.lifetime`` or
+        ``pendmap.simulate`` returned;
         ``attrs["kind"]`` tells which.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.

@@ -1,0 +1,213 @@
+"""Lyapunov exponents: against reference values and scipy, in files, figures and recordings."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from drawn import made, named, titles
+from pendmap import Effect, Pendulum, Rig
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+    from conftest import Run
+
+CHAOS = Pendulum(gamma=0.1, p=2.0, omega=2.0)
+
+
+@pytest.fixture(scope="module")
+def chaos() -> xr.Dataset:
+    return pendmap.lyapunov(CHAOS)
+
+
+@pytest.fixture(scope="module")
+def settled() -> xr.Dataset:
+    """A start that is chaotic for some time."""
+    return pendmap.lyapunov(Pendulum(gamma=0.1, p=1.8, omega=2.0), -1.9, 0.4)
+
+
+def test_chaos_against_the_reference(chaos: xr.Dataset, truths: dict[str, Any]) -> None:
+    entry = truths["lyapunov"]["w2.0_p2.0"]
+    a = chaos.attrs
+    assert a["end"] == "chaotic"
+    assert 0 < a["stderr"] < 0.002 * a["exponent"]
+    assert abs(a["exponent"] - entry["lle_per_tau"]) < 3 * math.hypot(a["stderr"], entry["se"])
+    assert a["per_period"] == pytest.approx(a["exponent"] * math.pi)
+    assert a["second_exponent"] + a["exponent"] == pytest.approx(-0.1)
+    assert abs(a["kaplan_yorke_dimension"] - entry["D_KY_map"]) < 2e-3
+    assert float(chaos["exponent"][0]) == a["exponent"]
+
+
+def test_the_error_is_that_of_independent_trajectories(chaos: xr.Dataset) -> None:
+    each = chaos["finite_time_exponent"].values.mean(axis=1)
+    assert chaos.attrs["exponent"] == pytest.approx(each.mean(), rel=1e-9)
+    assert chaos.attrs["stderr"] == pytest.approx(each.std(ddof=1) / math.sqrt(each.size))
+    # Blocks of a trajectory scatter as independent ones would: nothing remembers for so long.
+    blocks = chaos["finite_time_exponent"].values[:, :200].reshape(each.size, 10, -1).mean(axis=2)
+    within = blocks.std(axis=1, ddof=1).mean() / math.sqrt(10)
+    assert within == pytest.approx(blocks.mean(axis=1).std(ddof=1), rel=0.25)
+
+
+def test_growth_along_the_start_is_the_tangents_of_scipy(settled: xr.Dataset) -> None:
+    model = Pendulum(gamma=0.1, p=1.8, omega=2.0)
+
+    def slope(tau: float, y: Any) -> list[float]:  # noqa: ANN401
+        pull = 1 + model.p * math.cos(model.omega * tau)
+        bend = -pull * math.cos(y[0])
+        return [y[1], -model.gamma * y[1] - pull * math.sin(y[0]), y[3], bend * y[2] - 0.1 * y[3]]
+
+    periods = 8
+    run = solve_ivp(
+        slope,
+        (0.0, periods * model.period),
+        (-1.9, 0.4, math.sqrt(0.5), math.sqrt(0.5)),
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-12,
+        t_eval=model.period * np.arange(periods + 1),
+    )
+    expected = np.log(np.hypot(run.y[2], run.y[3]))
+    assert np.allclose(settled["growth"].values[: periods + 1], expected, atol=2e-3)
+
+
+def test_transient_chaos_has_the_exponent_of_what_captures_it(settled: xr.Dataset) -> None:
+    a = settled.attrs
+    assert a["end"] == "captured"
+    assert a["transient_periods"] > 30
+    assert settled["growth"].values.max() > 15
+    assert a["exponent"] == pytest.approx(-0.05, abs=1e-9)
+    assert (a["stderr"], a["trajectories"]) == (0.0, 0)
+    assert a["second_exponent"] == pytest.approx(-0.05, abs=1e-9)
+    assert "reached after" in a["summary"]
+
+
+@pytest.mark.parametrize("name", ["fig2a", "fig2b", "fig2c"])
+def test_the_points_of_figure_2_are_tumbling_chaos(name: str) -> None:
+    found = pendmap.lyapunov(pendmap.PRESETS[name], precision=0.01)
+    assert [str(kind) for kind in found["kind"].values] == ["tumbling_chaos"]
+    assert found.attrs["exponent"] > 20 * found.attrs["stderr"]
+
+
+def test_another_seed_is_another_sample_and_threads_are_not(chaos: xr.Dataset) -> None:
+    few = pendmap.lyapunov(CHAOS, precision=0.01, threads=1)
+    same = pendmap.lyapunov(CHAOS, precision=0.01, threads=2)
+    other = pendmap.lyapunov(CHAOS, precision=0.01, seed=1)
+    assert few.attrs["exponent"] == same.attrs["exponent"]
+    assert few.attrs["exponent"] != other.attrs["exponent"]
+    apart = few.attrs["exponent"] - other.attrs["exponent"]
+    assert abs(apart) < 4 * math.hypot(few.attrs["stderr"], other.attrs["stderr"])
+    assert few.attrs["stderr"] > chaos.attrs["stderr"]
+
+
+def test_friction_that_holds_has_none_and_says_so() -> None:
+    found = pendmap.lyapunov(Pendulum(gamma=0.1, p=1.5, omega=0.87, theta_r=0.2))
+    assert found.attrs["end"] == "captured"
+    assert str(found["attractor"].values[0]) == "rest"
+    assert math.isnan(found.attrs["exponent"])
+    assert "Friction holds it for ever" in found.attrs["summary"]
+
+
+def test_a_cycle_with_turns_under_friction_has_the_sum_of_its_turns() -> None:
+    found = pendmap.lyapunov(Pendulum(gamma=0.1, p=1.0, omega=0.87, theta_r=0.01))
+    a = found.attrs
+    assert str(found["kind"].values[0]) == "oscillation"
+    # Each turn shrinks phase area on top of what viscous damping does.
+    assert -0.12 < a["exponent_sum"] < -0.101
+
+
+def test_in_si_it_is_per_second(chaos: xr.Dataset) -> None:
+    rig = Rig(w0=5.0, c_over_m=0.5, p=2.0, Omega=10.0)
+    si = pendmap.lyapunov(rig)
+    assert si.attrs["exponent"] == pytest.approx(5 * chaos.attrs["exponent"], rel=1e-9)
+    assert si.attrs["per_period"] == pytest.approx(chaos.attrs["per_period"], rel=1e-9)
+    assert "per second" in si.attrs["summary"]
+    assert si["running_exponent"].attrs["units"] == "1/s"
+
+
+def test_without_damping_or_drive() -> None:
+    found = pendmap.lyapunov(Pendulum(gamma=0.0, p=0.0), 0.5)
+    assert found.attrs["end"] == "undamped"
+    assert abs(found.attrs["exponent"]) < 5e-3
+    found = pendmap.lyapunov(Pendulum(p=0.0))
+    assert (str(found["kind"].values[0]), found.attrs["end"]) == ("rest", "captured")
+    assert found.attrs["exponent"] == pytest.approx(-0.05)
+
+
+def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
+    drag = Effect("quadratic_drag", {"q": 0.3})
+    found = pendmap.lyapunov(Pendulum(p=1.0, effects=(drag,)))
+    assert found.attrs["end"] == "captured"
+    assert found.attrs["exponent_sum"] < -0.101
+    ever = Pendulum(p=1.0, effects=(Effect("drive_chirp", {"r": 0.001}),))
+    with pytest.raises(pendmap.InputError, match="drive_chirp"):
+        pendmap.lyapunov(ever)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"precision": 0.0}, "precision is 0: allowed is above 0 up to 0.5"),
+        ({"precision": math.nan}, "precision is nan"),
+        ({"theta": math.inf}, "theta is inf"),
+        ({"tol": 1.0}, "tol is 1"),
+        ({"max_periods": 0}, "max_periods is 0"),
+        ({"threads": 0}, "threads is 0"),
+        ({"seed": -1}, "seed is -1"),
+    ],
+)
+def test_what_is_refused(given: dict[str, Any], match: str) -> None:
+    with pytest.raises(pendmap.InputError, match=match):
+        pendmap.lyapunov(CHAOS, **given)
+
+
+def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("lyapunov", "--p", 2, "--precision", 0.01)
+    assert run.returncode == 0, run.stderr
+    assert "Largest Lyapunov exponent 0.27" in run.stdout
+    assert {p.name for p in tmp_path.iterdir()} == {"lyapunov.nc", "lyapunov.png", "lyapunov.rrd"}
+    run = pendmap_command("lyapunov", "--p", 1, "--theta-r", 0.5, "--json")
+    said = json.loads(run.stdout)
+    assert {"exponent", "stderr", "per_period", "attractor", "transient_periods"} <= said.keys()
+    assert said["attractor"]["name"] == "rest"
+    assert said["exponent"] is None
+    again = pendmap_command("plot", "lyapunov.nc", "--layer", "distribution", "--plot", "again.pdf")
+    assert again.returncode == 0, again.stderr
+    refused = pendmap_command("lyapunov", "--precision", 1)
+    assert refused.returncode == 2
+    assert "up to 0.5" in refused.stderr
+
+
+def test_figures_say_what_they_show(chaos: xr.Dataset, settled: xr.Dataset) -> None:
+    figure = made(chaos)
+    assert titles(figure)[1:] == ["mean over 256 trajectories", "exponents over 20 periods"]
+    assert any("0.2736" in text or "0.2735" in text for text in named(figure))
+    figure = made(settled)
+    assert titles(figure)[1:] == ["exponent over 20 periods"]
+    assert any("transient" in text for text in named(figure))
+    with pytest.raises(pendmap.InputError, match="no layer 'labels'"):
+        made(chaos, layer="labels")
+
+
+@pytest.mark.usefixtures("strict_recordings")
+def test_recordings_hold_it(chaos: xr.Dataset, settled: xr.Dataset, tmp_path: Path) -> None:
+    back = recorded(chaos, tmp_path)
+    wanted = {"/average/data/own", "/average/data/band", "/distribution/data/density"}
+    assert wanted | {"/growth/data/own", "/attractor/data/points", "/summary"} <= set(back.columns)
+    back = recorded(settled, tmp_path)
+    assert {"/exponent/data/own", "/exponent/data/value"} <= set(back.columns)
+
+
+def test_files_hold_it(chaos: xr.Dataset, settled: xr.Dataset, tmp_path: Path) -> None:
+    for number, dataset in enumerate((chaos, settled)):
+        path = pendmap.save(dataset, tmp_path / f"{number}.nc")
+        assert pendmap.load(path).equals(dataset)

@@ -1,0 +1,220 @@
+"""Lifetimes of transient chaos: the statistics on drawn times, reference values, files, figures."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import pendmap
+from drawn import made, named
+from pendmap import Effect, Pendulum, Rig, survival
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+    from conftest import Run
+
+BOUND = 4000
+
+
+def drawn(seed: int, mean: float, count: int = 20_000) -> Any:  # noqa: ANN401
+    """Whole times of an exponential tail after a settling that is not exponential."""
+    draw = np.random.default_rng(seed)
+    return np.ceil(draw.exponential(mean, count) + draw.gamma(4.0, mean / 40, count)).astype(int)
+
+
+def test_the_mean_of_drawn_times_is_found_and_its_error_holds() -> None:
+    off = []
+    exact = 1 / (1 - math.exp(-1 / 60))  # of whole periods
+    for seed in range(40):
+        times = drawn(seed, 60.0)
+        tail = survival.begin(times, 0, BOUND)
+        assert tail is not None
+        assert tail.is_exponential
+        off.append((tail.mean - exact) / tail.stderr)
+    assert abs(np.mean(off)) < 0.6
+    assert 0.7 < np.std(off) < 1.4
+
+
+def test_times_cut_off_do_not_bias_it() -> None:
+    draw = np.random.default_rng(3)
+    times = np.ceil(draw.exponential(3000.0, 20_000)).astype(int)
+    early = times[times <= 1000]
+    censored = int((times > 1000).sum())
+    tail = survival.begin(early, censored, 1000)
+    assert tail is not None
+    assert tail.censored == censored > 10_000
+    assert abs(tail.mean - 3000.0) < 3 * tail.stderr
+    assert tail.stderr == pytest.approx(tail.mean / math.sqrt(tail.captured))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_no_exponential_is_not_taken_for_one(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    for times in (draw.uniform(0, 300, 20_000), 50 * draw.weibull(2.0, 20_000)):
+        whole = np.ceil(times).astype(int)
+        assert not survival.tail(whole, 0, BOUND, 5).is_exponential
+    # Both tests call chance what is chance, about one time in ten.
+    called = [
+        survival.tail(np.ceil(draw.exponential(80.0, 2000)).astype(int), 0, BOUND, 0)
+        for _ in range(60)
+    ]
+    assert sum(not tail.is_exponential for tail in called) < 16
+
+
+@pytest.fixture(scope="module")
+def long() -> xr.Dataset:
+    return pendmap.lifetime(Pendulum(gamma=0.1, p=1.8, omega=2.0))
+
+
+@pytest.mark.parametrize("p", [1.2, 1.8])
+def test_against_the_reference(p: float, truths: dict[str, Any]) -> None:
+    found = pendmap.lifetime(Pendulum(gamma=0.1, p=p, omega=2.0))
+    a = found.attrs
+    assert (a["persistent"], a["transient_chaos"]) == (0, 1)
+    assert min(a["tail_weibull"], a["tail_steady"]) > 0.05
+    for known in truths["transient_lifetime_periods"][f"w2.0_p{p}"]["tail"]:
+        gap = abs(a["mean_periods"] - known["mean"])
+        assert gap < 3 * math.hypot(a["stderr"], known["stderr"]), known
+
+
+def test_the_error_is_the_spread_over_seeds() -> None:
+    found = [pendmap.lifetime(Pendulum(p=1.2), starts=6000, seed=seed).attrs for seed in range(20)]
+    means = np.array([a["mean_periods"] for a in found])
+    errors = np.array([a["stderr"] for a in found])
+    spread = (((means - np.average(means, weights=errors**-2)) / errors) ** 2).sum()
+    # Chi squared with 19 degrees of freedom: outside once in five hundred.
+    assert 5.5 < spread < 43, spread
+
+
+def test_the_tail_is_that_of_the_starts(long: xr.Dataset) -> None:
+    a = long.attrs
+    begin = a["from_period"]
+    times = long["capture_period"].values
+    beyond = times[times > begin] - begin
+    assert a["tail_captured"] == beyond.size
+    assert a["mean_periods"] == pytest.approx(beyond.mean())
+    assert long["captured"].values[:, -1].sum() == a["captured"] == (times >= 0).sum()
+    chosen = pendmap.lifetime(Pendulum(gamma=0.1, p=1.8, omega=2.0), from_period=600)
+    assert chosen.attrs["from_period"] == 600
+    early = pendmap.lifetime(Pendulum(gamma=0.1, p=1.8, omega=2.0), from_period=5)
+    assert "IS NOT EXPONENTIAL" in early.attrs["summary"]
+
+
+def test_on_the_saddle_deviations_grow_faster_than_trajectories_leave(long: xr.Dataset) -> None:
+    a = long.attrs
+    assert a["escape_rate"] == pytest.approx(1 / a["mean_periods"], rel=0.01)
+    assert 0.3 < a["exponent_per_period"] < 0.8
+    assert a["entropy"] == pytest.approx(a["exponent_per_period"] - a["escape_rate"])
+    assert 1 < a["saddle_dimension"] < 2
+
+
+@pytest.mark.parametrize("p", [0.0, 0.3, 0.5, 0.6])
+def test_smooth_basins_have_no_transient_chaos(p: float) -> None:
+    found = pendmap.lifetime(Pendulum(gamma=0.1, p=p, omega=2.0))
+    a = found.attrs
+    assert (a["persistent"], a["transient_chaos"]) == (0, 0)
+    assert math.isnan(a["mean_periods"])
+    assert a["summary"].startswith("No transient chaos")
+
+
+def test_chaos_that_persists() -> None:
+    found = pendmap.lifetime(pendmap.PRESETS["fig2b"], starts=2000)
+    a = found.attrs
+    assert (a["persistent"], a["captured"]) == (1, 0)
+    assert a["exponent"] == pytest.approx(0.1454, abs=0.003)
+    assert a["summary"].startswith("Persistent: tumbling chaos")
+    # Beside other attractors the starts that end on it are left out.
+    beside = pendmap.lifetime(Pendulum(p=1.52, omega=1.1), starts=4000).attrs
+    assert beside["persistent"] == 0
+    assert 0.02 < beside["chaotic_share"] < 0.06
+
+
+def test_a_little_friction_ends_what_persisted() -> None:
+    found = pendmap.lifetime(Pendulum(p=2.0, theta_r=0.05), starts=2000)
+    a = found.attrs
+    assert (a["persistent"], a["transient_chaos"]) == (0, 1)
+    assert {str(kind) for kind in found["kind"].values} <= {"rest", "inverted_rest"}
+    assert a["mean_periods"] > 500
+
+
+def test_without_damping_nothing_is_captured() -> None:
+    found = pendmap.lifetime(Pendulum(gamma=0.0), starts=500)
+    assert (found.attrs["persistent"], found.attrs["captured"]) == (0, 0)
+    assert "Without damping" in found.attrs["summary"]
+
+
+def test_in_si_the_time_is_in_seconds() -> None:
+    bare = pendmap.lifetime(Pendulum(gamma=0.1, p=1.2, omega=2.0), starts=4000).attrs
+    rig = Rig(w0=5.0, c_over_m=0.5, p=1.2, Omega=10.0)
+    si = pendmap.lifetime(rig, starts=4000).attrs
+    # One in a thousand starts is chaotic enough that rounding of the velocities moves it.
+    assert si["mean_periods"] == pytest.approx(bare["mean_periods"], rel=0.1)
+    assert si["mean_time"] == pytest.approx(si["mean_periods"] * 2 * math.pi / 10)
+    assert " s)" in si["summary"]
+
+
+def test_threads_do_not_count_and_lists_of_starts_do() -> None:
+    model = Pendulum(p=1.2, effects=(Effect("quadratic_drag", {"q": 0.01}),))
+    one = pendmap.lifetime(model, starts=2000, threads=1)
+    two = pendmap.lifetime(model, starts=2000, threads=2)
+    assert one["capture_period"].equals(two["capture_period"])
+    assert one.attrs["mean_periods"] == two.attrs["mean_periods"]
+    same = pendmap.lifetime(model, one["start_theta"].values, one["start_velocity"].values)
+    assert same.attrs["mean_periods"] == one.attrs["mean_periods"]
+    assert not one["capture_period"].equals(
+        pendmap.lifetime(model, starts=2000, seed=1)["capture_period"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"starts": 10}, "starts is 10: allowed is a whole number from 100"),
+        ({"from_period": -1}, "from_period is -1"),
+        ({"theta": [0.1]}, "theta and velocity: allowed is both or none"),
+        ({"seed": 0.5}, "seed is 0.5"),
+        ({"tol": 2.0}, "tol is 2"),
+    ],
+)
+def test_what_is_refused(given: dict[str, Any], match: str) -> None:
+    with pytest.raises(pendmap.InputError, match=match):
+        pendmap.lifetime(Pendulum(), **given)
+
+
+def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("lifetime", "--p", 1.2, "--starts", 5000)
+    assert run.returncode == 0, run.stderr
+    assert "Transient chaos lives for 5" in run.stdout
+    assert {p.name for p in tmp_path.iterdir()} == {"lifetime.nc", "lifetime.png", "lifetime.rrd"}
+    run = pendmap_command("lifetime", "--p", 0.5, "--starts", 2000, "--json")
+    said = json.loads(run.stdout)
+    assert (said["mean_periods"], said["stderr"]) == (None, None)
+    assert said["persistent"] is said["transient_chaos"] is False
+    again = pendmap_command("plot", "lifetime.nc", "--layer", "tail", "--plot", "again.svg")
+    assert again.returncode == 0, again.stderr
+    refused = pendmap_command("lifetime", "--starts", 3)
+    assert refused.returncode == 2
+
+
+def test_the_figure_says_who_captures(long: xr.Dataset) -> None:
+    said = " ".join(named(made(long)))
+    assert "rotation 8:+8 captures" in said
+    assert f"tail from period {long.attrs['from_period']}: mean lifetime" in said
+
+
+@pytest.mark.usefixtures("strict_recordings")
+def test_recordings_and_files_hold_it(long: xr.Dataset, tmp_path: Path) -> None:
+    back = recorded(long, tmp_path)
+    wanted = {"/survival/data/0", "/survival/data/1", "/survival/data/tail", "/tail/data/mean"}
+    assert wanted | {"/legend", "/summary"} <= set(back.columns)
+    assert pendmap.load(pendmap.save(long, tmp_path / "long.nc")).equals(long)
+    none = pendmap.lifetime(pendmap.PRESETS["fig2b"], starts=200)
+    assert "/survival/data/0" in recorded(none, tmp_path).columns
