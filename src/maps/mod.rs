@@ -6,7 +6,8 @@
 //! - [`label`]: every start to the attractor that captures it
 //! - [`layers`]: turns and exponents over a fixed time
 //! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
-//! - [`orbits`]: all closed orbits of one period and winding
+//! - [`orbits`]: all closed orbits of one period and winding; where their displacement `vanishing`
+//!   is possible
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
@@ -18,3 +19,4 @@ pub mod orbits;
 pub mod reliability;
 pub mod starts;
 pub mod texture;
+mod vanishing;
