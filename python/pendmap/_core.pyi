@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "__version__",
+    "acceleration",
     "advance",
     "basins_grid",
     "basins_list",
@@ -21,6 +22,7 @@ __all__ = [
     "simd",
     "simd_available",
     "simulate",
+    "tongues",
 ]
 
 __version__: str
@@ -72,6 +74,9 @@ def advance(
 def choose_steps(
     parameters: _Parameters, theta: _Floats, velocity: _Floats, tol: float
 ) -> tuple[int, float]: ...
+def acceleration(
+    parameters: _Parameters, tau: _Floats, theta: _Floats, velocity: _Floats
+) -> _Floats: ...
 def simulate(
     parameters: _Parameters,
     start: tuple[float, float],
@@ -102,6 +107,13 @@ def orbits(
     threads: int,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def tongues(
+    parameters: _Parameters,
+    omegas: Sequence[float],
+    p_max: float,
+    threads: int,
+    progress: _Progress | None = None,
+) -> list[dict[str, Any]]: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],

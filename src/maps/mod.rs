@@ -6,12 +6,15 @@
 //! - [`label`]: every start to the attractor that captures it
 //! - [`layers`]: turns and exponents over a fixed time
 //! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
-//! - [`orbits`]: all closed orbits of one period and winding; where their displacement `vanishing`
-//!   is possible
+//! - [`orbits`]: all closed orbits of one period and winding: `vanishing` and `approach` find
+//!   where Newton's method begins
+//! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
+mod approach;
 pub mod basins;
+mod chebyshev;
 pub mod control;
 pub mod label;
 pub mod layers;
@@ -19,4 +22,5 @@ pub mod orbits;
 pub mod reliability;
 pub mod starts;
 pub mod texture;
+pub mod tongues;
 mod vanishing;

@@ -1,7 +1,8 @@
 //! All closed orbits of one period and winding in a box of starts, those that repel too.
 //!
 //! Newton's method begins wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped,
-//! may vanish ([`super::vanishing`]). Next to an orbit near its birth it is begun again, repelled by
+//! may vanish ([`super::vanishing`]), by differences
+//! first ([`super::approach`]). Next to an orbit near its birth it is begun again, repelled by
 //! all that is known: branches that are about to meet lie nearer to one another than any cell.
 
 use std::f64::consts::TAU;
@@ -10,6 +11,7 @@ use nalgebra::Matrix2;
 use rayon::prelude::*;
 
 use super::advance::advance;
+use super::approach::approach;
 use super::control::{Control, pool};
 use super::starts::{Axis, Starts};
 use super::vanishing;
@@ -87,10 +89,11 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         let running = running.into_iter().filter(|r| r.sense == request.w).collect();
         return Ok(Orbits { running, ..none });
     }
-    let begin = beginnings(pendulum, request, control)?;
     let map = PoincareMap::new(pendulum);
+    let rubs = pendulum.has_friction();
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
+    let begin = beginnings(pendulum, request, reach, control)?;
     let pool = pool(request.threads)?;
     let mut all: Vec<PeriodicOrbit> = Vec::new();
     let mut begun = 0;
@@ -124,7 +127,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         let turned = [-TAU, 0.0, TAU].map(|turn| p[0] + turn);
         turned.iter().any(|t| request.theta.holds(*t)) && request.velocity.holds(p[1])
     };
-    let held = |p: &State| p[1] == 0.0 && pendulum.equation().holds_for_ever(p[0]);
+    let held = |p: &State| rubs && p[1] == 0.0 && pendulum.equation().holds_for_ever(p[0]);
     all.retain(|orbit| {
         let asked = (orbit.n, orbit.w) == (request.n, request.w);
         asked && orbit.points.iter().any(inside) && !orbit.points.iter().any(held)
@@ -136,6 +139,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
 fn beginnings(
     pendulum: &Pendulum,
     request: &Request,
+    reach: f64,
     control: &Control,
 ) -> Result<Vec<State>, Error> {
     let starts = Starts::Grid { theta: request.theta, velocity: request.velocity };
@@ -154,7 +158,8 @@ fn beginnings(
         };
         Ok(from.iter().zip(ends).map(gap).collect())
     };
-    vanishing::places([request.theta, request.velocity], displacements)
+    let places = vanishing::places([request.theta, request.velocity], &displacements)?;
+    approach(&places, reach, displacements)
 }
 
 /// Starts beside an orbit whose displacement over `n` periods hardly changes in one direction: only

@@ -13,13 +13,13 @@ use crate::error::Error;
 use crate::integrate::State;
 
 /// How often a cell is quartered.
-const LEVELS: usize = 3;
+const LEVELS: usize = 4;
 /// Cells are not quartered where more than this many remain: the field is not resolved there.
 const MOST_CELLS: usize = 60_000;
 /// A zero may lie so far from the centre of its cell, in cells.
-const HALF: f64 = 0.6;
+const HALF: f64 = 0.75;
 /// A component that keeps its sign on all nodes by this part of its range has it in between.
-const CLEAR: f64 = 0.2;
+const CLEAR: f64 = 0.5;
 
 /// The nodes of a cell and its ring, rows of equal velocity, the lowest first.
 type Patch = [State; 16];
@@ -29,12 +29,11 @@ type Patch = [State; 16];
 struct Cell {
     /// Its corner with the lowest values.
     corner: State,
-    /// How large what is not linear is, in cells, and where linearity puts the zero.
-    doubt: f64,
+    /// Where linearity puts the zero.
     aim: State,
 }
 
-/// Places from which Newton's method would find all zeros in the box, the surest first.
+/// Places from which Newton's method should find all zeros in the box.
 ///
 /// # Errors
 /// Those of `field`, which is asked for its values at many points at once.
@@ -85,7 +84,6 @@ pub(super) fn places(
         }
         (cells, size) = (smaller, half);
     }
-    cells.sort_by(|a, b| a.doubt.total_cmp(&b.doubt));
     Ok(cells.iter().map(|cell| cell.aim).collect())
 }
 
@@ -109,7 +107,7 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
     let mean = 0.25 * (value(5) + value(6) + value(9) + value(10));
     let along = 0.5 * (value(6) + value(10) - value(5) - value(9));
     let up = 0.5 * (value(9) + value(10) - value(5) - value(6));
-    let unresolved = Some(Cell { corner, doubt: f64::INFINITY, aim: centre });
+    let unresolved = Some(Cell { corner, aim: centre });
     let Some(inverse) = Matrix2::from_columns(&[along, up]).try_inverse() else {
         return unresolved;
     };
@@ -123,11 +121,10 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
     if (0..2).any(|k| from_centre[k].abs() > HALF + bent[k]) {
         return None;
     }
-    let doubt = bent[0].max(bent[1]);
-    if !doubt.is_finite() {
+    if !(bent[0] + bent[1]).is_finite() {
         return unresolved;
     }
     // Not beyond the cell: the linear part is known no further.
     let aim = [0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]);
-    Some(Cell { corner, doubt, aim })
+    Some(Cell { corner, aim })
 }

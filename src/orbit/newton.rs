@@ -101,7 +101,7 @@ pub fn find_other(
         .filter(|d| n.is_multiple_of(*d))
         .find(|d| *d == n || distance(image(*d).state, point) < SAME_POINT)?;
     let point = if smallest == n { point } else { polish(map, point, smallest, reach, &[])? };
-    complete(map, point, smallest)
+    complete(map, [wrapped(point[0]), point[1]], smallest)
 }
 
 /// The place of the point with the lowest angle.

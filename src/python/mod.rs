@@ -9,6 +9,7 @@ mod library;
 mod maps;
 mod motion;
 mod orbits;
+mod tongues;
 mod watch;
 
 use pyo3::prelude::*;
@@ -118,6 +119,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(maps::basins_grid, module)?)?;
     module.add_function(wrap_pyfunction!(maps::basins_list, module)?)?;
     module.add_function(wrap_pyfunction!(orbits::orbits, module)?)?;
+    module.add_function(wrap_pyfunction!(tongues::tongues, module)?)?;
+    module.add_function(wrap_pyfunction!(motion::acceleration, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_rows, module)?)?;
