@@ -27,6 +27,7 @@ from pendmap.model.library import EffectDefinition, EffectParameter, effects
 if TYPE_CHECKING:
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins, basins_of
+    from pendmap.melnikov import melnikov
     from pendmap.orbits import orbit
     from pendmap.records import (
         Experiment,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
         read_experiment,
     )
     from pendmap.store import load, save
+    from pendmap.tongues import tongues
     from pendmap.trajectory import advance, simulate
 
     __version__: str
@@ -66,12 +68,14 @@ __all__ = [
     "load",
     "load_formulas",
     "load_model",
+    "melnikov",
     "noise_floor",
     "orbit",
     "read_experiment",
     "save",
     "save_model",
     "simulate",
+    "tongues",
 ]
 
 _HOMES = {
@@ -86,11 +90,13 @@ _HOMES = {
     "basins": "maps",
     "basins_of": "maps",
     "load": "store",
+    "melnikov": "melnikov",
     "noise_floor": "records",
     "orbit": "orbits",
     "read_experiment": "records",
     "save": "store",
     "simulate": "trajectory",
+    "tongues": "tongues",
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     Command = Callable[..., Any]
 
-__all__ = ["model_from", "model_options", "rig_from"]
+__all__ = ["model_from", "model_options", "model_options_without", "rig_from"]
 
 _BARE = {
     "gamma": "Viscous damping c/(m w0).",
@@ -37,6 +38,15 @@ _SAME = {"stroke_mm": "p", "frequency_hz": "omega"}
 
 def model_options(function: Command) -> Command:
     """Add the parameters of the pendulum, the presets and the model file."""
+    return model_options_without()(function)
+
+
+def model_options_without(*left_out: str) -> Callable[[Command], Command]:
+    """Return what adds them but those ``left_out``, which the command takes otherwise."""
+    return functools.partial(_add, left_out=left_out)
+
+
+def _add(function: Command, left_out: tuple[str, ...]) -> Command:
     model = click.option(
         "--model",
         "model",
@@ -51,6 +61,8 @@ def model_options(function: Command) -> Command:
     )
     function = model(preset(function))
     for name, text in reversed((_BARE | _SI).items()):
+        if name in left_out:
+            continue
         default = getattr(Pendulum(), name, None)
         function = click.option(
             f"--{name.replace('_', '-')}",
@@ -64,7 +76,7 @@ def model_options(function: Command) -> Command:
 def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     """Take the model's options out of ``given`` and make the model that they describe."""
     model, preset = given.pop("model"), given.pop("preset")
-    typed = {name: given.pop(name) for name in (*_BARE, *_SI)}
+    typed = {name: given.pop(name, None) for name in (*_BARE, *_SI)}
     typed = {name: value for name, value in typed.items() if value is not None}
     if model is not None and preset is not None:
         raise click.UsageError("--model and --preset: allowed is one of them")

@@ -14,7 +14,7 @@ from pendmap.checks import MOST_CELLS, shown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["AXIS", "NUMBER", "AxisText", "OutputFile", "ReportFile", "Whole"]
+__all__ = ["AXIS", "NUMBER", "RANGE", "AxisText", "OutputFile", "ReportFile", "Whole"]
 
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
@@ -97,6 +97,36 @@ class _Axis(click.ParamType[AxisText]):
         return AxisText(low, high, count)
 
 
+class _Range(click.ParamType[list[float]]):
+    name = "A:B:N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[float]:
+        """Return N values from A to B, both included, or the only one."""
+        if isinstance(value, list):
+            return value
+        wanted = "allowed is A:B:N, N values from A to B, both included, or a single value"
+        parts = str(value).split(":")
+        try:
+            ends = [_number(part) for part in parts[:2]]
+            count = int(parts[2]) if len(parts) == 3 else 1  # noqa: PLR2004
+        except (ValueError, ZeroDivisionError):
+            self.fail(f"{value!r}: {wanted}", param, ctx)
+        if len(parts) not in {1, 3}:
+            self.fail(f"{value!r}: {wanted}", param, ctx)
+        if not all(math.isfinite(end) for end in ends) or ends[0] > ends[-1]:
+            self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
+        if not 1 <= count <= MOST_CELLS:
+            self.fail(f"{value!r}: {count} values, allowed are 1 to {MOST_CELLS}", param, ctx)
+        low, high = ends[0], ends[-1]
+        if count == 1 and low != high:
+            self.fail(f"{value!r}: one value has one bound", param, ctx)
+        if count > 1 and low == high:
+            self.fail(f"{value!r}: {count} values need two bounds", param, ctx)
+        return [low + (high - low) * k / max(count - 1, 1) for k in range(count)]
+
+
 class OutputFile(click.ParamType[Path]):
     """A file to write: its suffix and folder are checked before anything is computed."""
 
@@ -159,3 +189,4 @@ def _writable(path: Path) -> bool:
 
 NUMBER = _Number()
 AXIS = _Axis()
+RANGE = _Range()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.figures import basins, orbits, style, trajectory
+from pendmap.figures import basins, melnikov, orbits, style, tongues, trajectory
 from pendmap.figures import runs as runs_figure
 from pendmap.figures.runs import RunPanel
 from pendmap.files import whole_file
@@ -43,7 +43,13 @@ __all__ = [
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
 
-_KINDS = {"basins": basins.figure, "orbits": orbits.figure, "trajectory": trajectory.figure}
+_KINDS = {
+    "basins": basins.figure,
+    "melnikov": melnikov.figure,
+    "orbits": orbits.figure,
+    "tongues": tongues.figure,
+    "trajectory": trajectory.figure,
+}
 
 
 def draw(  # noqa: PLR0913 (all of these a user may choose)
@@ -60,18 +66,21 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     Of a basin map: the labels, with the attractors marked and named with their shares, and the
     settle time beside them; where the labels are unreliable, settle time and net turns lead; where
     labels tell nothing, the net turns and the finite-time exponent. Of closed orbits: their paths
-    and points in the phase plane. Of a trajectory: time history, phase plane, Poincare section.
+    and points in the phase plane. Of critical curves: stable regions and their boundaries. Of
+    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history, phase plane, Poincare section.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit`` or ``pendmap.simulate`` returned;
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.simulate``, ``pendmap.tongues`` or
+        ``pendmap.melnikov`` returned;
         ``attrs["kind"]`` tells which.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
         Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map;
-        ``history``, ``phase`` or ``section`` of a trajectory.
+        ``history``, ``phase`` or ``section`` of a trajectory. Of critical curves the plane:
+        ``omega-p`` or ``e-alpha2``.
     size : (float, float), optional
         Width and height in inches; by default as large as the parts need.
     dpi : float, optional

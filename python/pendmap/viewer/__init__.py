@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from pendmap.errors import InputError
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
-from pendmap.viewer import basins, frame, orbits, trajectory
+from pendmap.viewer import basins, frame, melnikov, orbits, tongues, trajectory
 from pendmap.viewer.discrepancy import record_discrepancy
 from pendmap.viewer.identification import record_identification
 from pendmap.viewer.window import (
@@ -48,7 +48,9 @@ SUFFIXES = (".rrd",)
 
 _KINDS = {
     "basins": (basins.blueprint, basins.log),
+    "melnikov": (melnikov.blueprint, melnikov.log),
     "orbits": (orbits.blueprint, orbits.log),
+    "tongues": (tongues.blueprint, tongues.log),
     "trajectory": (trajectory.blueprint, trajectory.log),
 }
 
@@ -59,7 +61,9 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Of a basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
     ``/turns/data/turns``, ``/exponent/data/exponent`` (those layers that tell something, the
     leading one in front), ``/legend`` and ``/summary``. Of closed orbits: ``/phase/data/NUMBER``
-    with ``path`` and ``points``, ``/legend`` and ``/summary``. Of a trajectory:
+    with ``path`` and ``points``, ``/legend`` and ``/summary``. Of critical curves:
+    ``/tongues/data/{plus,minus,undamped,fold,own}`` and the same under ``/paper`` in the plane of
+    eq. 1.4. Of Melnikov's criterion: ``/melnikov/data/{forward,backward,own}``. Of a trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
     ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
     ``sim_time`` (nondimensional time, shown as seconds) and ``period``.
@@ -67,7 +71,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit`` or ``pendmap.simulate`` returned;
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.simulate``, ``pendmap.tongues`` or
+        ``pendmap.melnikov`` returned;
         ``attrs["kind"]`` tells which.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.

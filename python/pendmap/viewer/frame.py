@@ -45,7 +45,9 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     """Return an empty recording, identified by the dataset's content."""
     attrs = {str(k): v for k, v in dataset.attrs.items() if k not in ("seconds", "summary")}
     content = hashlib.blake2b(repr(sorted(attrs.items())).encode(), digest_size=12)
-    telling = next(name for name in ("label", "theta", "theta_point") if name in dataset)
+    telling = next(
+        name for name in ("label", "theta", "theta_point", "p", "p_melnikov") if name in dataset
+    )
     content.update(np.ascontiguousarray(dataset[telling].values).data)
     return identified(content.hexdigest())
 
