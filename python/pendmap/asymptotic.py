@@ -17,7 +17,8 @@ which adds ``k p^2``, ``k = 1/(9 omega^2 - 4)``, to ``a``: second order,
 second harmonic. ``C0 = -(p/2) A`` takes ``p^2/2`` off the stiffness of the cosine alone, the second
 harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
 
-``(a - (1/2 - s) p^2)(a + s p^2) + c^2 = 0``, ``a = 1 - omega^2``, ``c = gamma omega``: second order.
+``(a - (1/2 - s) p^2)(a + s p^2) + c^2 = 0``, ``a = 1 - omega^2``, ``c = gamma omega``: second
+order.
 
 Damping of the harmonics that are eliminated is left out: it is of the next order.
 """

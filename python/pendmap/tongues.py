@@ -125,9 +125,9 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     }
     above = [stable for row in found for stable in row["stable"][1:]]
     variables["stable_above"] = ("critical", np.array(above, dtype=np.int8))
-    asymptotic_p, error = _asymptotic(found, frequencies, pendulum.gamma, p_max)
+    asymptotic_p, off = _asymptotic(found, frequencies, pendulum.gamma, p_max)
     variables["asymptotic"] = (("curve", "omega"), asymptotic_p, of_p)
-    variables["asymptotic_error"] = (("curve", "omega"), error, {"units": "1"})
+    variables["asymptotic_error"] = (("curve", "omega"), off, {"units": "1"})
     coords: dict[str, Any] = {
         "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
         "curve": ("curve", np.array(list(asymptotic.CURVES))),

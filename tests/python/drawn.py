@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from matplotlib import rc_context
 from matplotlib.text import Text
 
-from pendmap.figures import basins, orbits, style, trajectory
+from pendmap.figures import basins, melnikov, orbits, style, tongues, trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 
 
 def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
-    kinds = {"basins": basins, "orbits": orbits, "trajectory": trajectory}
+    kinds = {
+        "basins": basins,
+        "melnikov": melnikov,
+        "orbits": orbits,
+        "tongues": tongues,
+        "trajectory": trajectory,
+    }
     draw = kinds[dataset.attrs["kind"]].figure
     with rc_context(style.RC):
         figure = draw(dataset, layer=layer, size=None, dpi=100.0, colormap=None)

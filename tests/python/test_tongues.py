@@ -117,7 +117,7 @@ def test_asymptotic_curves_have_the_order_they_say(name: str) -> None:
         near = 2.0 if multiplier < 0 else 1.0
         omega = near * (1 + (size if multiplier < 0 else size**2))
         gamma = (0.5 * size) if multiplier < 0 else 0.5 * size**2
-        exact = [p for p, m in found_at(Pendulum(gamma=gamma), omega) if m == multiplier][0]
+        exact = next(p for p, m in found_at(Pendulum(gamma=gamma), omega) if m == multiplier)
         errors.append(abs(float(formula(np.array([omega]), gamma)[0]) - exact) / exact)
     order = math.log2(errors[0] / errors[1])
     assert order > {"tongue 1, first order": 0.8}.get(name, 1.7), (order, errors)

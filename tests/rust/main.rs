@@ -11,7 +11,7 @@
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
 //!   they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
-//! - [`maps`], [`layers`], [`threads`]: whole planes
+//! - [`maps`], [`layers`], [`threads`]: whole planes; [`tongues`]: where rest is stable
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
@@ -50,5 +50,6 @@ mod stick_slip;
 mod support;
 mod tangent;
 mod threads;
+mod tongues;
 mod traps;
 mod truths;

@@ -67,7 +67,8 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     settle time beside them; where the labels are unreliable, settle time and net turns lead; where
     labels tell nothing, the net turns and the finite-time exponent. Of closed orbits: their paths
     and points in the phase plane. Of critical curves: stable regions and their boundaries. Of
-    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history, phase plane, Poincare section.
+    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history, phase
+    plane, Poincare section.
 
     Parameters
     ----------

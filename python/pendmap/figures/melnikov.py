@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
-_LOOKS = {"forward": ("#d55e00", "-"), "backward": ("#0072b2", (0, (5, 2)))}
+_LOOKS: dict[str, tuple[str, Any]] = {"forward": ("#d55e00", "-"), "backward": ("#0072b2", (0, (5, 2)))}
 _HIGH = 12.0
 """Largest threshold shown, in units of the least."""
 

@@ -20,6 +20,18 @@ Floats = npt.NDArray[np.float64]
 COLOURS = {1: "#d55e00", -1: "#0072b2"}
 """Curves on which a multiplier is +1 (solutions of the drive's period), and -1 (twice that)."""
 
+_SQUARED = "\N{SUPERSCRIPT TWO}"
+_NAMES = {
+    "omega-p": (
+        "\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0",
+        f"p = Y\N{GREEK CAPITAL LETTER OMEGA}{_SQUARED}/g",
+    ),
+    "e-alpha2": (
+        f"\N{GREEK SMALL LETTER ALPHA}{_SQUARED} = 1/\N{GREEK SMALL LETTER OMEGA}{_SQUARED}",
+        f"e = p/\N{GREEK SMALL LETTER OMEGA}{_SQUARED} = Y/l",
+    ),
+}
+
 _JUMP = 0.6
 """Lines are joined over a change of p, between two frequencies, of at most this part of the mean
 ``p`` and a little."""
@@ -110,16 +122,7 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
         x = (0.0, 1 / x[0] ** 2)
         y = (0.0, min(_HIGHEST, p_max * x[1]))
     return Chart(
-        (
-            "\N{GREEK SMALL LETTER ALPHA}\N{SUPERSCRIPT TWO} = 1/\N{GREEK SMALL LETTER OMEGA}"
-            "\N{SUPERSCRIPT TWO}",
-            "e = p/\N{GREEK SMALL LETTER OMEGA}\N{SUPERSCRIPT TWO} = Y/l",
-        )
-        if turned
-        else (
-            "\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0",
-            "p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g",
-        ),
+        _NAMES[plane],
         x,
         y,
         lines,
