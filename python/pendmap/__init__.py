@@ -27,7 +27,7 @@ from pendmap.model.library import EffectDefinition, EffectParameter, effects
 if TYPE_CHECKING:
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins, basins_of
-    from pendmap.melnikov import melnikov
+    from pendmap.homoclinic import melnikov
     from pendmap.orbits import orbit
     from pendmap.records import (
         Experiment,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         read_experiment,
     )
     from pendmap.store import load, save
-    from pendmap.tongues import tongues
+    from pendmap.critical_curves import tongues
     from pendmap.trajectory import advance, simulate
 
     __version__: str
@@ -90,13 +90,13 @@ _HOMES = {
     "basins": "maps",
     "basins_of": "maps",
     "load": "store",
-    "melnikov": "melnikov",
+    "melnikov": "homoclinic",
     "noise_floor": "records",
     "orbit": "orbits",
     "read_experiment": "records",
     "save": "store",
     "simulate": "trajectory",
-    "tongues": "tongues",
+    "tongues": "critical_curves",
 }
 
 

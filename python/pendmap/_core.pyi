@@ -111,6 +111,7 @@ def tongues(
     parameters: _Parameters,
     omegas: Sequence[float],
     p_max: float,
+    folds: bool,
     threads: int,
     progress: _Progress | None = None,
 ) -> list[dict[str, Any]]: ...

@@ -55,7 +55,7 @@ pub struct Curve {
     pub fold: Option<Fold>,
 }
 
-/// All critical amplitudes up to `p_max` at each of the frequencies.
+/// All critical amplitudes up to `p_max` at each of the frequencies, with `folds` if asked for.
 ///
 /// # Errors
 /// [`Error::Range`] for a `p_max` or frequency out of range, [`Error::NotMappable`] for effects that no
@@ -65,6 +65,7 @@ pub fn tongues(
     pendulum: &Pendulum,
     omegas: &[f64],
     p_max: f64,
+    folds: bool,
     threads: usize,
     control: &Control,
 ) -> Result<Vec<Curve>, Error> {
@@ -79,7 +80,7 @@ pub fn tongues(
     pool(threads)?.install(|| {
         let one = |omega: &f64| {
             control.check()?;
-            let curve = along(pendulum, *omega, p_max);
+            let curve = along(pendulum, *omega, p_max, folds);
             control.add(1);
             Ok(curve)
         };
@@ -135,7 +136,7 @@ fn is_stable(m: Values<5>) -> bool {
     within && m[4] < 1.0 + ALIKE
 }
 
-fn along(pendulum: &Pendulum, omega: f64, p_max: f64) -> Curve {
+fn along(pendulum: &Pendulum, omega: f64, p_max: f64, folds: bool) -> Curve {
     let at = |p: f64| monodromy(pendulum, p, omega);
     // Solutions grow by about the exponential of the period times the root of p.
     let period = std::f64::consts::TAU / omega;
@@ -185,7 +186,7 @@ fn along(pendulum: &Pendulum, omega: f64, p_max: f64) -> Curve {
     let onset = critical.iter().find(|c| c.stable == [true, false]);
     let mirrored = pendulum.is_mirror_symmetric();
     let fold = onset
-        .filter(|c| c.p > 0.0 && (mirrored || c.multiplier > 0.0))
+        .filter(|c| folds && c.p > 0.0 && (mirrored || c.multiplier > 0.0))
         .and_then(|c| fold_of_onset(&under(pendulum, c.p, omega), c.multiplier));
     Curve { omega, critical, stable_at_first: between[0], fold }
 }

@@ -9,18 +9,19 @@ use crate::maps::tongues::tongues as search;
 
 /// Critical amplitudes of the drive at each frequency, up to `p_max`.
 #[pyfunction]
-#[pyo3(signature = (parameters, omegas, p_max, threads, progress=None))]
+#[pyo3(signature = (parameters, omegas, p_max, folds, threads, progress=None))]
 pub fn tongues<'py>(
     py: Python<'py>,
     parameters: Parameters,
     omegas: Vec<f64>,
     p_max: f64,
+    folds: bool,
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyList>> {
     let pendulum = pendulum(parameters)?;
     let curves = watched(py, progress.as_ref(), |control| {
-        search(&pendulum, &omegas, p_max, threads, control)
+        search(&pendulum, &omegas, p_max, folds, threads, control)
     })?;
     let listed = PyList::empty(py);
     for curve in curves {

@@ -116,7 +116,7 @@ def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
     slowed = pendmap.orbit(Pendulum(gamma=0.1, p=1.0, omega=2.0, effects=(drag,)), 1, 1)
     assert slowed.sizes["orbit"] == plain.sizes["orbit"]
     assert np.abs(slowed["theta_point"].values - plain["theta_point"].values).min() > 1e-3
-    ever = Pendulum(gamma=0.1, p=1.0, omega=2.0, effects=(Effect("drive_chirp", {"rate": 0.001}),))
+    ever = Pendulum(gamma=0.1, p=1.0, omega=2.0, effects=(Effect("drive_chirp", {"r": 0.001}),))
     with pytest.raises(pendmap.InputError, match="drive_chirp"):
         pendmap.orbit(ever, 1, 1)
 

@@ -137,7 +137,7 @@ def test_added_damping_is_damping_and_effects_count() -> None:
     [
         ({"theta_r": 0.05}, "friction holds it"),
         ({"torque": 0.1}, "a torque or a sideways drive moves it"),
-        ({"effects": (Effect("drive_chirp", {"rate": 0.001}),)}, "drive_chirp"),
+        ({"effects": (Effect("drive_chirp", {"r": 0.001}),)}, "drive_chirp"),
     ],
 )
 def test_what_has_no_critical_curves_is_refused(given: dict[str, Any], match: str) -> None:

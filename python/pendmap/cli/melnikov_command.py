@@ -30,7 +30,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     model = model_from(given)
     outputs = Outputs.take(given, "melnikov", reads=[file])
 
-    from pendmap.melnikov import melnikov
+    from pendmap.homoclinic import melnikov
 
     show(melnikov(model), outputs, fields)
 

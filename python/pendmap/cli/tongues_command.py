@@ -48,7 +48,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     outputs = Outputs.take(given, "tongues", reads=[file])
     omegas = given.pop("omegas")
 
-    from pendmap.tongues import tongues
+    from pendmap.critical_curves import tongues
 
     with progress_bar("tongues", shown=outputs.shows_progress) as progress:
         dataset = tongues(model, omegas, progress=progress, **given)

@@ -37,6 +37,7 @@ __all__ = [
     "draw_pendulum",
     "draw_record",
     "draw_runs",
+    "draw_tongues",
     "write_report",
 ]
 
@@ -117,6 +118,47 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         made = _KINDS[kind](dataset, layer=layer, size=size, dpi=resolution, colormap=colormap)
+        style.write(made, part)
+    return Path(path)
+
+
+def draw_tongues(
+    dataset: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    title: str,
+    marks: Sequence[tuple[float, float, str]] = (),
+) -> Path:
+    """Draw critical curves with points marked into a file: figure 1.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What ``pendmap.tongues`` returned.
+    path : str or path
+        As of :func:`draw`.
+    title : str
+        What stands above.
+    marks : sequence of (float, float, str)
+        Amplitude ``p``, frequency ``omega`` and name of each point.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If the file cannot be written.
+    """
+    dpi = style.resolution(None)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        made = tongues.figure(
+            dataset, layer=None, size=None, dpi=dpi, colormap=None, title=title, marks=marks
+        )
         style.write(made, part)
     return Path(path)
 

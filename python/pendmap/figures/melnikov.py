@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
-_LOOKS: dict[str, tuple[str, Any]] = {"forward": ("#d55e00", "-"), "backward": ("#0072b2", (0, (5, 2)))}
+_LOOKS: dict[str, tuple[str, Any]] = {
+    "forward": ("#d55e00", "-"),
+    "backward": ("#0072b2", (0, (5, 2))),
+}
 _HIGH = 12.0
 """Largest threshold shown, in units of the least."""
 

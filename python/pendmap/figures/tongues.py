@@ -13,7 +13,7 @@ from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
 from pendmap.pictures import layers as layering
 from pendmap.pictures import tongues as drawn
-from pendmap.tongues import NEAR, PLANES
+from pendmap.critical_curves import NEAR, PLANES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.tongues import PLANES
+from pendmap.critical_curves import PLANES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,9 @@ _NAMES = {
         f"e = p/\N{GREEK SMALL LETTER OMEGA}{_SQUARED} = Y/l",
     ),
 }
+
+_PARTED = 0.3
+"""Asymptotic curves that err more are not drawn: they say nothing there."""
 
 _JUMP = 0.6
 """Lines are joined over a change of p, between two frequencies, of at most this part of the mean
@@ -113,7 +117,8 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
     for k, name in enumerate(dataset["curve"].values):
         whole = to(np.stack([omega, dataset["asymptotic"].values[k]], axis=-1))
         close = (error[k] < near)[:, None]
-        asymptotic[str(name)] = (np.where(close, whole, np.nan), np.where(~close, whole, np.nan))
+        parting = (error[k] < _PARTED)[:, None] & ~close
+        asymptotic[str(name)] = (np.where(close, whole, np.nan), np.where(parting, whole, np.nan))
     edge = to(np.stack([omega, np.full_like(omega, p_max)], axis=-1))
     own = to(np.array([float(dataset.attrs["own_omega"]), float(dataset.attrs["own_p"])]))
     x = (float(omega[0]), float(omega[-1]))
@@ -166,16 +171,39 @@ def _joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int
             if i not in taken and j not in used:
                 taken[i] = j
                 used.add(j)
-        on = []
+        on, ended = [], []
         for i, line in enumerate(open_):
             if i in taken:
                 line.append((w, values[taken[i]]))
                 on.append(line)
             else:
-                done.append(line)
-        on += [[(w, p)] for j, p in enumerate(values) if j not in used]
-        open_ = on
+                ended.append(line)
+        done += _paired(ended)
+        begun = [[(w, p)] for j, p in enumerate(values) if j not in used]
+        # Two that begin next to one another turn back between the frequencies.
+        for lower, upper in itertools.pairwise(begun):
+            if _tip(lower[0], upper[0]) and len(lower) == 1:
+                upper.insert(0, lower[0])
+        open_ = [*on, *begun]
     return [np.array(line) for line in [*done, *open_] if len(line) > 1]
+
+
+def _tip(a: tuple[float, float], b: tuple[float, float]) -> bool:
+    """Whether two points at one frequency are next to a place where a curve turns back."""
+    return abs(a[1] - b[1]) < _JUMP * (0.3 + (a[1] + b[1]) / 2)
+
+
+def _paired(
+    ended: list[list[tuple[float, float]]],
+) -> list[list[tuple[float, float]]]:
+    """Join lines that end at one frequency next to one another: the curve turns back there."""
+    done: list[list[tuple[float, float]]] = []
+    for line in sorted(ended, key=lambda one: one[-1][1]):
+        if done and done[-1][-1][0] == line[-1][0] and _tip(done[-1][-1], line[-1]):
+            done[-1] = [*done[-1], *reversed(line)]
+        else:
+            done.append(line)
+    return done
 
 
 def _ahead(line: list[tuple[float, float]], w: float) -> float:

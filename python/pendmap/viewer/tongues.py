@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.pictures import tongues as drawn
-from pendmap.tongues import NEAR
+from pendmap.critical_curves import NEAR
 from pendmap.viewer import frame
 from pendmap.viewer.panel import Panel
 

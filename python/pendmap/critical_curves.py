@@ -104,12 +104,15 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     began = time.perf_counter()
 
-    def of(one: Pendulum) -> list[dict[str, Any]]:
-        return _core.tongues(one.parameters, frequencies.tolist(), p_max, workers, progress)
+    def of(one: Pendulum, *, folds: bool) -> list[dict[str, Any]]:
+        return _core.tongues(
+            one.parameters, frequencies.tolist(), p_max, folds, workers, progress
+        )
 
     try:
-        found = of(pendulum)
-        undamped = of(dataclasses.replace(pendulum, gamma=0.0)) if pendulum.gamma else found
+        found, undamped = of(pendulum, folds=True), None
+        if pendulum.gamma:
+            undamped = of(dataclasses.replace(pendulum, gamma=0.0), folds=False)
     except ValueError as error:
         raise InputError(str(error)) from None
     folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
@@ -117,7 +120,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     of_p = {"units": "1", "long_name": "amplitude of the drive over gravity"}
     variables: dict[str, Any] = {
         **_columns(found, "critical", ""),
-        **_columns(undamped, "undamped", "undamped_"),
+        **_columns(undamped or found, "undamped", "undamped_"),
         "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
         "fold": ("omega", fold, of_p | {"comment": "of the oscillation born at the first loss"}),
         "fold_theta": ("omega", theta, {"units": "rad"}),
