@@ -51,6 +51,11 @@ pub enum Error {
         /// Why not.
         why: &'static str,
     },
+    /// Hanging at rest is no solution whose stability the linear equation tells.
+    NoRest {
+        /// Why not.
+        why: &'static str,
+    },
     /// Arrays that belong together have different lengths.
     Lengths {
         /// What was given.
@@ -97,6 +102,7 @@ impl fmt::Display for Error {
             Self::NotMappable { effect, why } => {
                 write!(f, "{effect}: allowed in one trajectory, not in maps: {why}")
             }
+            Self::NoRest { why } => write!(f, "hanging at rest has no critical curves here: {why}"),
             Self::Lengths { given, names } => write!(
                 f,
                 "{} has {} values and {} has {}: they must be as many",

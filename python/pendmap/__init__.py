@@ -25,9 +25,11 @@ from pendmap.model import (
 from pendmap.model.library import EffectDefinition, EffectParameter, effects
 
 if TYPE_CHECKING:
+    from pendmap.critical_curves import tongues
     from pendmap.diagrams import bifurcation
     from pendmap.exponents import lyapunov
     from pendmap.grid import Axis, Grid
+    from pendmap.homoclinic import melnikov
     from pendmap.lifetimes import lifetime
     from pendmap.maps import basins, basins_of
     from pendmap.orbits import orbit
@@ -73,6 +75,7 @@ __all__ = [
     "load_formulas",
     "load_model",
     "lyapunov",
+    "melnikov",
     "noise_floor",
     "orbit",
     "parameter_map",
@@ -80,6 +83,7 @@ __all__ = [
     "save",
     "save_model",
     "simulate",
+    "tongues",
 ]
 
 _HOMES = {
@@ -97,12 +101,14 @@ _HOMES = {
     "lifetime": "lifetimes",
     "load": "store",
     "lyapunov": "exponents",
+    "melnikov": "homoclinic",
     "noise_floor": "records",
     "orbit": "orbits",
     "parameter_map": "planes",
     "read_experiment": "records",
     "save": "store",
     "simulate": "trajectory",
+    "tongues": "critical_curves",
 }
 
 

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "__version__",
+    "acceleration",
     "advance",
     "basins_grid",
     "basins_list",
@@ -23,6 +24,7 @@ __all__ = [
     "simd",
     "simd_available",
     "simulate",
+    "tongues",
 ]
 
 __version__: str
@@ -82,6 +84,9 @@ def advance(
 def choose_steps(
     parameters: _Parameters, theta: _Floats, velocity: _Floats, tol: float
 ) -> tuple[int, float]: ...
+def acceleration(
+    parameters: _Parameters, tau: _Floats, theta: _Floats, velocity: _Floats
+) -> _Floats: ...
 def simulate(
     parameters: _Parameters,
     start: tuple[float, float],
@@ -150,6 +155,14 @@ def growth(
     threads: int,
     progress: _Progress | None = None,
 ) -> _Floats: ...
+def tongues(
+    parameters: _Parameters,
+    omegas: Sequence[float],
+    p_max: float,
+    folds: bool,
+    threads: int,
+    progress: _Progress | None = None,
+) -> list[dict[str, Any]]: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],

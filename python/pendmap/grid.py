@@ -14,7 +14,7 @@ from pendmap.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Axis", "Grid", "starts"]
+__all__ = ["Axis", "Grid", "frequencies", "starts"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,6 +100,26 @@ class Grid:
     def cells(self) -> int:
         """Number of cells."""
         return self.theta.count * self.velocity.count
+
+
+def frequencies(values: ArrayLike) -> NDArray[np.float64]:
+    """Return frequencies ``Omega/w0`` of the drive as an array, shape (N,).
+
+    Raises
+    ------
+    InputError
+        If they are no numbers above 0, in ascending order.
+    """
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError, OverflowError):
+        array = np.array([np.nan])
+    good = array.ndim == 1 and 0 < array.size <= checks.MOST_CELLS
+    if not (good and np.isfinite(array).all() and (array > 0).all() and (np.diff(array) > 0).all()):
+        raise InputError(
+            f"omega is {checks.shown(values)}: allowed are numbers above 0 in ascending order"
+        )
+    return array
 
 
 def starts(

@@ -15,6 +15,8 @@ from pendmap.files import whole_file
 if TYPE_CHECKING:
     import os
 
+    import xarray as xr
+
     from pendmap.identification import IdentificationReport
 
 __all__ = [
@@ -30,6 +32,7 @@ __all__ = [
 
 TABLE: Final = "table1"
 FIGURES: Final = {
+    "1": "Critical curves, and the three strange attractors",
     "3": "The parametric pendulum",
     "4": "A decay, its velocity and half cycles",
     "5": "The decrement of each three peaks",
@@ -38,7 +41,7 @@ FIGURES: Final = {
     TABLE: "Damping by each method, and what its simulation misses (%)",
 }
 """What can be drawn, by the names a user types."""
-_LATER: Final = ("1", "2", "8", "9")
+_LATER: Final = ("2", "8", "9")
 _PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
 
 PRINTED: Final = {
@@ -48,6 +51,12 @@ PRINTED: Final = {
 }
 """The paper's table 1, percent: periods of 0.26 s and 1.54 s, peaks of 1.2 rad and 2.53 rad."""
 _PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 2.53 rad")
+
+
+_SQUARES: Final = (0.05, 1.6)
+_HIGHEST: Final = 2.6
+_COLUMNS: Final = 240
+"""Range of alpha^2, largest e, and frequencies of figure 1."""
 
 
 def wanted(name: str) -> list[str]:
@@ -112,6 +121,8 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         raise InputError(f"key is {key!r}: allowed is one figure")
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
+    if key == "1":
+        return figures.draw_tongues(_critical(), path, title=title, marks=_strange())
     if key == "3":
         return figures.draw_pendulum(path, title=title)
     found = report(seed)
@@ -124,6 +135,25 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         "release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1\u00b0, zero off by 0.05\u00b0, "
         f"seed {seed}",
     )
+
+
+def _critical() -> xr.Dataset:
+    """Return the critical curves of figure 1: alpha^2 up to 1.6, e up to 2.6."""
+    import numpy as np  # noqa: PLC0415
+
+    from pendmap.critical_curves import tongues  # noqa: PLC0415
+    from pendmap.model import Pendulum  # noqa: PLC0415
+
+    square = np.linspace(_SQUARES[0], _SQUARES[1], _COLUMNS)[::-1]
+    p_max = _HIGHEST / _SQUARES[0]
+    return tongues(Pendulum(gamma=0.1), 1 / np.sqrt(square), p_max, plane="e-alpha2")
+
+
+def _strange() -> list[tuple[float, float, str]]:
+    """Return the points of figure 2 as marks of figure 1."""
+    from pendmap.model import PRESETS  # noqa: PLC0415
+
+    return [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
 
 
 def printed_table() -> tuple[list[str], list[list[str]]]:

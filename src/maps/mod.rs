@@ -10,12 +10,17 @@
 //! - [`orbits`]: all closed orbits of one period and winding
 //! - [`resolution`], [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
 //! - [`bifurcation`]: along one parameter, all attractors, and one followed up and down
+//! - [`orbits`]: all closed orbits of one period and winding: `vanishing` and `approach` find
+//!   where Newton's method begins
+//! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
+mod approach;
 pub mod basins;
 pub mod bifurcation;
 pub mod cell;
+mod chebyshev;
 pub mod control;
 pub mod growth;
 pub mod label;
@@ -27,3 +32,5 @@ pub mod reliability;
 pub mod resolution;
 pub mod starts;
 pub mod texture;
+pub mod tongues;
+mod vanishing;

@@ -1,16 +1,20 @@
 //! All closed orbits of one period and winding in a box of starts, those that repel too.
 //!
-//! On the nodes of a grid over the box the displacement `P^n(x) - x - (2 pi w, 0)` is computed, angles
-//! not wrapped. Newton's method begins in every cell around which both of its components change
-//! sign, and at every node where it is least among the neighbours'.
+//! Newton's method begins wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped,
+//! may vanish ([`super::vanishing`]), by differences
+//! first ([`super::approach`]). Next to an orbit near its birth it is begun again, repelled by
+//! all that is known: branches that are about to meet lie nearer to one another than any cell.
 
 use std::f64::consts::TAU;
 
+use nalgebra::Matrix2;
 use rayon::prelude::*;
 
 use super::advance::advance;
+use super::approach::approach;
 use super::control::{Control, pool};
 use super::starts::{Axis, Starts};
+use super::vanishing;
 use crate::error::Error;
 use crate::integrate::{State, accuracy};
 use crate::lanes::Path;
@@ -31,6 +35,13 @@ const REACH_CELLS: f64 = 8.0;
 const LEAST_REACH: f64 = 0.3;
 /// Points nearer than this are of one orbit.
 const SAME: f64 = 1e-6;
+/// Only where the derivative of the displacement shrinks a direction below this are orbits looked for
+/// beside another ...
+const WEAK: f64 = 0.3;
+/// ... so far away, ...
+const FURTHEST: f64 = 0.3;
+/// ... and at so many halves of that.
+const HALVINGS: u32 = 9;
 
 /// What to look for, and where.
 #[derive(Clone, Copy, Debug)]
@@ -78,92 +89,95 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         let running = running.into_iter().filter(|r| r.sense == request.w).collect();
         return Ok(Orbits { running, ..none });
     }
-    let starts = Starts::Grid { theta: request.theta, velocity: request.velocity };
-    let field = displacements(pendulum, request, &starts, control)?;
-    let begin = beginnings(&field, request);
-    control.begin(begin.len());
     let map = PoincareMap::new(pendulum);
+    let rubs = pendulum.has_friction();
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
-    let begun = begin.len();
-    let found: Vec<Option<PeriodicOrbit>> = pool(request.threads)?.install(|| {
+    let begin = beginnings(pendulum, request, reach, control)?;
+    let pool = pool(request.threads)?;
+    let mut all: Vec<PeriodicOrbit> = Vec::new();
+    let mut begun = 0;
+    let mut known: Vec<State> = Vec::new();
+    // First from all places, then from beside what was found last, until nothing new is.
+    let mut next = begin;
+    while !next.is_empty() {
+        control.begin(next.len());
+        begun += next.len();
         let search = |start: &State| {
             control.check()?;
-            let orbit = newton::find(&map, *start, request.n, reach);
+            let orbit = newton::find_other(&map, *start, request.n, reach, &known);
             control.add(1);
             Ok(orbit)
         };
-        begin.par_iter().map(search).collect::<Result<_, Error>>()
-    })?;
-    let mut closed: Vec<PeriodicOrbit> = Vec::new();
-    for orbit in found.into_iter().flatten() {
-        let inside = |p: &State| {
-            let turned = [-TAU, 0.0, TAU].map(|turn| p[0] + turn);
-            turned.iter().any(|t| request.theta.holds(*t)) && request.velocity.holds(p[1])
-        };
-        let held = |p: &State| p[1] == 0.0 && pendulum.equation().holds_for_ever(p[0]);
-        let asked = (orbit.n, orbit.w) == (request.n, request.w);
-        let known = closed.iter().any(|other| other.contains(orbit.points[0], SAME));
-        if asked && !known && orbit.points.iter().any(inside) && !orbit.points.iter().any(held) {
-            closed.push(orbit);
+        let found: Vec<Option<PeriodicOrbit>> =
+            pool.install(|| next.par_iter().map(search).collect::<Result<_, Error>>())?;
+        let before = all.len();
+        for orbit in found.into_iter().flatten() {
+            let image = pendulum.is_mirror_symmetric().then(|| orbit.mirrored().0);
+            for one in std::iter::once(orbit).chain(image) {
+                if !all.iter().any(|other| other.contains(one.points[0], SAME)) {
+                    all.push(one);
+                }
+            }
         }
+        known = all.iter().flat_map(|orbit| orbit.points.iter().copied()).collect();
+        next = all[before..].iter().flat_map(|orbit| beside(orbit, request.n)).collect();
     }
-    Ok(Orbits { closed, begun, ..none })
+    let inside = |p: &State| {
+        let turned = [-TAU, 0.0, TAU].map(|turn| p[0] + turn);
+        turned.iter().any(|t| request.theta.holds(*t)) && request.velocity.holds(p[1])
+    };
+    let held = |p: &State| rubs && p[1] == 0.0 && pendulum.equation().holds_for_ever(p[0]);
+    all.retain(|orbit| {
+        let asked = (orbit.n, orbit.w) == (request.n, request.w);
+        asked && orbit.points.iter().any(inside) && !orbit.points.iter().any(held)
+    });
+    Ok(Orbits { closed: all, begun, ..none })
 }
 
-/// The displacement from each node, infinite where it is no number.
-fn displacements(
+/// Where Newton's method begins at first.
+fn beginnings(
     pendulum: &Pendulum,
     request: &Request,
-    starts: &Starts,
+    reach: f64,
     control: &Control,
 ) -> Result<Vec<State>, Error> {
+    let starts = Starts::Grid { theta: request.theta, velocity: request.velocity };
     let sample = starts.sampled_states(ERROR_SAMPLE, 0);
     let (strobe, _) = accuracy::choose(pendulum, &sample, TOLERANCE, Path::choose()?)?;
-    let all: Vec<State> = (0..starts.len()).map(|i| starts.get(i)).collect();
-    let mut theta: Vec<f64> = all.iter().map(|s| s[0]).collect();
-    let mut velocity: Vec<f64> = all.iter().map(|s| s[1]).collect();
-    let turns = advance(&strobe, &mut theta, &mut velocity, request.n, request.threads, control)?;
-    let ends = theta.iter().zip(&velocity).zip(turns);
-    let gap = |(start, ((theta, velocity), turns)): (&State, ((&f64, &f64), i64))| {
-        // The turns are net: rounded from the whole way, of which this is the rest.
-        let rest = accuracy::wrapped(theta - start[0]);
-        [(turns - request.w) as f64 * TAU + rest, velocity - start[1]]
+    // The displacement is the whole way, of which the turns are net.
+    let displacements = |from: &[State]| -> Result<Vec<State>, Error> {
+        let mut theta: Vec<f64> = from.iter().map(|s| s[0]).collect();
+        let mut velocity: Vec<f64> = from.iter().map(|s| s[1]).collect();
+        let (n, threads) = (request.n, request.threads);
+        let turns = advance(&strobe, &mut theta, &mut velocity, n, threads, control)?;
+        let ends = theta.iter().zip(&velocity).zip(turns);
+        let gap = |(start, ((theta, velocity), turns)): (&State, ((&f64, &f64), i64))| {
+            let rest = accuracy::wrapped(theta - start[0]);
+            [(turns - request.w) as f64 * TAU + rest, velocity - start[1]]
+        };
+        Ok(from.iter().zip(ends).map(gap).collect())
     };
-    Ok(all.iter().zip(ends).map(gap).collect())
+    let places = vanishing::places([request.theta, request.velocity], &displacements)?;
+    approach(&places, reach, displacements)
 }
 
-/// Where Newton's method begins, the nearest first.
-fn beginnings(field: &[State], request: &Request) -> Vec<State> {
-    let (columns, rows) = (request.theta.count, request.velocity.count);
-    let at = |i: usize, j: usize| field[j * columns + i];
-    let size = |i: usize, j: usize| at(i, j)[0].hypot(at(i, j)[1]);
-    let state = |x: f64, y: f64| [request.theta.between(x), request.velocity.between(y)];
-    let mut found: Vec<(f64, State)> = Vec::new();
-    for j in 0..rows {
-        for i in 0..columns {
-            let around = (j.saturating_sub(1)..rows.min(j + 2))
-                .flat_map(|b| (i.saturating_sub(1)..columns.min(i + 2)).map(move |a| (a, b)));
-            let own = size(i, j);
-            if own.is_finite() && around.into_iter().all(|(a, b)| !(size(a, b) < own)) {
-                found.push((own, state(i as f64, j as f64)));
-            }
-            if i + 1 == columns || j + 1 == rows {
-                continue;
-            }
-            let corners = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
-            let changes = |k: usize| {
-                corners.iter().any(|c| c[k] <= 0.0) && corners.iter().any(|c| c[k] >= 0.0)
-            };
-            if changes(0) && changes(1) {
-                let least = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)]
-                    .map(|(a, b)| size(a, b))
-                    .into_iter()
-                    .fold(f64::INFINITY, f64::min);
-                found.push((least, state(i as f64 + 0.5, j as f64 + 0.5)));
-            }
-        }
+/// Starts beside an orbit whose displacement over `n` periods hardly changes in one direction: only
+/// there can another one lie nearer than a cell.
+fn beside(orbit: &PeriodicOrbit, n: usize) -> Vec<State> {
+    let whole = orbit.monodromy[0].pow((n / orbit.n) as u32);
+    let svd = (whole - Matrix2::identity()).svd(false, true);
+    let Some(rows) = svd.v_t else { return Vec::new() };
+    let least = svd.singular_values.imin();
+    if svd.singular_values[least] > WEAK {
+        return Vec::new();
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found.into_iter().map(|(_, state)| state).collect()
+    let [theta, velocity] = orbit.points[0];
+    let at = |away: f64| [theta + away * rows[(least, 0)], velocity + away * rows[(least, 1)]];
+    (0..HALVINGS)
+        .flat_map(|k| {
+            let away = FURTHEST / f64::from(1_u32 << k);
+            [at(away), at(-away)]
+        })
+        .collect()
 }

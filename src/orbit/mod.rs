@@ -1,6 +1,7 @@
 //! Closed orbits: the precise stroboscopic map, Newton's method, Floquet multipliers.
 
 pub mod floquet;
+pub mod fold;
 pub mod newton;
 pub mod poincare;
 pub mod rotation;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
 
 use super::floquet::{Multipliers, multipliers};
 use super::poincare::{PoincareMap, closing_gap};
@@ -74,13 +74,34 @@ impl PeriodicOrbit {
 /// shrink by the product that the damping and the turns give it.
 #[must_use]
 pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<PeriodicOrbit> {
-    let point = polish(map, [wrapped(start[0]), start[1]], n, reach)?;
+    find_other(map, start, n, reach, &[])
+}
+
+/// The same for an orbit that has none of the points `known`.
+///
+/// The gap is divided by the distances to them, `m(x) = prod (1 + 1/|x - r|^2)` times `P^n(x) - x`, which has
+/// its zeros but for theirs: Newton's method is repelled by what it has found already, and finds
+/// zeros that lie next to one another (Farrell, Birkisson & Funke 2015, SIAM J. Sci. Comput. 37,
+/// A2026: deflation).
+#[must_use]
+pub fn find_other(
+    map: &PoincareMap,
+    start: State,
+    n: usize,
+    reach: f64,
+    known: &[State],
+) -> Option<PeriodicOrbit> {
+    let mut point = polish(map, [wrapped(start[0]), start[1]], n, reach, known)?;
+    if !known.is_empty() {
+        // Where zeros lie close the gap is small all about: once more without what repels.
+        point = polish(map, point, n, reach, &[])?;
+    }
     let image = |d: usize| map.iterate(point, d);
     let smallest = (1..=n)
         .filter(|d| n.is_multiple_of(*d))
         .find(|d| *d == n || distance(image(*d).state, point) < SAME_POINT)?;
-    let point = if smallest == n { point } else { polish(map, point, smallest, reach)? };
-    complete(map, point, smallest)
+    let point = if smallest == n { point } else { polish(map, point, smallest, reach, &[])? };
+    complete(map, [wrapped(point[0]), point[1]], smallest)
 }
 
 /// The place of the point with the lowest angle.
@@ -88,7 +109,7 @@ fn lowest(points: &[State]) -> usize {
     (0..points.len()).min_by(|a, b| points[*a][0].total_cmp(&points[*b][0])).unwrap_or(0)
 }
 
-fn polish(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<State> {
+fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]) -> Option<State> {
     let mut point = start;
     let mut best: Option<(f64, State)> = None;
     let mut first = f64::INFINITY;
@@ -99,7 +120,8 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<State
         if iteration == 0 {
             first = size;
         }
-        if iteration == PROMISING && size > 0.1 * first && size > RESIDUAL {
+        // What repels lets the gap grow first.
+        if iteration == PROMISING && known.is_empty() && size > 0.1 * first && size > RESIDUAL {
             break;
         }
         if !size.is_finite() || distance(point, start) > reach {
@@ -112,12 +134,25 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<State
             _ => best = Some((size, point)),
         }
         let step = (Matrix2::identity() - image.derivative).lu().solve(&gap)?;
+        let step = repelled(step, point, known);
         let length = step.norm();
         let damped = if length > 0.5 { 0.5 / length } else { 1.0 };
         point = [point[0] + damped * step[0], point[1] + damped * step[1]];
     }
     let (least, point) = best?;
     (least < RESIDUAL).then_some(point)
+}
+
+/// Newton's step of the gap times `m(x)`: along the step of the gap, over `1 - step . grad m / m`.
+fn repelled(step: Vector2<f64>, point: State, known: &[State]) -> Vector2<f64> {
+    let mut slope = 0.0;
+    for other in known {
+        let away = Vector2::new(wrapped(point[0] - other[0]), point[1] - other[1]);
+        let square = away.norm_squared();
+        slope -= 2.0 * away.dot(&step) / (square * (1.0 + square));
+    }
+    let stretched = step / (1.0 - slope);
+    if stretched.norm().is_finite() { stretched } else { step }
 }
 
 fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> {

@@ -11,6 +11,7 @@ mod maps;
 mod motion;
 mod orbits;
 mod planes;
+mod tongues;
 mod watch;
 
 use pyo3::prelude::*;
@@ -125,6 +126,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(planes::bifurcation, module)?)?;
     module.add_function(wrap_pyfunction!(exponents::lyapunov, module)?)?;
     module.add_function(wrap_pyfunction!(exponents::growth, module)?)?;
+    module.add_function(wrap_pyfunction!(tongues::tongues, module)?)?;
+    module.add_function(wrap_pyfunction!(motion::acceleration, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_rows, module)?)?;

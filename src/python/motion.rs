@@ -16,6 +16,22 @@ use crate::maps::advance::advance as advance_all;
 type Advanced<'py> =
     (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>);
 
+/// The acceleration at many times, angles and velocities, moving in the sense of each velocity.
+#[pyfunction]
+pub fn acceleration<'py>(
+    py: Python<'py>,
+    parameters: Parameters,
+    tau: PyReadonlyArray1<'py, f64>,
+    theta: PyReadonlyArray1<'py, f64>,
+    velocity: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let pendulum = pendulum(parameters)?;
+    let (tau, theta, velocity) = (tau.as_slice()?, theta.as_slice()?, velocity.as_slice()?);
+    let states = tau.iter().zip(theta).zip(velocity);
+    let all: Vec<f64> = states.map(|((t, x), v)| pendulum.acceleration(*t, *x, *v)).collect();
+    Ok(all.into_pyarray(py))
+}
+
 /// Many starts, the same number of forcing periods on.
 #[pyfunction]
 #[pyo3(signature = (parameters, theta, velocity, periods, steps_per_period, threads, progress=None))]

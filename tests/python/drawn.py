@@ -12,9 +12,11 @@ from pendmap.figures import (
     diagrams,
     exponents,
     lifetimes,
+    melnikov,
     orbits,
     planes,
     style,
+    tongues,
     trajectory,
 )
 
@@ -31,6 +33,8 @@ def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
         "parameter_map": planes,
         "lifetime": lifetimes,
         "lyapunov": exponents,
+        "melnikov": melnikov,
+        "tongues": tongues,
         "trajectory": trajectory,
     }
     draw = kinds[dataset.attrs["kind"]].figure

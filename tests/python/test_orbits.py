@@ -66,12 +66,11 @@ def test_the_known_attractors_are_among_the_orbits(truths: dict[str, Any]) -> No
         assert np.allclose(np.sort_complex(multipliers), np.sort_complex(expected), atol=1e-9)
 
 
-@pytest.mark.parametrize(("n", "w"), [(1, 1), (2, 0), (2, 2)])
-def test_each_closes_and_has_its_multipliers_by_scipy(n: int, w: int) -> None:
-    model = Pendulum(gamma=0.1, p=1.4, omega=2.0, phase=0.4, torque=0.02)
+@pytest.mark.parametrize(("n", "w", "count"), [(1, 1, 2), (2, 0, 3), (2, 2, 1)])
+def test_each_closes_and_has_its_multipliers_by_scipy(n: int, w: int, count: int) -> None:
+    model = Pendulum(gamma=0.1, p=1.4, omega=2.0, phase=0.4, torque=0.005)
     found = pendmap.orbit(model, n, w)
-    assert found.sizes["orbit"] >= 2
-    assert not found["stable"].values.all()
+    assert found.sizes["orbit"] == count
     for k in range(found.sizes["orbit"]):
         row = found.isel(orbit=k)
         start = float(row["theta_point"]), float(row["velocity_point"])
@@ -112,12 +111,12 @@ def test_in_si_they_are_the_same() -> None:
 
 
 def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
-    drag = Effect("quadratic_drag", {"q": 0.1})
-    plain, slowed = pendmap.orbit(DRIVEN, 1, 1), None
+    drag = Effect("quadratic_drag", {"q": 0.02})
+    plain = pendmap.orbit(DRIVEN, 1, 1)
     slowed = pendmap.orbit(Pendulum(gamma=0.1, p=1.0, omega=2.0, effects=(drag,)), 1, 1)
     assert slowed.sizes["orbit"] == plain.sizes["orbit"]
     assert np.abs(slowed["theta_point"].values - plain["theta_point"].values).min() > 1e-3
-    ever = Pendulum(gamma=0.1, p=1.0, omega=2.0, effects=(Effect("drive_chirp", {"rate": 0.001}),))
+    ever = Pendulum(gamma=0.1, p=1.0, omega=2.0, effects=(Effect("drive_chirp", {"r": 0.001}),))
     with pytest.raises(pendmap.InputError, match="drive_chirp"):
         pendmap.orbit(ever, 1, 1)
 

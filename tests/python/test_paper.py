@@ -28,7 +28,7 @@ def test_a_figure_has_several_names(name: str) -> None:
     ("name", "says"),
     [
         ("8", "not there yet"),
-        ("figure 1", "not there yet"),
+        ("figure 2", "not there yet"),
         ("10", "'10' is not one"),
         ("x", "'x'"),
     ],

@@ -13,7 +13,7 @@
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
 //! - [`maps`], [`layers`], [`threads`]: whole planes; [`planes`]: of parameters
 //! - [`exponents`]: how fast neighbouring motions part, through friction too
-//! - [`maps`], [`layers`], [`threads`]: whole planes
+//! - [`maps`], [`layers`], [`threads`]: whole planes; [`tongues`]: where rest is stable
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
@@ -54,5 +54,6 @@ mod stick_slip;
 mod support;
 mod tangent;
 mod threads;
+mod tongues;
 mod traps;
 mod truths;

@@ -175,3 +175,92 @@ fn newton_alone_finds_no_orbit_that_the_search_has_not() {
     }
     assert!(met > 20 && !known.is_empty());
 }
+
+/// How near to where orbits change they are looked at, in p.
+const BESIDE: f64 = 1e-6;
+
+/// All orbits right before and right after the value `p`.
+fn about(p: f64, omega: f64, n: usize, w: i64) -> [Vec<PeriodicOrbit>; 2] {
+    [p - BESIDE, p + BESIDE].map(|p| all(&driven(0.1, p, omega), n, w).closed)
+}
+
+fn near(orbits: &[PeriodicOrbit], point: [f64; 2]) -> Vec<&PeriodicOrbit> {
+    orbits.iter().filter(|o| o.contains(point, 0.05)).collect()
+}
+
+fn point(entry: &serde_json::Value) -> [f64; 2] {
+    [number(&entry["theta"]), number(&entry["v"])]
+}
+
+#[test]
+fn rotations_are_born_in_pairs() {
+    let folds = &truths()["rotation_saddle_node"];
+    let at_two = &truths()["bifurcations_gamma0.1_omega2"]["rot_SN"];
+    for (entry, omega) in [(at_two, 2.0), (&folds["rotSN_w1.0"], 1.0), (&folds["rotSN_w3.0"], 3.0)]
+    {
+        let [before, after] = about(number(&entry["p"]), omega, 1, 1);
+        assert!(near(&before, point(entry)).is_empty(), "before the fold at omega = {omega}");
+        let pair = near(&after, point(entry));
+        assert_eq!(pair.len(), 2, "after the fold at omega = {omega}");
+        let mut largest: Vec<f64> = pair.iter().map(|o| o.multipliers.0[0].re).collect();
+        largest.sort_by(f64::total_cmp);
+        assert!(0.9 < largest[0] && largest[0] < 1.0 && 1.0 < largest[1], "{largest:?}");
+    }
+}
+
+#[test]
+fn the_subcritical_oscillation_has_a_fold_and_rest_an_onset() {
+    let onset = &truths()["rest_onset"];
+    let entry = &onset["res_w1.8"];
+    let fold = [number(&entry["fold_theta"]), number(&entry["fold_v"])];
+    let [before, after] = about(number(&entry["p_fold"]), 1.8, 2, 0);
+    assert!(near(&before, fold).is_empty());
+    let pair = near(&after, fold);
+    assert_eq!(pair.len(), 2);
+    assert_eq!(pair.iter().filter(|o| o.is_stable()).count(), 1);
+    for (key, omega) in [("res_w1.8", 1.8), ("res_w2.0", 2.0), ("res_w2.2", 2.2)] {
+        let entry = &onset[key];
+        let p = number(&entry["p_onset"]);
+        let rests = about(p, omega, 1, 0).map(|orbits| {
+            let rest = orbits.iter().find(|o| o.contains([0.0; 2], 1e-9)).expect("rest");
+            rest.multipliers.0[0].re
+        });
+        assert!(-1.0 < rests[0] && rests[0] < -0.9 && rests[1] < -1.0, "{key}: {rests:?}");
+        // The small oscillation is there on one side alone: after the onset, or before.
+        let small = about(p, omega, 2, 0).map(|orbits| near(&orbits, [0.0; 2]).len());
+        let super_critical = entry["criticality"] == "supercritical";
+        assert_eq!(small, if super_critical { [0, 1] } else { [1, 0] }, "{key}");
+    }
+}
+
+#[test]
+fn twins_part_where_symmetry_breaks() {
+    let entry = &truths()["bifurcations_gamma0.1_omega2"]["osc_SB"];
+    let [before, after] = about(number(&entry["p"]), 2.0, 2, 0);
+    let [one] = near(&before, point(entry))[..] else { panic!("one before") };
+    assert!(one.is_stable() && one.multipliers.0[0].re > 0.99);
+    let three = near(&after, point(entry));
+    assert_eq!(three.len(), 3);
+    let (stable, lost): (Vec<_>, Vec<_>) = three.into_iter().partition(|o| o.is_stable());
+    assert_eq!((stable.len(), lost.len()), (2, 1));
+    assert!(lost[0].multipliers.0[0].re > 1.0);
+    assert!(same(&[lost[0].mirrored().0], &[lost[0].clone()]), "the symmetric one loses");
+    assert!(same(&[stable[0].mirrored().0], &[stable[1].clone()]), "twins");
+}
+
+#[test]
+fn doublings_leave_an_orbit_of_twice_the_period() {
+    let at_two = &truths()["bifurcations_gamma0.1_omega2"];
+    for (name, n, w) in [("osc_PD1", 2, 0), ("osc_PD2", 4, 0), ("rot_PD1", 1, 1)] {
+        let entry = &at_two[name];
+        let p = number(&entry["p"]);
+        let [before, after] = about(p, 2.0, n, w);
+        let own = |orbits: &[PeriodicOrbit]| near(orbits, point(entry))[0].multipliers.0[0].re;
+        let (stable, lost) = (own(&before), own(&after));
+        assert!(-1.0 < stable && stable < -0.99 && lost < -1.0, "{name}: {stable}, {lost}");
+        let [before, after] = about(p, 2.0, 2 * n, 2 * w);
+        assert!(near(&before, point(entry)).is_empty(), "{name}");
+        let doubled = near(&after, point(entry));
+        assert!(doubled.len() == 1 && doubled[0].is_stable(), "{name}: {}", doubled.len());
+    }
+}

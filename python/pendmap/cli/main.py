@@ -28,6 +28,8 @@ _COMMANDS = {
     "orbit": "Find all periodic orbits of one period and winding, stable and unstable.",
     "lyapunov": "Find the largest Lyapunov exponent of the attractor that a start reaches.",
     "lifetime": "Measure how long transient chaos lives, or find that it persists.",
+    "tongues": "Find where rest loses its stability: critical curves in two planes.",
+    "melnikov": "Compute the homoclinic threshold by Melnikov's criterion.",
     "look": "Say what a record holds: channels, rate, noise, releases, what is odd about it.",
     "identify": "Find natural frequency, damping and friction in a free decay, by every method.",
     "compare": "Compare a model with records that it was not fitted to.",

@@ -19,7 +19,13 @@ if TYPE_CHECKING:
 
     Command = Callable[..., Any]
 
-__all__ = ["model_from", "model_options", "rig_from", "varied_model_options"]
+__all__ = [
+    "model_from",
+    "model_options",
+    "model_options_without",
+    "rig_from",
+    "varied_model_options",
+]
 
 _BARE = {
     "gamma": "Viscous damping c/(m w0).",
@@ -69,7 +75,14 @@ def model_options(function: Command) -> Command:
     return _options(function, NUMBER)
 
 
-def _options(function: Command, kind: click.ParamType[Any]) -> Command:
+def model_options_without(*left_out: str) -> Callable[[Command], Command]:
+    """Return what adds them but those ``left_out``, which the command takes otherwise."""
+    return functools.partial(_options, kind=NUMBER, left_out=left_out)
+
+
+def _options(
+    function: Command, kind: click.ParamType[Any], left_out: tuple[str, ...] = ()
+) -> Command:
     model = click.option(
         "--model",
         "model",
@@ -84,6 +97,8 @@ def _options(function: Command, kind: click.ParamType[Any]) -> Command:
     )
     function = model(preset(function))
     for name, text in reversed((_BARE | _SI).items()):
+        if name in left_out:
+            continue
         default = getattr(Pendulum(), name, None)
         function = click.option(
             f"--{name.replace('_', '-')}",
@@ -97,7 +112,7 @@ def _options(function: Command, kind: click.ParamType[Any]) -> Command:
 def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     """Take the model's options out of ``given`` and make the model that they describe."""
     model, preset = given.pop("model"), given.pop("preset")
-    typed = {name: given.pop(name) for name in (*_BARE, *_SI)}
+    typed = {name: given.pop(name, None) for name in (*_BARE, *_SI)}
     typed = {name: value for name, value in typed.items() if value is not None}
     if model is not None and preset is not None:
         raise click.UsageError("--model and --preset: allowed is one of them")

@@ -19,6 +19,7 @@ __all__ = [
     "NUMBER",
     "NUMBER_OR_RANGE",
     "RANGE",
+    "VALUES",
     "AxisText",
     "OutputFile",
     "ReportFile",
@@ -126,6 +127,36 @@ class _NumberOrRange(click.ParamType[float | AxisText]):
         return NUMBER.convert(value, param, ctx)
 
 
+class _Values(click.ParamType[list[float]]):
+    name = "A:B:N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[float]:
+        """Return N values from A to B, both included, or the only one."""
+        if isinstance(value, list):
+            return value
+        wanted = "allowed is A:B:N, N values from A to B, both included, or a single value"
+        parts = str(value).split(":")
+        try:
+            ends = [_number(part) for part in parts[:2]]
+            count = int(parts[2]) if len(parts) == 3 else 1  # noqa: PLR2004
+        except (ValueError, ZeroDivisionError):
+            self.fail(f"{value!r}: {wanted}", param, ctx)
+        if len(parts) not in {1, 3}:
+            self.fail(f"{value!r}: {wanted}", param, ctx)
+        if not all(math.isfinite(end) for end in ends) or ends[0] > ends[-1]:
+            self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
+        if not 1 <= count <= MOST_CELLS:
+            self.fail(f"{value!r}: {count} values, allowed are 1 to {MOST_CELLS}", param, ctx)
+        low, high = ends[0], ends[-1]
+        if count == 1 and low != high:
+            self.fail(f"{value!r}: one value has one bound", param, ctx)
+        if count > 1 and low == high:
+            self.fail(f"{value!r}: {count} values need two bounds", param, ctx)
+        return [low + (high - low) * k / max(count - 1, 1) for k in range(count)]
+
+
 class OutputFile(click.ParamType[Path]):
     """A file to write: its suffix and folder are checked before anything is computed."""
 
@@ -190,3 +221,4 @@ NUMBER = _Number()
 AXIS = _Axis()
 RANGE = _Range()
 NUMBER_OR_RANGE = _NumberOrRange()
+VALUES = _Values()

@@ -16,9 +16,11 @@ from pendmap.figures import (
     diagrams,
     exponents,
     lifetimes,
+    melnikov,
     orbits,
     planes,
     style,
+    tongues,
     trajectory,
 )
 from pendmap.figures import runs as runs_figure
@@ -46,6 +48,7 @@ __all__ = [
     "draw_pendulum",
     "draw_record",
     "draw_runs",
+    "draw_tongues",
     "write_report",
 ]
 
@@ -55,10 +58,12 @@ SUFFIXES = (".png", ".svg", ".pdf")
 _KINDS = {
     "basins": basins.figure,
     "bifurcation": diagrams.figure,
-    "orbits": orbits.figure,
-    "parameter_map": planes.figure,
     "lifetime": lifetimes.figure,
     "lyapunov": exponents.figure,
+    "melnikov": melnikov.figure,
+    "orbits": orbits.figure,
+    "parameter_map": planes.figure,
+    "tongues": tongues.figure,
     "trajectory": trajectory.figure,
 }
 
@@ -77,22 +82,30 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     Of a basin map: the labels, with the attractors marked and named with their shares, and the
     settle time beside them; where the labels are unreliable, settle time and net turns lead; where
     labels tell nothing, the net turns and the finite-time exponent. Of closed orbits: their paths
-    and points in the phase plane. Of a trajectory: time history, phase plane, Poincare section. Of
-    an exponent: growth along the start, the running mean, its distribution. Of a lifetime: the
-    survival curve with its tail, and the mean over where the tail begins.
+    and points in the phase plane. Of a map over two parameters: the kinds of attractor, striped
+    where several coexist, and the largest exponent. Of a bifurcation diagram: stroboscopic angles,
+    sweeps up and down, exponents. Of critical curves: stable regions and their boundaries. Of
+    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history, phase
+    plane, Poincare section. Of an exponent: growth along the start, the running mean, its
+    distribution. Of a lifetime: the survival curve with its tail, and the mean over where the tail
+    begins.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.lyapunov``, ``pendmap.lifetime`` or
-        ``pendmap.simulate`` returned;
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
+        ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
+        ``pendmap.melnikov`` or ``pendmap.simulate`` returned;
         ``attrs["kind"]`` tells which.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
         Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map;
         ``history``, ``phase`` or ``section`` of a trajectory; ``growth``, ``average`` or
-        ``distribution`` of an exponent; ``survival`` or ``tail`` of a lifetime.
+        ``distribution`` of an exponent; ``survival`` or ``tail`` of a lifetime; ``theta`` or
+        ``velocity`` of a bifurcation diagram; of critical curves the plane: ``omega-p`` or
+        ``e-alpha2``; of a map over two parameters ``kinds``, ``exponent``, ``attractors``,
+        ``period``, ``winding``, ``undecided`` or ``share KIND``.
     size : (float, float), optional
         Width and height in inches; by default as large as the parts need.
     dpi : float, optional
@@ -128,6 +141,47 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         made = _KINDS[kind](dataset, layer=layer, size=size, dpi=resolution, colormap=colormap)
+        style.write(made, part)
+    return Path(path)
+
+
+def draw_tongues(
+    dataset: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    title: str,
+    marks: Sequence[tuple[float, float, str]] = (),
+) -> Path:
+    """Draw critical curves with points marked into a file: figure 1.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What ``pendmap.tongues`` returned.
+    path : str or path
+        As of :func:`draw`.
+    title : str
+        What stands above.
+    marks : sequence of (float, float, str)
+        Amplitude ``p``, frequency ``omega`` and name of each point.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If the file cannot be written.
+    """
+    dpi = style.resolution(None)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        made = tongues.figure(
+            dataset, layer=None, size=None, dpi=dpi, colormap=None, title=title, marks=marks
+        )
         style.write(made, part)
     return Path(path)
 

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
 from pendmap.errors import InputError
 from pendmap.figures import style
@@ -79,6 +80,8 @@ def _look(one: Closed) -> dict[str, Any]:
         "markeredgewidth": 1.0,
         "markeredgecolor": style.INK,
         "markerfacecolor": one.colour if one.stable else "white",
+        # Pale colours on white, and all of them in grey, need an edge.
+        "path_effects": [withStroke(linewidth=2.6 if one.stable else 1.6, foreground=style.QUIET)],
     }
 
 

@@ -13,7 +13,18 @@ from typing import TYPE_CHECKING
 from pendmap.errors import InputError
 from pendmap.files import whole_file
 from pendmap.pictures.layers import refuse_lists
-from pendmap.viewer import basins, diagrams, exponents, frame, lifetimes, orbits, planes, trajectory
+from pendmap.viewer import (
+    basins,
+    diagrams,
+    exponents,
+    frame,
+    lifetimes,
+    melnikov,
+    orbits,
+    planes,
+    tongues,
+    trajectory,
+)
 from pendmap.viewer.discrepancy import record_discrepancy
 from pendmap.viewer.identification import record_identification
 from pendmap.viewer.window import (
@@ -53,6 +64,8 @@ _KINDS = {
     "lyapunov": (exponents.blueprint, exponents.log),
     "orbits": (orbits.blueprint, orbits.log),
     "parameter_map": (planes.blueprint, planes.log),
+    "melnikov": (melnikov.blueprint, melnikov.log),
+    "tongues": (tongues.blueprint, tongues.log),
     "trajectory": (trajectory.blueprint, trajectory.log),
 }
 
@@ -70,6 +83,9 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     of a closed orbit, ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a
     lifetime: ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
     ``/tail/data/{mean,error,fitted}`` and ``/legend``. Of a trajectory:
+    with ``path`` and ``points``, ``/legend`` and ``/summary``. Of critical curves:
+    ``/tongues/data/{plus,minus,undamped,fold,own}`` and the same under ``/paper`` in the plane of
+    eq. 1.4. Of Melnikov's criterion: ``/melnikov/data/{forward,backward,own}``. Of a trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
     ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
     ``sim_time`` (nondimensional time, shown as seconds) and ``period``.
@@ -79,6 +95,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     dataset : xarray.Dataset
         What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.lyapunov``, ``pendmap.lifetime`` or
         ``pendmap.simulate`` returned;
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.simulate``, ``pendmap.tongues`` or
+        ``pendmap.melnikov`` returned;
         ``attrs["kind"]`` tells which.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.

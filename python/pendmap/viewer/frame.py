@@ -53,7 +53,15 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     content = hashlib.blake2b(repr(sorted(attrs.items())).encode(), digest_size=12)
     telling = next(
         name
-        for name in ("label", "regime", "entry_theta", "theta", "theta_point")
+        for name in (
+            "label",
+            "regime",
+            "entry_theta",
+            "theta",
+            "theta_point",
+            "p",
+            "p_melnikov",
+        )
         if name in dataset
     )
     content.update(np.ascontiguousarray(dataset[telling].values).data)

@@ -1,0 +1,222 @@
+"""Critical curves: where rest loses its stability under a harmonic drive of the pivot."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core, asymptotic, checks
+from pendmap import grid as grids
+from pendmap.errors import InputError
+from pendmap.model import without_dimensions
+from pendmap.model.units import RATE
+from pendmap.store import FORMAT_VERSION
+from pendmap.summary import of_motion
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.model import Pendulum, Rig
+
+__all__ = ["NEAR", "OMEGA", "PLANES", "P_MAX", "tongues"]
+
+OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
+"""Frequencies and largest amplitude where none are given."""
+
+PLANES = ("omega-p", "e-alpha2")
+"""Planes in which critical curves are drawn: eq. 1.2's, and eq. 1.4's ``(alpha^2, e)``."""
+
+NEAR = 0.05
+"""An asymptotic curve that is off by less than this part is near the exact one."""
+
+
+def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    omega: ArrayLike | None = None,
+    p_max: float = P_MAX,
+    *,
+    plane: str = "omega-p",
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """Return the critical curves of hanging rest, exact, with folds and asymptotic curves.
+
+    Rest obeys ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` (eq. 1.3 with damping). The
+    derivative of the stroboscopic map there is its monodromy matrix ``M``, and rest changes its
+    stability where a multiplier passes +1, ``1 - tr M + det M = 0``, or -1, ``1 + tr M + det M =
+    0``. As ``p`` enters linearly, ``M`` is an entire function of ``p``: from its Chebyshev series
+    all such amplitudes up to ``p_max`` are found, and moved onto the map itself. In the plane of
+    eq. 1.4 a point is ``(e, alpha^2) = (p/omega^2, 1/omega^2)``.
+
+    Where rest first loses its stability an oscillation is born, with period 1 (multiplier +1) or 2
+    (-1). Where it is born toward smaller ``p`` it is followed to its fold: between fold and
+    critical curve it is there beside a rest that is stable.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; its own ``p``, ``omega`` and phase do not matter. With gamma = 0 the curves are
+        those of Mathieu's equation. Effects count; rest must stay a solution.
+    omega : array_like, optional
+        Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3.
+    p_max : float
+        Largest amplitude, up to 100.
+    plane : str
+        In which plane a figure shows them: ``omega-p``, or ``e-alpha2``, that of eq. 1.4.
+    threads : int, optional
+        Number of threads; by default one a processor. The result does not depend on it.
+    progress : callable, optional
+        Called now and then with what is done and in all.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``critical``, a critical amplitude each: ``index`` of its frequency, ``p``,
+        ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above). Over
+        ``omega``: ``stable_at_first`` (below the first), ``fold`` (nan where none) and the point
+        ``fold_theta``, ``fold_velocity`` of the oscillation there. The same without damping:
+        ``undamped_index``, ``undamped_p``, ``undamped_multiplier`` over ``undamped``. Over
+        ``curve`` and ``omega``: ``asymptotic`` and ``asymptotic_error``, relative to the exact
+        curve nearest by (:mod:`pendmap.asymptotic`).
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range; if the model has friction, which holds rest whatever the
+        drive, or a torque or another load at rest, which moves it.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    frequencies = grids.frequencies(np.linspace(*OMEGA) if omega is None else omega)
+    p_max = checks.number("p_max", p_max)
+    checks.call("progress", progress)
+    if plane not in PLANES:
+        raise InputError(f"plane is {checks.shown(plane)}: allowed are {', '.join(PLANES)}")
+    workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
+    began = time.perf_counter()
+
+    def of(one: Pendulum, *, folds: bool) -> list[dict[str, Any]]:
+        return _core.tongues(one.parameters, frequencies.tolist(), p_max, folds, workers, progress)
+
+    try:
+        found, undamped = of(pendulum, folds=True), None
+        if pendulum.gamma:
+            undamped = of(dataclasses.replace(pendulum, gamma=0.0), folds=False)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
+    fold, theta, velocity = np.array(folds).T
+    of_p = {"units": "1", "long_name": "amplitude of the drive over gravity"}
+    variables: dict[str, Any] = {
+        **_columns(found, "critical", ""),
+        **_columns(undamped or found, "undamped", "undamped_"),
+        "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
+        "fold": ("omega", fold, of_p | {"comment": "of the oscillation born at the first loss"}),
+        "fold_theta": ("omega", theta, {"units": "rad"}),
+        "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
+    }
+    above = [stable for row in found for stable in row["stable"][1:]]
+    variables["stable_above"] = ("critical", np.array(above, dtype=np.int8))
+    asymptotic_p, off = _asymptotic(found, frequencies, pendulum.gamma, p_max)
+    variables["asymptotic"] = (("curve", "omega"), asymptotic_p, of_p)
+    variables["asymptotic_error"] = (("curve", "omega"), off, {"units": "1"})
+    coords: dict[str, Any] = {
+        "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
+        "curve": ("curve", np.array(list(asymptotic.CURVES))),
+    }
+    if units.si:
+        given = units.given(frequencies, RATE)
+        coords["Omega"] = ("omega", given, {"units": "rad/s"})
+    dataset = xr.Dataset(variables, coords=coords)
+    dataset.attrs = {
+        "kind": "tongues",
+        "title": model.title,
+        **model.attributes,
+        "plane": plane,
+        "p_max": p_max,
+        "own_p": pendulum.p,
+        "own_omega": pendulum.omega,
+        "seconds": time.perf_counter() - began,
+        "threads": workers or _core.default_threads(),
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [*_summary(dataset), *of_motion(model.effects, "curves are")]
+    dataset.attrs["summary"] = "\n".join(lines)
+    return dataset
+
+
+def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, Any]:
+    count = [len(row["p"]) for row in found]
+    p = np.array([p for row in found for p in row["p"]], dtype=float)
+    multiplier = np.array([m for row in found for m in row["multiplier"]], dtype=np.int8)
+    index = np.repeat(np.arange(len(found), dtype=np.int32), count)
+    return {
+        f"{prefix}index": (one, index, {"comment": "place of its frequency in omega"}),
+        f"{prefix}p": (one, p, {"units": "1", "long_name": "amplitude of the drive over gravity"}),
+        f"{prefix}multiplier": (one, multiplier),
+    }
+
+
+def _asymptotic(
+    found: list[dict[str, Any]],
+    omega: NDArray[np.float64],
+    gamma: float,
+    p_max: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return each asymptotic curve, and how far it is from the exact one with its multiplier."""
+    curves, errors = [], []
+    for multiplier, formula in asymptotic.CURVES.values():
+        p = formula(omega, gamma)
+        p[p > p_max] = np.nan
+        error = np.full_like(p, np.nan)
+        for k, row in enumerate(found):
+            exact = [q for q, m in zip(row["p"], row["multiplier"], strict=True) if m == multiplier]
+            if exact and np.isfinite(p[k]):
+                nearest = min(exact, key=lambda q: abs(q - p[k]))
+                error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan
+        curves.append(p)
+        errors.append(error)
+    return np.array(curves), np.array(errors)
+
+
+def _summary(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    omega = dataset["omega"].values
+    count = dataset.sizes["critical"]
+    where = f"{counted(omega.size, 'value')} of omega from {omega[0]:g} to {omega[-1]:g}"
+    lines = [f"{counted(count, 'critical amplitude')} up to p = {a['p_max']:g} at {where}."]
+    index, p = dataset["index"].values, dataset["p"].values
+    first = [k for k in range(count) if k == 0 or index[k] != index[k - 1]]
+    if first:
+        least = min(first, key=lambda k: p[k])
+        lines.append(
+            f"Rest loses its stability soonest at p = {p[least]:.9g}, "
+            f"omega = {omega[index[least]]:.6g} (multiplier {dataset['multiplier'].values[least]})."
+        )
+    fold = dataset["fold"].values
+    if np.isfinite(fold).any():
+        at = omega[np.isfinite(fold)]
+        lines.append(
+            f"At {counted(at.size, 'value')} of omega from {at.min():.4g} to {at.max():.4g} the "
+            "oscillation is born toward smaller p: it exists from its fold on."
+        )
+    for name in dataset["curve"].values:
+        error = dataset["asymptotic_error"].sel(curve=name).values
+        near = omega[error < NEAR]
+        if near.size:
+            lines.append(
+                f"{str(name).capitalize()}: within {100 * NEAR:g} % of the exact curve at "
+                f"omega = {near.min():.4g} to {near.max():.4g}."
+            )
+    lines.append(f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')}.")
+    return lines

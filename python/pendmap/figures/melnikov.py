@@ -1,0 +1,88 @@
+"""The figure of Melnikov's threshold against the frequency of the drive."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from pendmap.errors import InputError
+from pendmap.figures import style
+from pendmap.figures.sheet import Panel, Sheet
+from pendmap.pictures import layers as layering
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["figure"]
+
+_LOOKS: dict[str, tuple[str, Any]] = {
+    "forward": ("#d55e00", "-"),
+    "backward": ("#0072b2", (0, (5, 2))),
+}
+_HIGH = 12.0
+"""Largest threshold shown, in units of the least."""
+
+
+def figure(
+    dataset: xr.Dataset,
+    *,
+    layer: str | None,
+    size: tuple[float, float] | None,
+    dpi: float,
+    colormap: str | None,
+) -> Figure:
+    """Return the figure of Melnikov's threshold; see :func:`pendmap.figures.draw`."""
+    if layer is not None:
+        raise InputError(f"no layer {layer!r}: a figure of Melnikov's threshold has one part")
+    if colormap is not None:
+        raise InputError(f"colormap {colormap!r}: this figure has no colour map")
+    a = dataset.attrs
+    omega, p = dataset["omega"].values, dataset["p_melnikov"].values
+    known = p[np.isfinite(p)]
+    least = float(known.min()) if known.size else 1.0
+    own = (float(a["own_omega"]), abs(float(a["own_p"])))
+    top = max(min(float(known.max()) if known.size else 1.0, _HIGH * least), 1.15 * own[1], 1e-3)
+    x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
+    alike = known.size and np.nanmax(np.abs(p[:, 0] - p[:, 1])) < 1e-9 * max(least, 1e-9)
+    branches = ["forward"] if alike else ["forward", "backward"]
+    handles, texts = [], []
+    for name in branches:
+        colour, look = _LOOKS[name]
+        handles.append(Line2D([], [], color=colour, linestyle=look, linewidth=1.6))
+        texts.append("threshold, both branches" if alike else f"threshold, {name}")
+    handles.append(Line2D([], [], color=style.INK, marker="*", markersize=9, linestyle="none"))
+    texts.append("this pendulum")
+    sheet = Sheet(
+        [Panel()],
+        ratio=0.68,
+        title="Homoclinic threshold, Melnikov, first order",
+        subtitle=layering.parameters(a),
+        handles=handles,
+        texts=texts,
+        labels=(style.widest(0.0, top), style.widest(*x)),
+        size=size,
+        dpi=dpi,
+    )
+    axes = sheet.axes[0]
+    for name in branches:
+        colour, look = _LOOKS[name]
+        values = dataset["p_melnikov"].sel(branch=name).values
+        axes.plot(omega, values, color=colour, linestyle=look, linewidth=1.6)
+        axes.fill_between(omega, values, top, color=colour, alpha=0.10, linewidth=0)
+    axes.plot(*own, marker="*", color=style.INK, markersize=9, clip_on=False, zorder=4)
+    axes.text(
+        0.5,
+        0.93,
+        "manifolds cross: fractal boundaries of basins",
+        ha="center",
+        transform=axes.transAxes,
+        color=style.QUIET,
+    )
+    axes.set_xlim(*x)
+    axes.set_ylim(0.0, top)
+    axes.set_xlabel("\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0")
+    axes.set_ylabel("p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g")
+    return sheet.figure

@@ -1,0 +1,114 @@
+"""The figure of critical curves: stable regions, boundaries, folds, asymptotic curves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from pendmap.critical_curves import NEAR, PLANES
+from pendmap.errors import InputError
+from pendmap.figures import style
+from pendmap.figures.sheet import Panel, Sheet
+from pendmap.pictures import layers as layering
+from pendmap.pictures import tongues as drawn
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["figure"]
+
+_STABLE = "#e3ecd8"
+_FOLD = "#009e73"
+_LOOKS: tuple[Any, ...] = ("-.", "--", ":")
+
+
+def figure(  # noqa: PLR0913 (all of these a user may choose)
+    dataset: xr.Dataset,
+    *,
+    layer: str | None,
+    size: tuple[float, float] | None,
+    dpi: float,
+    colormap: str | None,
+    title: str = "Where hanging rest is stable",
+    marks: Sequence[tuple[float, float, str]] = (),
+) -> Figure:
+    """Return the figure of critical curves; see :func:`pendmap.figures.draw`.
+
+    ``marks`` are further points ``(p, omega, name)``.
+    """
+    plane = layer or str(dataset.attrs.get("plane", PLANES[0]))
+    if plane not in PLANES:
+        raise InputError(f"no layer {plane!r}: allowed are {', '.join(PLANES)}")
+    if colormap is not None:
+        raise InputError(f"colormap {colormap!r}: a figure of critical curves has no colour map")
+    chart = drawn.chart(dataset, plane, NEAR)
+    handles, texts = _legend(chart, own=not marks)
+    sheet = Sheet(
+        [Panel()],
+        ratio=0.72,
+        title=title,
+        subtitle=layering.parameters({k: v for k, v in dataset.attrs.items() if k not in _DRIVE}),
+        handles=handles,
+        texts=texts,
+        labels=(style.widest(*chart.y), style.widest(*chart.x)),
+        size=size,
+        dpi=dpi,
+    )
+    axes = sheet.axes[0]
+    # Edges of the same colour: without them a seam shows between neighbours.
+    areas = PolyCollection(chart.stable, facecolors=_STABLE, edgecolors=_STABLE, linewidths=0.3)
+    axes.add_collection(areas)
+    axes.add_collection(LineCollection(chart.undamped, colors=style.QUIET, linewidths=0.6))
+    for multiplier, colour in drawn.COLOURS.items():
+        thick = 1.5 if multiplier < 0 else 1.1
+        axes.add_collection(
+            LineCollection(chart.lines[multiplier], colors=colour, linewidths=thick)
+        )
+    for look, (near, far) in zip(_LOOKS, chart.asymptotic.values(), strict=True):
+        axes.plot(near[:, 0], near[:, 1], linestyle=look, color=style.INK, linewidth=1.0)
+        axes.plot(far[:, 0], far[:, 1], linestyle=look, color=style.INK, linewidth=0.5, alpha=0.45)
+    axes.plot(chart.fold[:, 0], chart.fold[:, 1], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
+    axes.plot(chart.beyond[:, 0], chart.beyond[:, 1], color=style.QUIET, linewidth=0.6)
+    if marks:
+        for p, omega, name in marks:
+            turned = plane == PLANES[1]
+            at = (1 / omega**2, p / omega**2) if turned else (omega, p)
+            axes.plot(*at, marker="o", color=style.INK, markersize=5)
+            axes.annotate(name, at, xytext=(6, 4), textcoords="offset points")
+    else:
+        axes.plot(*chart.own, marker="*", color=style.INK, markersize=9, linestyle="none")
+    axes.set_xlim(*chart.x)
+    axes.set_ylim(*chart.y)
+    axes.set_xlabel(chart.names[0])
+    axes.set_ylabel(chart.names[1])
+    return sheet.figure
+
+
+_DRIVE = {"p", "omega", "phase", "Omega", "phi"}
+
+
+def _legend(chart: drawn.Chart, *, own: bool) -> tuple[list[Any], list[str]]:
+    entries: list[tuple[Any, str]] = [
+        (Patch(facecolor=_STABLE, edgecolor=style.QUIET, linewidth=0.4), "rest is stable"),
+        (
+            Line2D([], [], color=drawn.COLOURS[-1], linewidth=1.5),
+            "exact, multiplier \N{MINUS SIGN}1 (period 2)",
+        ),
+        (Line2D([], [], color=drawn.COLOURS[1], linewidth=1.1), "exact, multiplier +1 (period 1)"),
+        (Line2D([], [], color=style.QUIET, linewidth=0.6), "exact, without damping"),
+    ]
+    if (chart.fold == chart.fold).any(axis=0)[1]:
+        fold = Line2D([], [], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
+        entries.append((fold, "fold: the oscillation exists from here"))
+    for look, name in zip(_LOOKS, chart.asymptotic, strict=True):
+        entries.append((Line2D([], [], color=style.INK, linewidth=1.0, linestyle=look), name))
+    if own:
+        star = Line2D([], [], color=style.INK, marker="*", markersize=9, linestyle="none")
+        entries.append((star, "this pendulum"))
+    return [e[0] for e in entries], [e[1] for e in entries]

@@ -1,0 +1,75 @@
+"""The recording of critical curves, in both planes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from pendmap.critical_curves import NEAR
+from pendmap.pictures import tongues as drawn
+from pendmap.viewer import frame
+from pendmap.viewer.panel import Panel
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["blueprint", "log"]
+
+_ROOTS = {"omega-p": ("tongues", "Frequency and amplitude"), "e-alpha2": ("paper", "Eq. 1.4")}
+_CURVES = {1: ("plus", (213, 94, 0)), -1: ("minus", (0, 114, 178))}
+_FOLD, _BARE, _OWN = (0, 158, 115), (150, 150, 150), (204, 121, 167)
+
+
+def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
+    """Return the layout: both planes behind one another, legend and summary beside them."""
+    first = str(dataset.attrs.get("plane", "omega-p"))
+    order = sorted(_ROOTS, key=lambda plane: plane != first)
+    views = [_panel(dataset, plane)[0].view(*_ROOTS[plane]) for plane in order]
+    aside = rrb.Vertical(
+        rrb.TextDocumentView(origin="/legend", name="Legend"),
+        rrb.TextDocumentView(origin="/summary", name="Summary"),
+    )
+    return frame.screen(rrb.Tabs(*views), aside, shares=[5, 3])
+
+
+def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
+    """Log the curves, the fold and the pendulum's point, in each plane."""
+    frame.summary(stream, dataset)
+    for plane, (root, _) in _ROOTS.items():
+        panel, chart = _panel(dataset, plane)
+        panel.log(stream, root)
+        panel.strips(stream, f"{root}/data/undamped", _within(panel, chart.undamped), _BARE, 0.6)
+        for multiplier, (name, colour) in _CURVES.items():
+            lines = _within(panel, chart.lines[multiplier])
+            panel.strips(stream, f"{root}/data/{name}", lines, colour, 1.5)
+        panel.strips(stream, f"{root}/data/fold", _within(panel, [chart.fold]), _FOLD, 1.5)
+        own = np.array([chart.own], dtype=np.float32)
+        points = rr.Points2D(own, colors=[_OWN], radii=rr.Radius.ui_points(5.0))
+        stream.log(f"{root}/data/own", points, static=True)
+    legend = [
+        "- blue: multiplier -1, an oscillation of period 2 is born",
+        "- vermillion: multiplier +1, one of period 1",
+        "- green: its fold, where it is born toward smaller p",
+        "- grey: without damping",
+        "- purple: this pendulum",
+    ]
+    frame.text(stream, "legend", "\n".join(legend))
+
+
+def _panel(dataset: xr.Dataset, plane: str) -> tuple[Panel, drawn.Chart]:
+    chart = drawn.chart(dataset, plane, NEAR)
+    return Panel(chart.x, chart.y, *chart.names), chart
+
+
+def _within(panel: Panel, lines: list[drawn.Floats]) -> list[drawn.Floats]:
+    """Cut lines where they leave the panel: a view clips nothing."""
+    pieces = []
+    for line in lines:
+        inside = (line[:, 1] <= panel.y[1]) & (line[:, 0] <= panel.x[1])
+        cuts = np.flatnonzero(np.diff(inside.astype(int))) + 1
+        parts = zip(np.split(line, cuts), np.split(inside, cuts), strict=True)
+        pieces += [part for part, keep in parts if keep.all()]
+    return pieces

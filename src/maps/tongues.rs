@@ -1,0 +1,207 @@
+//! Where rest loses and gains stability: critical amplitudes of the drive, by Floquet.
+//!
+//! The derivative `M` of the stroboscopic map at hanging rest is the monodromy matrix of the
+//! linearised equation, eq. 1.3 with damping. Rest changes where a multiplier passes +1,
+//! `1 - tr M + det M = 0`, or -1, `1 + tr M + det M = 0`. As `p` stands in the linear equation linearly,
+//! `M` is an entire function of it: its Chebyshev series on an interval soon says all about it.
+//!
+//! Without damping the two boundaries of a narrow tongue are nearly a double zero of that. The drive is
+//! even in time then, so that `m11 = m22` and, on a boundary, `m12 m21 = m11^2 - 1 = 0`: one is a
+//! simple zero of `m12`, the other of `m21`, however narrow the tongue (Magnus & Winkler 1966, Hill's
+//! equation, section 1.1).
+
+use rayon::prelude::*;
+
+use super::chebyshev::{Interpolant, Values};
+use super::control::{Control, pool};
+use crate::error::Error;
+use crate::model::Pendulum;
+use crate::orbit::PoincareMap;
+use crate::orbit::fold::{Fold, fold_of_onset};
+
+/// The largest `p` that is asked for.
+pub const MOST_P: f64 = 100.0;
+/// Over a part of the range of `p` solutions grow at most by the exponential of about this.
+const GROWTH: f64 = 8.0;
+/// Entries, or products of multipliers, that differ by less than this part are alike.
+const ALIKE: f64 = 1e-9;
+/// A load on the pendulum hanging at rest up to this is none.
+const NO_LOAD: f64 = 1e-14;
+/// Times in a period, and share of gravity of the drive, at which that is looked at.
+const TIMES: usize = 16;
+
+/// What happens at a critical amplitude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Critical {
+    /// Amplitude of the drive.
+    pub p: f64,
+    /// The multiplier there: 1 or -1.
+    pub multiplier: f64,
+    /// Whether rest is stable right below, and right above.
+    pub stable: [bool; 2],
+}
+
+/// Critical amplitudes at one frequency.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Frequency of the drive.
+    pub omega: f64,
+    /// In order of `p`.
+    pub critical: Vec<Critical>,
+    /// Whether rest is stable between `p = 0` and the first.
+    pub stable_at_first: bool,
+    /// Where the oscillation that is born at the first loss of stability turns back: below that `p`
+    /// it is not. `None` where it is born toward larger `p`.
+    pub fold: Option<Fold>,
+}
+
+/// All critical amplitudes up to `p_max` at each of the frequencies, with `folds` if asked for.
+///
+/// # Errors
+/// [`Error::Range`] for a `p_max` or frequency out of range, [`Error::NotMappable`] for effects that no
+/// map can have, [`Error::NoRest`] where hanging at rest is no solution, or friction holds it,
+/// [`Error::Interrupted`] if `control` was cancelled.
+pub fn tongues(
+    pendulum: &Pendulum,
+    omegas: &[f64],
+    p_max: f64,
+    folds: bool,
+    threads: usize,
+    control: &Control,
+) -> Result<Vec<Curve>, Error> {
+    if !(p_max > 0.0 && p_max <= MOST_P) {
+        return Err(Error::Range { name: "p_max", value: p_max, allowed: "above 0, up to 100" });
+    }
+    if let Some(value) = omegas.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
+        return Err(Error::Range { name: "omega", value: *value, allowed: "above 0" });
+    }
+    check(pendulum, omegas, p_max)?;
+    control.begin(omegas.len());
+    pool(threads)?.install(|| {
+        let one = |omega: &f64| {
+            control.check()?;
+            let curve = along(pendulum, *omega, p_max, folds);
+            control.add(1);
+            Ok(curve)
+        };
+        omegas.par_iter().map(one).collect()
+    })
+}
+
+/// The same pendulum under another drive.
+fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
+    let mut other = pendulum.clone();
+    (other.drive.p, other.drive.omega, other.drive.phase) = (p, omega, 0.0);
+    other
+}
+
+/// Whether hanging at rest is a solution under all these drives, and nothing holds it.
+fn check(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Result<(), Error> {
+    pendulum.check_mappable()?;
+    if pendulum.has_friction() {
+        let why = "friction holds it whatever the drive: rest never loses its stability";
+        return Err(Error::NoRest { why });
+    }
+    for omega in omegas {
+        let driven = under(pendulum, p_max, *omega);
+        let loaded = (0..TIMES).any(|k| {
+            let tau = driven.period() * k as f64 / TIMES as f64;
+            driven.acceleration(tau, 0.0, 0.0).abs() > NO_LOAD
+        });
+        if loaded {
+            let why =
+                "a torque or a sideways drive moves it, and eq. 1.3 is not its linear equation";
+            return Err(Error::NoRest { why });
+        }
+    }
+    Ok(())
+}
+
+/// Entries of the monodromy matrix by rows, and its determinant.
+fn monodromy(pendulum: &Pendulum, p: f64, omega: f64) -> Values<5> {
+    // Without drive a period is another one: so little of it changes nothing.
+    let image = PoincareMap::new(&under(pendulum, p.max(f64::MIN_POSITIVE), omega)).once([0.0; 2]);
+    let m = image.derivative;
+    let product = image.product.unwrap_or(m.determinant());
+    [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)], product]
+}
+
+/// `1 - m tr M + det M`: zero where `m`, 1 or -1, is a multiplier.
+fn gap(multiplier: f64, [a, _, _, d, product]: Values<5>) -> f64 {
+    1.0 - multiplier * (a + d) + product
+}
+
+fn is_stable(m: Values<5>) -> bool {
+    let within = gap(1.0, m) > 0.0 && gap(-1.0, m) > 0.0;
+    within && m[4] < 1.0 + ALIKE
+}
+
+fn along(pendulum: &Pendulum, omega: f64, p_max: f64, folds: bool) -> Curve {
+    let at = |p: f64| monodromy(pendulum, p, omega);
+    // Solutions grow by about the exponential of the period times the root of p.
+    let period = std::f64::consts::TAU / omega;
+    let parts = (0.4 * period * p_max.sqrt() / GROWTH).ceil().max(1.0) as usize;
+    let end = |i: usize| p_max * (i as f64 / parts as f64).powi(2);
+    let mut critical: Vec<(f64, f64)> = Vec::new();
+    let mut panels = Vec::new();
+    for i in 0..parts {
+        let panel = Interpolant::of(end(i), end(i + 1), at);
+        let begin: Values<5> = std::array::from_fn(|k| panel.value(k, end(i)));
+        let even = (begin[0] - begin[3]).abs() < ALIKE * (1.0 + begin[0].abs())
+            && (begin[4] - 1.0).abs() < ALIKE;
+        let functions: Vec<(f64, fn(Values<5>) -> f64)> = if even {
+            vec![(0.0, |m| m[1]), (0.0, |m| m[2])]
+        } else {
+            vec![(1.0, |m| gap(1.0, m)), (-1.0, |m| gap(-1.0, m))]
+        };
+        for (multiplier, function) in functions {
+            for zero in panel.zeros(function) {
+                let p = corrected(&panel, zero, function, at);
+                let sign = if even { panel.value(0, zero).signum() } else { multiplier };
+                critical.push((p.clamp(0.0, p_max), sign));
+            }
+        }
+        panels.push((end(i + 1), panel));
+    }
+    critical.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let middle_of = |i: usize| {
+        let low = if i == 0 { 0.0 } else { critical[i - 1].0 };
+        let high = critical.get(i).map_or(p_max, |c| c.0);
+        0.5 * (low + high)
+    };
+    let stable = |p: f64| {
+        let panel = panels.iter().find(|(end, _)| p <= *end).map_or(&panels[0].1, |(_, one)| one);
+        is_stable(std::array::from_fn(|k| panel.value(k, p)))
+    };
+    let between: Vec<bool> = (0..=critical.len()).map(|i| stable(middle_of(i))).collect();
+    let critical: Vec<Critical> = critical
+        .iter()
+        .zip(between.windows(2))
+        .map(|((p, multiplier), both)| Critical {
+            p: *p,
+            multiplier: *multiplier,
+            stable: [both[0], both[1]],
+        })
+        .collect();
+    let onset = critical.iter().find(|c| c.stable == [true, false]);
+    let mirrored = pendulum.is_mirror_symmetric();
+    let fold = onset
+        .filter(|c| folds && c.p > 0.0 && (mirrored || c.multiplier > 0.0))
+        .and_then(|c| fold_of_onset(&under(pendulum, c.p, omega), c.multiplier));
+    Curve { omega, critical, stable_at_first: between[0], fold }
+}
+
+/// A zero of the interpolant moved to that of the function itself, by one step of Newton's method.
+fn corrected(
+    panel: &Interpolant<5>,
+    zero: f64,
+    function: fn(Values<5>) -> f64,
+    at: impl Fn(f64) -> Values<5>,
+) -> f64 {
+    let width = 1e-5 * zero.max(1e-3);
+    let side = |by: f64| function(std::array::from_fn(|k| panel.value(k, zero + by)));
+    let slope = (side(width) - side(-width)) / (2.0 * width);
+    let step = function(at(zero)) / slope;
+    // At a tip the slope is none, and nothing is to be gained.
+    if step.abs() < width { zero - step } else { zero }
+}

@@ -1,0 +1,217 @@
+"""Critical curves: against reference values, Mathieu's functions, scipy; in figures and files."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import mathieu_a, mathieu_b
+
+import pendmap
+from drawn import made
+from pendmap import Effect, Pendulum, Rig, asymptotic, figures
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+    from conftest import Run
+
+DAMPED = Pendulum(gamma=0.1)
+
+
+def found_at(model: Pendulum, omega: float, p_max: float = 6.0) -> list[tuple[float, int]]:
+    found = pendmap.tongues(model, omega, p_max)
+    return list(zip(found["p"].values, found["multiplier"].values, strict=True))
+
+
+@pytest.mark.parametrize(("key", "gamma"), [("undamped", 0.0), ("damped_gamma0.1", 0.1)])
+def test_the_known_boundaries_to_1e_9(truths: dict[str, Any], key: str, gamma: float) -> None:
+    for omega, rows in truths["mathieu_boundaries"][key].items():
+        found = found_at(Pendulum(gamma=gamma), float(omega))
+        for row in rows:
+            gap, multiplier = min((abs(p - float(row["p"])), m) for p, m in found)
+            assert gap < 1e-9, (omega, row["p"], gap)
+            assert multiplier == row["multiplier"]
+        # And none that is not known.
+        assert len(found) == len(rows), (omega, found)
+
+
+def test_the_onset_of_resonance_to_1e_9(truths: dict[str, Any]) -> None:
+    for row in truths["rest_onset"].values():
+        p, multiplier = found_at(DAMPED, row["omega"])[0]
+        assert abs(p - row["p_onset"]) < 1e-9
+        assert multiplier == -1
+
+
+def test_folds_to_1e_9_where_the_onset_is_subcritical(truths: dict[str, Any]) -> None:
+    onsets = list(truths["rest_onset"].values())
+    found = pendmap.tongues(DAMPED, [row["omega"] for row in onsets])
+    for row, fold in zip(onsets, found["fold"].values, strict=True):
+        if row["criticality"] == "supercritical":
+            assert math.isnan(fold)
+        else:
+            assert abs(fold - float(row["p_fold"])) < 1e-9
+
+
+def test_without_damping_they_are_mathieus_characteristic_curves() -> None:
+    # 4/omega^2 = a_r(q) or b_r(q), q = 2 p/omega^2: curves of both kinds, thin tongues too.
+    omegas = [0.52, 0.66, 0.71, 0.99, 1.03, 1.7, 2.3]
+    found = pendmap.tongues(Pendulum(gamma=0.0), omegas, 2.0)
+    assert found.sizes["critical"] > 8
+    for k, p, m in zip(
+        found["index"].values, found["p"].values, found["multiplier"].values, strict=True
+    ):
+        level, q = 4 / omegas[k] ** 2, 2 * p / omegas[k] ** 2
+        orders = range(0, 8, 2) if m > 0 else range(1, 8, 2)
+        values = [float(mathieu_a(r, q)) for r in orders]
+        values += [float(mathieu_b(r, q)) for r in orders if r]
+        assert min(abs(value - level) for value in values) < 1e-8 * level
+
+
+def test_narrow_tongues_are_not_missed() -> None:
+    # Near omega = 1/2 the fourth tongue is narrower than 1e-7 in p at p near 0.1.
+    for omega in (0.499, 0.4999):
+        found = found_at(Pendulum(gamma=0.0), omega, 0.4)
+        first = [p for p, m in found if m == 1][:2]
+        assert len(first) == 2, found
+        assert first[1] - first[0] < 0.05
+    # The strip between two tongues at omega = 0.6, 0.0026 wide, is in the reference values.
+
+
+def test_stable_means_that_motions_decay() -> None:
+    omega = 0.8
+    found = pendmap.tongues(DAMPED, omega)
+    edges = [0.0, *found["p"].values, 6.0]
+    stable = [int(found["stable_at_first"][0]), *found["stable_above"].values]
+
+    def largest(p: float) -> float:
+        ends = []
+        for start in ((1.0, 0.0), (0.0, 1.0)):
+            run = solve_ivp(
+                lambda t, y: [y[1], -0.1 * y[1] - (1 + p * math.cos(omega * t)) * y[0]],
+                (0.0, math.tau / omega),
+                start,
+                rtol=1e-10,
+                atol=1e-12,
+            )
+            ends.append(run.y[:, -1])
+        return float(np.abs(np.linalg.eigvals(np.array(ends).T)).max())
+
+    for low, high, yes in zip(edges[:-1], edges[1:], stable, strict=True):
+        assert (largest((low + high) / 2) < 1) == bool(yes)
+
+
+@pytest.mark.parametrize("name", list(asymptotic.CURVES))
+def test_asymptotic_curves_have_the_order_they_say(name: str) -> None:
+    multiplier, formula = asymptotic.CURVES[name]
+    # Towards the tip, with damping in proportion: detuning, p and gamma (or its root) all small.
+    errors = []
+    for size in (0.08, 0.04):
+        near = 2.0 if multiplier < 0 else 1.0
+        omega = near * (1 + (size if multiplier < 0 else size**2))
+        gamma = (0.5 * size) if multiplier < 0 else 0.5 * size**2
+        exact = next(p for p, m in found_at(Pendulum(gamma=gamma), omega) if m == multiplier)
+        errors.append(abs(float(formula(np.array([omega]), gamma)[0]) - exact) / exact)
+    order = math.log2(errors[0] / errors[1])
+    assert order > {"tongue 1, first order": 0.8}.get(name, 1.7), (order, errors)
+
+
+def test_added_damping_is_damping_and_effects_count() -> None:
+    plain = found_at(Pendulum(gamma=0.1), 1.5)
+    added = found_at(Pendulum(gamma=0.0, effects=(Effect("viscous_damping", {"gamma": 0.1}),)), 1.5)
+    assert np.allclose(plain, added, atol=1e-9)
+    # Drag and damping of higher order vanish at rest.
+    drag = (Effect("quadratic_drag", {"q": 0.3}),)
+    assert np.allclose(plain, found_at(Pendulum(gamma=0.1, effects=drag), 1.5), atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"theta_r": 0.05}, "friction holds it"),
+        ({"torque": 0.1}, "a torque or a sideways drive moves it"),
+        ({"effects": (Effect("drive_chirp", {"r": 0.001}),)}, "drive_chirp"),
+    ],
+)
+def test_what_has_no_critical_curves_is_refused(given: dict[str, Any], match: str) -> None:
+    with pytest.raises(pendmap.InputError, match=match):
+        pendmap.tongues(Pendulum(**given), 2.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"omega": [2.0, 1.0]}, "ascending"),
+        ({"omega": 0.0}, "above 0"),
+        ({"p_max": 0.0}, "p_max is 0"),
+        ({"p_max": 101.0}, "up to 100"),
+        ({"plane": "q-a"}, "e-alpha2"),
+    ],
+)
+def test_bad_values_are_named(given: dict[str, Any], match: str) -> None:
+    with pytest.raises(pendmap.InputError, match=match):
+        pendmap.tongues(DAMPED, **given)
+
+
+def test_in_si_the_frequency_is_there_too() -> None:
+    rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
+    si, bare = pendmap.tongues(rig, [1.9, 2.0]), pendmap.tongues(DAMPED, [1.9, 2.0])
+    assert np.allclose(si["p"], bare["p"], atol=1e-12)
+    assert np.allclose(si["Omega"], [9.5, 10.0])
+
+
+@pytest.fixture(scope="module")
+def whole() -> xr.Dataset:
+    return pendmap.tongues(DAMPED, np.linspace(0.5, 3.0, 60))
+
+
+def test_threads_do_not_show(whole: xr.Dataset) -> None:
+    again = pendmap.tongues(DAMPED, np.linspace(0.5, 3.0, 60), threads=1)
+    assert again["p"].equals(whole["p"])
+
+
+@pytest.mark.parametrize("plane", ["omega-p", "e-alpha2"])
+def test_the_figure_in_both_planes(whole: xr.Dataset, plane: str) -> None:
+    figure = made(whole.assign_attrs(plane=plane))
+    axes = figure.axes[0]
+    assert ("e = p" in axes.get_ylabel()) == (plane == "e-alpha2")
+    assert any("multiplier" in text.get_text() for text in figure.legends[0].get_texts())
+
+
+@pytest.mark.usefixtures("strict_recordings")
+def test_the_recording_has_both_planes(whole: xr.Dataset, tmp_path: Path) -> None:
+    back = recorded(whole, tmp_path)
+    for root in ("tongues", "paper"):
+        for name in ("plus", "minus", "undamped", "own"):
+            assert f"/{root}/data/{name}" in back.static
+
+
+def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
+    run = pendmap_command("tongues", "--omega", "1.5:2.5:11")
+    assert run.returncode == 0, run.stderr
+    assert {p.name for p in tmp_path.iterdir()} == {"tongues.nc", "tongues.png", "tongues.rrd"}
+    again = pendmap_command("plot", "tongues.nc", "--layer", "e-alpha2", "--plot", "again.pdf")
+    assert again.returncode == 0, again.stderr
+    run = pendmap_command("tongues", "--omega", "2:2:1", "--json")
+    (curve,) = json.loads(run.stdout)["curves"]
+    assert {"omega", "p", "multiplier"} <= curve.keys()
+    assert curve["omega"] == 2.0
+    refused = pendmap_command("tongues", "--theta-r", 0.1)
+    assert refused.returncode == 2
+    assert "friction" in refused.stderr
+    refused = pendmap_command("tongues", "--omega", "3:1:5")
+    assert refused.returncode == 2
+    assert "lower one first" in refused.stderr
+
+
+def test_a_file_holds_all_of_it(whole: xr.Dataset, tmp_path: Path) -> None:
+    back = pendmap.load(pendmap.save(whole, tmp_path / "tongues.nc"))
+    assert back.equals(whole)
+    assert figures.draw(back, tmp_path / "tongues.svg").stat().st_size > 0
