@@ -38,13 +38,16 @@ if TYPE_CHECKING:
         read_experiment,
     )
     from pendmap.store import load, save
+    from pendmap.texture import BasinEntropy, basin_entropy
     from pendmap.trajectory import advance, simulate
+    from pendmap.uncertainty import UncertaintyExponent, uncertainty_exponent
 
     __version__: str
 
 __all__ = [
     "PRESETS",
     "Axis",
+    "BasinEntropy",
     "Effect",
     "EffectDefinition",
     "EffectParameter",
@@ -58,8 +61,10 @@ __all__ = [
     "Rig",
     "Run",
     "Segment",
+    "UncertaintyExponent",
     "__version__",
     "advance",
+    "basin_entropy",
     "basins",
     "basins_of",
     "effects",
@@ -72,17 +77,21 @@ __all__ = [
     "save",
     "save_model",
     "simulate",
+    "uncertainty_exponent",
 ]
 
 _HOMES = {
     "Axis": "grid",
+    "BasinEntropy": "texture",
     "Experiment": "records",
     "Finding": "records",
     "Grid": "grid",
     "NoiseFloor": "records",
     "Run": "records",
     "Segment": "records",
+    "UncertaintyExponent": "uncertainty",
     "advance": "trajectory",
+    "basin_entropy": "texture",
     "basins": "maps",
     "basins_of": "maps",
     "load": "store",
@@ -91,6 +100,7 @@ _HOMES = {
     "read_experiment": "records",
     "save": "store",
     "simulate": "trajectory",
+    "uncertainty_exponent": "uncertainty",
 }
 
 

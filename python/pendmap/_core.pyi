@@ -21,6 +21,7 @@ __all__ = [
     "simd",
     "simd_available",
     "simulate",
+    "texture",
 ]
 
 __version__: str
@@ -79,6 +80,7 @@ def simulate(
     tol: float,
     samples: int,
     lyapunov: bool,
+    live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
 ) -> dict[str, Any]: ...
 def basins_grid(
     parameters: _Parameters,
@@ -94,6 +96,7 @@ def basins_list(
     choices: _Choices,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def texture(labels: NDArray[np.int16], columns: int) -> dict[str, Any]: ...
 def orbits(
     parameters: _Parameters,
     winding: tuple[int, int],

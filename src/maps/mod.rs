@@ -5,7 +5,8 @@
 //! - [`basins`]: basins of attraction
 //! - [`label`]: every start to the attractor that captures it
 //! - [`layers`]: turns and exponents over a fixed time
-//! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
+//! - [`texture`], [`uncertainty`]: how fine the basins are; [`reliability`]: whether labels can be
+//!   believed
 //! - [`orbits`]: all closed orbits of one period and winding
 //! - [`control`]: progress, cancellation, threads
 
@@ -18,3 +19,4 @@ pub mod orbits;
 pub mod reliability;
 pub mod starts;
 pub mod texture;
+pub mod uncertainty;
