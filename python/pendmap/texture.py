@@ -60,7 +60,8 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
     ``S_bb = sum S_i / N_b`` over the N_b boxes with more than one label. ``S_b`` says how
     unpredictable ends are: 0 in one basin, ``ln K`` where K labels are spread at random. On a
     smooth boundary at most few boxes hold more than two labels, so ``S_bb`` stays below ``ln 2``;
-    above it the boundary is fractal. Below it nothing follows: many fractal boundaries are there.
+    above it the boundary is fractal. Below it nothing follows: many fractal boundaries are there,
+    and all of those between two labels alone.
     Both depend on the size of a cell; compare maps with cells of one size.
 
     Parameters

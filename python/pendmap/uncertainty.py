@@ -31,13 +31,15 @@ _LEAST_SCALES: Final = 3
 """Distances that a power law is fitted to at least."""
 _TELLING: Final = 5.0
 """Variance of a count above which its deviation is normal enough to judge the law by."""
-_UNLIKELY: Final = 0.05
+_UNLIKELY: Final = 0.01
 """Chance of a misfit below which the greatest distance is left out: there the law ends."""
 _PART: Final = 16
 """Distances on a grid reach up to this part of its shorter side."""
 _STRIPS: Final = 16
 """Strips of a grid that are left out one by one to see what the exponent owes to each."""
 _ROUNDS: Final = 100
+_TIMES: Final = 1.96
+"""Standard errors in half an interval."""
 _EPS: Final = 1e-12
 
 
@@ -122,11 +124,11 @@ def uncertainty_exponent(
     are thinner, the exponent is that of what is seen.
 
     The law is fitted by its binomial likelihood to the smallest distances, to all of them up to
-    where it breaks (a misfit less likely than 5 %), and the interval is widened by what misfit
+    where it breaks (a misfit less likely than 1 %), and the interval is widened by what misfit
     remains. On a grid neighbouring cells are no independent starts: they count for as many as the
-    spread between strips of the plane allows, and cells nearer to an edge than the greatest
-    distance are left out. So are starts with an unknown end near by, undecided or failed. Mirror
-    images count as attractors of their own.
+    spread between strips of the plane allows; beyond an edge that is not periodic lies the plane's
+    mirror image. Starts with an unknown end near by, undecided or failed, are left out. Mirror images
+    count as attractors of their own.
 
     Parameters
     ----------
@@ -184,29 +186,22 @@ def fitted(
         if np.count_nonzero(hit[:scales]) < _LEAST_SCALES:
             return None
         value, error, misfit, degrees = _law(far[:scales], hit[:scales], all_[:scales])
-        few = np.count_nonzero(hit[: scales - 1]) < max(_LEAST_SCALES, hit.size // 3)
+        few = np.count_nonzero(hit[: scales - 1]) < max(_LEAST_SCALES + 1, hit.size // 3)
         if degrees <= 1 or few or stats.chi2.sf(misfit, degrees) > _UNLIKELY:
             break
         scales -= 1
-    wide = 1.0 if degrees < 1 else max(1.0, misfit / degrees)
-    known = stats.t.ppf(0.975, degrees) if wide > 1 else stats.norm.ppf(0.975)
-    found = UncertaintyExponent(
+    wide = max(1.0, misfit / degrees) if degrees > 0 else 1.0
+    error *= math.sqrt(wide)
+    return UncertaintyExponent(
         value=value,
-        stderr=error * math.sqrt(wide),
-        ci95=(value, value),
+        stderr=error,
+        ci95=(value - _TIMES * error, value + _TIMES * error),
         eps=far,
         uncertain=hit.astype(np.int64),
         tried=all_.astype(np.int64),
         unit=unit,
         scales=scales,
     )
-    return _with_error(found, found.stderr, float(known))
-
-
-def _with_error(found: UncertaintyExponent, error: float, times: float) -> UncertaintyExponent:
-    low = min(found.ci95[0], found.value - times * error)
-    high = max(found.ci95[1], found.value + times * error)
-    return dataclasses.replace(found, stderr=error, ci95=(float(low), float(high)))
 
 
 def _law(eps: Floats, hit: Floats, tried: Floats) -> tuple[float, float, float, int]:
@@ -257,20 +252,20 @@ def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats
     steps = steps[steps <= max(shorter // _PART, 1)]
     strips = [np.linspace(0, side, min(_STRIPS, side) + 1)[:-1].astype(int) for side in cells.shape]
     counts: list[list[Floats]] = [[], []]
-    inner = cells > 0
-    for axis in (0, 1):  # the same starts for all distances, or the share of edges would change
-        if not periodic[axis]:
-            edge = np.s_[:, : steps[-1]] if axis else np.s_[: steps[-1]]
-            inner[edge] = False
-            np.flip(inner, axis=axis)[edge] = False
+    far, (height, width) = int(steps[-1]), cells.shape
+    # Beyond an edge lies the other one, or the plane's mirror image: its boundary is as dense.
+    wider = cells
+    for axis in (0, 1):
+        beyond = [(far, far) if k == axis else (0, 0) for k in (0, 1)]
+        wider = np.pad(wider, beyond, mode="wrap" if periodic[axis] else "symmetric")
     for step in steps.tolist():
-        known, uncertain = inner.copy(), np.zeros(cells.shape, dtype=bool)
-        for axis in (0, 1):
-            for way in (step, -step):
-                beside = np.roll(cells, way, axis=axis)
-                known &= beside > 0
-                uncertain |= beside != cells
-        for found, which in zip(counts, (known & uncertain, known), strict=True):
+        tried, uncertain = cells > 0, np.zeros(cells.shape, dtype=bool)
+        for down, right in ((step, 0), (-step, 0), (0, step), (0, -step)):
+            top, left = far + down, far + right
+            beside = wider[top : top + height, left : left + width]
+            tried &= beside > 0
+            uncertain |= beside != cells
+        for found, which in zip(counts, (tried & uncertain, tried), strict=True):
             rows = np.add.reduceat(which.astype(float), strips[0], axis=0)
             found.append(np.add.reduceat(rows, strips[1], axis=1))
     return steps.astype(float), np.array(counts[0]), np.array(counts[1])

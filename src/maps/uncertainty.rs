@@ -12,13 +12,13 @@ const SCALES: [i32; 2] = [-4, -26];
 /// Starts at every other distance that say how many each takes.
 const PILOT: usize = 256;
 /// Uncertain starts that are aimed at for each distance.
-const AIM: f64 = 400.0;
+const AIM: f64 = 600.0;
 /// Starts a distance, at least and at most.
 const STARTS: [f64; 2] = [200.0, 16_000.0];
 /// A distance with fewer uncertain starts in the pilot costs too many.
 const LEAST_UNCERTAIN: usize = 3;
 /// Labels in all: at least, over the cells of the map, and at most.
-const LABELS: [f64; 3] = [15_000.0, 0.125, 150_000.0];
+const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
 /// Labels of a start: its own and one on either side.
 const SIDES: usize = 3;
 

@@ -11,7 +11,7 @@
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
 //!   they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
-//! - [`maps`], [`layers`], [`threads`]: whole planes
+//! - [`maps`], [`layers`], [`uncertainty`], [`threads`]: whole planes
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
@@ -52,3 +52,4 @@ mod tangent;
 mod threads;
 mod traps;
 mod truths;
+mod uncertainty;
