@@ -13,7 +13,7 @@ from pendmap.model.units import RATE, Units
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
 from pendmap.texture import passes_log2
-from pendmap.uncertainty import fitted
+from pendmap.uncertainty import fitted_map
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def cells(
 
 
 def uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
-    """The counts of starts whose label changes nearby, over ``distance``; none without a boundary."""
+    """Counts of starts whose label changes nearby, over ``distance``; none without a boundary."""
     if not raw["uncertainty_eps"].size:
         return {}
     what = "distance in sides of the window"
@@ -164,8 +164,7 @@ def _boundary(dataset: xr.Dataset, raw: dict[str, Any]) -> dict[str, float]:
             passes_log2(raw["boundary_basin_entropy"], raw["boundary_stderr"])
         )
     if "uncertainty_eps" in dataset:
-        names = ("uncertainty_eps", "uncertain", "uncertainty_tried")
-        law = fitted(*(dataset[name].values for name in names))
+        law = fitted_map(dataset)
         if law is not None:
             found["uncertainty_exponent"] = law.value
             found["uncertainty_exponent_stderr"] = law.stderr

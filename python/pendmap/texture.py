@@ -69,7 +69,7 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
     labels : array_like of int, shape (M, N)
         Numbers of attractors from 1; 0 and below where the end is not known. Those cells are left
         out, as are cells beyond the last whole box; below 5 cells a side the whole side is a box.
-        Mirror images count as attractors of their own.
+        Attractors that are mirror images of one another count as two.
 
     Returns
     -------

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy import stats
+import xarray as xr
+from scipy.special import gammaincc
 
 from pendmap.errors import InputError
 from pendmap.notebook import Readable
@@ -18,14 +19,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     import numpy.typing as npt
-    import xarray as xr
 
     from pendmap.notebook import Table
 
     Floats = npt.NDArray[np.float64]
     Labels = npt.NDArray[np.int16]
 
-__all__ = ["UncertaintyExponent", "fitted", "uncertainty_exponent"]
+__all__ = ["UncertaintyExponent", "fitted", "fitted_map", "uncertainty_exponent"]
 
 _LEAST_SCALES: Final = 3
 """Distances that a power law is fitted to at least."""
@@ -127,8 +127,8 @@ def uncertainty_exponent(
     where it breaks (a misfit less likely than 1 %), and the interval is widened by what misfit
     remains. On a grid neighbouring cells are no independent starts: they count for as many as the
     spread between strips of the plane allows; beyond an edge that is not periodic lies the plane's
-    mirror image. Starts with an unknown end near by, undecided or failed, are left out. Mirror images
-    count as attractors of their own.
+    mirror image. Starts with an unknown end near by, undecided or failed, are left out. Attractors
+    that are mirror images of one another count as two.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def uncertainty_exponent(
     C. Grebogi, S. W. McDonald, E. Ott & J. A. Yorke (1983), Physics Letters A 99, 415;
     S. W. McDonald et al. (1985), Physica D 17, 125.
     """
-    if hasattr(labels, "attrs") and hasattr(labels, "data_vars"):
+    if isinstance(labels, xr.Dataset):
         return _of_map(labels)
     cells, _ = numbered(labels)
     eps, uncertain, tried = _on_grid(cells, periodic)
@@ -187,7 +187,7 @@ def fitted(
             return None
         value, error, misfit, degrees = _law(far[:scales], hit[:scales], all_[:scales])
         few = np.count_nonzero(hit[: scales - 1]) < max(_LEAST_SCALES + 1, hit.size // 3)
-        if degrees <= 1 or few or stats.chi2.sf(misfit, degrees) > _UNLIKELY:
+        if degrees <= 1 or few or gammaincc(degrees / 2, misfit / 2) > _UNLIKELY:
             break
         scales -= 1
     wide = max(1.0, misfit / degrees) if degrees > 0 else 1.0
@@ -238,7 +238,8 @@ def _spread(hit: Floats, tried: Floats) -> Floats:
     without = (hit.sum(axis=1, keepdims=True) - hit) / rest
     variance = (count - 1) * without.var(axis=1)
     binomial = np.maximum(share * (1 - share), _EPS) / whole
-    return np.maximum(variance / binomial, 1.0)
+    fewer: Floats = np.maximum(variance / binomial, 1.0)
+    return fewer
 
 
 def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats, Floats]:
@@ -271,14 +272,21 @@ def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats
     return steps.astype(float), np.array(counts[0]), np.array(counts[1])
 
 
-def _of_map(dataset: Any) -> UncertaintyExponent:  # noqa: ANN401 (a Dataset)
+def fitted_map(dataset: xr.Dataset) -> UncertaintyExponent | None:
+    """The law of a map that has counts; None where they are too few."""
+    eps, uncertain, tried = (
+        dataset[name].values for name in ("uncertainty_eps", "uncertain", "uncertainty_tried")
+    )
+    return fitted(eps, uncertain, tried)
+
+
+def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
     if "uncertainty_eps" not in dataset:
         raise InputError(
             "this dataset has no counts of uncertain starts: allowed are maps of pendmap.basins "
             "whose labels tell basins apart, made with check=True; or dataset['label']"
         )
-    names = ("uncertainty_eps", "uncertain", "uncertainty_tried")
-    found = fitted(*(dataset[name].values for name in names))
+    found = fitted_map(dataset)
     if found is None:
         raise InputError("too few starts of this map are uncertain: there is no exponent")
     return found

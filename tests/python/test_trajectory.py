@@ -155,7 +155,8 @@ def watched(pendulum: Pendulum | Rig, until: float, **words: Any) -> tuple[Any, 
 )
 @pytest.mark.parametrize("lyapunov", [False, True])
 def test_what_is_shown_meanwhile_is_the_trajectory_bit_for_bit(
-    pendulum: Pendulum | Rig, lyapunov: bool
+    pendulum: Pendulum | Rig,
+    lyapunov: bool,  # noqa: FBT001 (a parameter of the test)
 ) -> None:
     run, shown = watched(pendulum, 40.3, lyapunov=lyapunov)
     alone = pendmap.simulate(pendulum, 1.0, 0.5, 40.3, lyapunov=lyapunov)

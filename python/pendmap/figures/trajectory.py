@@ -34,8 +34,8 @@ LATE = 0.2
 FLAT = 0.1
 """Range in rad under which a history counts as a straight line."""
 
-MANY = 500
-"""Points of a section above which they are drawn smaller."""
+SIZES = ((500, 2.6), (20_000, 1.3), (math.inf, 0.6))
+"""Sizes of the points of a section, each up to so many of them."""
 
 UPSIDE_DOWN = 2.0
 """Energy over m g l of a pendulum that rests upside down."""
@@ -43,8 +43,8 @@ UPSIDE_DOWN = 2.0
 MOST_DRAWN = 20_000
 """Bins of a curve against time that is drawn by its lowest and highest values."""
 
-MOST_CURVE = 100_000
-"""Samples of the phase curve that are drawn of either part, the last ones."""
+MOST_PERIODS = 200
+"""Periods of which the phase curve is drawn whole; of more it is the last half of so many."""
 
 LEGEND_ROOM = 2.6
 """Inches of a panel whose title leaves room for a legend beside it."""
@@ -179,25 +179,27 @@ def resting(dataset: xr.Dataset) -> npt.NDArray[np.float64]:
 
 def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     theta, velocity = dataset["theta"].values, dataset["velocity"].values
-    late = _late(dataset["time"].values)
-    before = slice(max(late + 1 - MOST_CURVE, 0), late + 1)
-    after = slice(max(late, theta.size - MOST_CURVE), None)
-    early = plane.broken_at_wrap(theta[before], velocity[before])
-    last = plane.broken_at_wrap(theta[after], velocity[after])
+    late, first, which = _late(dataset["time"].values), 0, ""
+    if dataset.sizes["period"] > MOST_PERIODS:
+        beginning = dataset["section_time"].values[-1 - MOST_PERIODS // 2]
+        late = first = int(np.searchsorted(dataset["time"].values, beginning))
+        which = f", the last {MOST_PERIODS // 2} periods"
+    early = plane.broken_at_wrap(theta[first : late + 1], velocity[first : late + 1])
+    last = plane.broken_at_wrap(theta[late:], velocity[late:])
     axes.plot(early[:, 0], early[:, 1], color=_EARLY_COLOUR, lw=0.5)
     axes.plot(last[:, 0], last[:, 1], color=_LATE_COLOUR, lw=0.7)
     if dataset.attrs.get("stuck"):
         rest = plane.wrapped(theta[-1:])
         axes.plot(rest, velocity[-1:], "o", ms=3.5, mew=0, color=_LATE_COLOUR)
     style.phase_plane(axes, (-math.pi, math.pi), plane.padded(velocity), Units.of(dataset.attrs))
-    axes.set_title(mark + "phase plane")
+    axes.set_title(mark + "phase plane" + which)
 
 
 def _section(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     theta, velocity = dataset["section_theta"].values, dataset["section_velocity"].values
     time = dataset["time"].values
     late = dataset["section_time"].values >= time[_late(time)] if time.size else []
-    size = 1.3 if theta.size > MANY else 2.6
+    size = next(size for most, size in SIZES if theta.size <= most)
     for which, colour in ((~np.asarray(late, bool), _EARLY_COLOUR), (late, _LATE_COLOUR)):
         axes.plot(theta[which], velocity[which], "o", ms=size, mew=0, color=colour)
     speeds = plane.padded(dataset["velocity"].values)

@@ -144,15 +144,15 @@ class Live:
             self._widen(velocity)
             early = self._sent < _MOVING
             bins = trajectory.BINS if early else _LATER
-            trajectory.series(self._stream, self._attrs, time, theta, velocity, bins)
+            motion = trajectory.Motion(time, theta, velocity)
+            trajectory.series(self._stream, self._attrs, motion, bins)
             whole, since = np.concatenate([self._before, block], axis=1), self._before.shape[1]
             every = 1 if early else -(-time.size // _LATER)
-            trajectory.moving(self._stream, self._attrs, *whole, since=since, every=every)
+            motion = trajectory.Motion(*whole)
+            trajectory.moving(self._stream, self._attrs, motion, since=since, every=every)
             period = np.round(time / self._period).astype(np.int64)
             once = np.abs(time / self._period - period) < 1e-9 * (1 + np.abs(period))
-            if once.any():
-                points = (values[once] for values in (time, theta, velocity, period))
-                trajectory.section(self._stream, *points)
+            trajectory.section(self._stream, time[once], theta[once], velocity[once], period[once])
         self._sent += time.size
         kept = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
         self._before = whole[:, -kept:]

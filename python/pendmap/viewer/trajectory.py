@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BINS",
+    "Motion",
     "behind",
     "blueprint",
     "curve",
@@ -71,6 +73,20 @@ _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "omega": (names.speed, (213, 94, 0)),
     "energy": (lambda _: "energy E / (m g l)", (0, 158, 115)),
 }
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Samples of a trajectory: times, angles, velocities, three arrays of one length."""
+
+    time: Floats
+    theta: Floats
+    velocity: Floats
+
+    def part(self, first: int, last: int) -> Motion:
+        """Return the samples from one number up to, without, another."""
+        cut = slice(first, last)
+        return Motion(self.time[cut], self.theta[cut], self.velocity[cut])
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
@@ -119,12 +135,13 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     attrs = dataset.attrs
     still(stream, attrs, frame_of(attrs, velocity))
     summary(stream, dataset)
-    series(stream, attrs, time, theta, velocity, BINS)
+    motion = Motion(time, theta, velocity)
+    series(stream, attrs, motion, BINS)
     first, last = min(time.size, MOVING), max(time.size - MOVING, MOVING)
-    moving(stream, attrs, time[:first], theta[:first], velocity[:first])
+    moving(stream, attrs, motion.part(0, first))
     if last < time.size:
         rest(stream, float(time[first]))
-        moving(stream, attrs, time[last:], theta[last:], velocity[last:])
+        moving(stream, attrs, motion.part(last, time.size))
     curve(stream, theta, velocity)
     section(
         stream,
@@ -192,16 +209,9 @@ def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) ->
     )
 
 
-def series(  # noqa: PLR0913 (where, what, and how much of it)
-    stream: rr.RecordingStream,
-    attrs: Attributes,
-    time: Floats,
-    theta: Floats,
-    velocity: Floats,
-    bins: int,
-) -> None:
+def series(stream: rr.RecordingStream, attrs: Attributes, motion: Motion, bins: int) -> None:
     """Log angle, velocity and energy against time, by their lowest and highest in so many bins."""
-    units = Units.of(attrs)
+    units, theta, velocity = Units.of(attrs), motion.theta, motion.velocity
     for name, values in (
         ("theta", theta),
         ("omega", velocity),
@@ -211,16 +221,15 @@ def series(  # noqa: PLR0913 (where, what, and how much of it)
         path = f"state/{name}"
         style = rr.SeriesLines(colors=[colour], names=[said(units)], widths=[1.5])
         stream.log(path, style, static=True)
-        at, shown = curves.envelope(time, values, bins)
+        at, shown = curves.envelope(motion.time, values, bins)
         stream.send_columns(path, [columns.at(at)], rr.Scalars.columns(scalars=shown))
 
 
-def moving(  # noqa: PLR0913 (where, what, and how much of it)
+def moving(
     stream: rr.RecordingStream,
     attrs: Attributes,
-    time: Floats,
-    theta: Floats,
-    velocity: Floats,
+    motion: Motion,
+    *,
     since: int = 0,
     every: int = 1,
 ) -> None:
@@ -230,6 +239,7 @@ def moving(  # noqa: PLR0913 (where, what, and how much of it)
     -(p / omega^2) cos(omega tau + phase). Samples before ``since`` have been logged and are there
     for the trail; of the others every so many are.
     """
+    time, theta, velocity = motion.time, motion.theta, motion.velocity
     omega, phase = float(attrs["omega"]), float(attrs.get("phase", 0.0))
     stroke = math.copysign(_stroke(attrs), float(attrs["p"]))
     tau = Units.of(attrs).bare(time, TIME)
@@ -270,13 +280,13 @@ def rest(stream: rr.RecordingStream, time: float) -> None:
 
 
 def curve(stream: rr.RecordingStream, theta: Floats, velocity: Floats) -> None:
-    """Log the curve in the phase plane, broken where the angle wraps; of a long one the last part."""
+    """Log the curve in the phase plane, broken where the angle wraps; of a long one the end."""
     points = plane.broken_at_wrap(theta[-CURVE:], velocity[-CURVE:]).astype(np.float32)
     lines = rr.LineStrips2D([points], colors=[LINE], radii=rr.Radius.ui_points(0.6))
     stream.log("phase/data/curve", lines, static=True)
 
 
-def section(  # noqa: PLR0913 (where, and what)
+def section(
     stream: rr.RecordingStream,
     time: Floats,
     theta: Floats,
