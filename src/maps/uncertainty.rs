@@ -7,16 +7,19 @@ use super::starts::Axis;
 use crate::error::Error;
 use crate::integrate::State;
 
-/// Distances are powers of two of the window's sides, from the first to the last exponent.
-const SCALES: [i32; 2] = [-4, -26];
+/// Distances are powers of two of the window's sides, from the first to the last exponent. Greater
+/// ones see several strips of a basin at once, where the law has not begun.
+const SCALES: [i32; 2] = [-6, -26];
 /// Starts at every other distance that say how many each takes.
-const PILOT: usize = 256;
+const PILOT: usize = 512;
 /// Uncertain starts that are aimed at for each distance.
 const AIM: f64 = 600.0;
 /// Starts a distance, at least and at most.
 const STARTS: [f64; 2] = [200.0, 16_000.0];
-/// A distance with fewer uncertain starts in the pilot costs too many.
-const LEAST_UNCERTAIN: usize = 3;
+/// Uncertain starts in the pilot that tell the share.
+const LEAST_TELLING: usize = 3;
+/// A distance at which fewer are expected from the most starts says too little.
+const LEAST_UNCERTAIN: f64 = 40.0;
 /// Labels in all: at least, over the cells of the map, and at most.
 const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
 /// Labels of a start: its own and one on either side.
@@ -88,21 +91,29 @@ pub fn uncertainty(
 
 /// Distances, and starts for each, from the pilot's counts.
 fn plan(pilot: &[(i32, usize)], seen: &[[u64; 2]], labels: f64) -> Vec<(i32, usize)> {
-    let told = seen.iter().take_while(|c| c[0] as usize >= LEAST_UNCERTAIN).count();
+    let told = seen.iter().take_while(|c| c[0] as usize >= LEAST_TELLING).count();
     if told == 0 {
         return Vec::new();
     }
-    let share = |k: usize| seen[k.min(told - 1)][0] as f64 / seen[k.min(told - 1)][1].max(1) as f64;
+    let share = |k: usize| seen[k][0] as f64 / seen[k][1].max(1) as f64;
     let mut wanted: Vec<(i32, f64)> = Vec::new();
-    for k in 0..told {
-        // Between two distances of the pilot, and once beyond the last, the share falls evenly.
-        let here = share(k);
-        let next = if k + 1 < told { share(k + 1) } else { 0.5 * here };
-        for (scale, share) in [(pilot[k].0, here), (pilot[k].0 - 1, (here * next).sqrt())] {
-            if scale >= SCALES[1] {
-                wanted.push((scale, (AIM / share).clamp(STARTS[0], STARTS[1])));
-            }
+    let mut add = |scale: i32, share: f64| {
+        let enough = share * STARTS[1] >= LEAST_UNCERTAIN && scale >= SCALES[1];
+        if enough {
+            wanted.push((scale, (AIM / share).clamp(STARTS[0], STARTS[1])));
         }
+        enough
+    };
+    for k in 0..told {
+        add(pilot[k].0, share(k));
+        if k + 1 < told {
+            add(pilot[k].0 - 1, (share(k) * share(k + 1)).sqrt());
+        }
+    }
+    // Beyond what the pilot tells the share may fall as on a smooth boundary.
+    let (mut scale, mut expected) = (pilot[told - 1].0 - 1, 0.5 * share(told - 1));
+    while add(scale, expected) {
+        (scale, expected) = (scale - 1, 0.5 * expected);
     }
     let all: f64 = SIDES as f64 * wanted.iter().map(|(_, starts)| starts).sum::<f64>();
     let part = (labels / all).min(1.0);

@@ -57,7 +57,7 @@ fn random_labels_are_uncertain_at_any_distance() {
         1 + ((mixed >> 40) % 2) as i16
     };
     let found = measured(100, 0, random);
-    assert!(found.eps.first() == Some(&2_f64.powi(-4)) && found.eps.last() < Some(&2e-8));
+    assert!(found.eps.first() == Some(&2_f64.powi(-6)) && found.eps.last() < Some(&2e-8));
     let far = deviations(&found, |_| 0.75).into_iter().filter(|d| d.abs() > 3.0).count();
     assert!(far <= 1, "{found:?}");
 }

@@ -125,7 +125,8 @@ class Live:
         velocity = dataset["velocity"].values
         with frame.strict():
             self._frame(velocity)
-            trajectory.curve(self._stream, dataset["theta"].values, velocity)
+            motion = trajectory.Motion(dataset["time"].values, dataset["theta"].values, velocity)
+            trajectory.curve(self._stream, self._attrs, motion)
             trajectory.summary(self._stream, dataset)
         try:
             self._stream.flush(timeout_sec=_FLUSH)

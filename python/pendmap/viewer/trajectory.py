@@ -65,8 +65,8 @@ MOVING = 100_000
 BINS = 100_000
 """Bins of a long series, which is logged by its lowest and highest values."""
 
-CURVE = 200_000
-"""Samples of the phase curve that are drawn, the last ones."""
+CURVE, CURVE_PERIODS = 200_000, 100
+"""Samples and periods of the phase curve that are drawn at most, the last ones."""
 
 _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "theta": (lambda _: names.ANGLE, (0, 114, 178)),
@@ -142,7 +142,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     if last < time.size:
         rest(stream, float(time[first]))
         moving(stream, attrs, motion.part(last, time.size))
-    curve(stream, theta, velocity)
+    curve(stream, attrs, motion)
     section(
         stream,
         dataset["section_time"].values.astype(float),
@@ -279,10 +279,15 @@ def rest(stream: rr.RecordingStream, time: float) -> None:
     stream.reset_time()
 
 
-def curve(stream: rr.RecordingStream, theta: Floats, velocity: Floats) -> None:
-    """Log the curve in the phase plane, broken where the angle wraps; of a long one the end."""
-    points = plane.broken_at_wrap(theta[-CURVE:], velocity[-CURVE:]).astype(np.float32)
-    lines = rr.LineStrips2D([points], colors=[LINE], radii=rr.Radius.ui_points(0.6))
+def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Motion) -> None:
+    """Log the curve in the phase plane of the last periods, broken where the angle wraps."""
+    period = Units.of(attrs).given(2 * math.pi / (float(attrs["omega"]) or 1.0), TIME)
+    first = int(np.searchsorted(motion.time, motion.time[-1] - CURVE_PERIODS * period))
+    first = max(first, motion.time.size - CURVE)
+    points = plane.broken_at_wrap(motion.theta[first:], motion.velocity[first:])
+    lines = rr.LineStrips2D(
+        [points.astype(np.float32)], colors=[LINE], radii=rr.Radius.ui_points(0.6)
+    )
     stream.log("phase/data/curve", lines, static=True)
 
 
