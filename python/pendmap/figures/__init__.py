@@ -37,6 +37,7 @@ __all__ = [
     "draw_pendulum",
     "draw_record",
     "draw_runs",
+    "draw_tumbling",
     "write_report",
 ]
 
@@ -60,7 +61,8 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     Of a basin map: the labels, with the attractors marked and named with their shares, and the
     settle time beside them; where the labels are unreliable, settle time and net turns lead; where
     labels tell nothing, the net turns and the finite-time exponent. Of closed orbits: their paths
-    and points in the phase plane. Of a trajectory: time history, phase plane, Poincare section.
+    and points in the phase plane. Of a trajectory: time history, energy, phase plane, Poincare
+    section.
 
     Parameters
     ----------
@@ -71,7 +73,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
         Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map;
-        ``history``, ``phase`` or ``section`` of a trajectory.
+        ``history``, ``energy``, ``phase`` or ``section`` of a trajectory.
     size : (float, float), optional
         Width and height in inches; by default as large as the parts need.
     dpi : float, optional
@@ -366,4 +368,30 @@ def draw_pendulum(
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         style.write(pendulum.figure(size=size, dpi=resolution, title=title), part)
+    return Path(path)
+
+
+def draw_tumbling(
+    runs: Sequence[xr.Dataset],
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+    title: str | None = None,
+) -> Path:
+    """Draw time history, phase plane and Poincare section of trajectories, a column each: figure 2.
+
+    Parameters
+    ----------
+    runs : sequence of Dataset
+        Trajectories of :func:`pendmap.simulate`, from the instant from which they are shown.
+    path, size, dpi, title
+        As for :func:`draw_pendulum`, whose result and errors are those here.
+    """
+    from pendmap.figures import tumbling  # noqa: PLC0415 (likewise)
+
+    resolution = style.resolution(dpi)
+    style.check_size(size, resolution)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(tumbling.figure(runs, size=size, dpi=resolution, title=title), part)
     return Path(path)
