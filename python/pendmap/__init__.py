@@ -44,13 +44,16 @@ if TYPE_CHECKING:
         read_experiment,
     )
     from pendmap.store import load, save
+    from pendmap.texture import BasinEntropy, basin_entropy
     from pendmap.trajectory import advance, simulate
+    from pendmap.uncertainty import UncertaintyExponent, uncertainty_exponent
 
     __version__: str
 
 __all__ = [
     "PRESETS",
     "Axis",
+    "BasinEntropy",
     "Effect",
     "EffectDefinition",
     "EffectParameter",
@@ -64,8 +67,10 @@ __all__ = [
     "Rig",
     "Run",
     "Segment",
+    "UncertaintyExponent",
     "__version__",
     "advance",
+    "basin_entropy",
     "basins",
     "basins_of",
     "bifurcation",
@@ -84,17 +89,21 @@ __all__ = [
     "save_model",
     "simulate",
     "tongues",
+    "uncertainty_exponent",
 ]
 
 _HOMES = {
     "Axis": "grid",
+    "BasinEntropy": "texture",
     "Experiment": "records",
     "Finding": "records",
     "Grid": "grid",
     "NoiseFloor": "records",
     "Run": "records",
     "Segment": "records",
+    "UncertaintyExponent": "uncertainty",
     "advance": "trajectory",
+    "basin_entropy": "texture",
     "basins": "maps",
     "basins_of": "maps",
     "bifurcation": "diagrams",
@@ -109,6 +118,7 @@ _HOMES = {
     "save": "store",
     "simulate": "trajectory",
     "tongues": "critical_curves",
+    "uncertainty_exponent": "uncertainty",
 }
 
 

@@ -24,6 +24,7 @@ __all__ = [
     "simd",
     "simd_available",
     "simulate",
+    "texture",
     "tongues",
 ]
 
@@ -94,6 +95,7 @@ def simulate(
     tol: float,
     samples: int,
     lyapunov: bool,
+    live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
 ) -> dict[str, Any]: ...
 def basins_grid(
     parameters: _Parameters,
@@ -109,6 +111,7 @@ def basins_list(
     choices: _Choices,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
+def texture(labels: NDArray[np.int16], columns: int) -> dict[str, Any]: ...
 def orbits(
     parameters: _Parameters,
     winding: tuple[int, int],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,6 +12,8 @@ from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, Units
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import summarise
+from pendmap.texture import passes_log2
+from pendmap.uncertainty import fitted_map
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum, Rig
 
-__all__ = ["RELIABLE", "cells", "complete", "table"]
+__all__ = ["RELIABLE", "cells", "complete", "table", "uncertain_starts"]
 
 RELIABLE: Final = 0.05
 """Labels of which a larger share changes under half the step or mirroring are not reliable."""
@@ -73,6 +76,26 @@ def cells(
     return cells
 
 
+def uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
+    """Counts of starts whose label changes nearby, over ``distance``; none without a boundary."""
+    if not raw["uncertainty_eps"].size:
+        return {}
+    what = "distance in sides of the window"
+    return {
+        "uncertainty_eps": ("distance", raw["uncertainty_eps"], {"units": "1", "long_name": what}),
+        "uncertain": (
+            "distance",
+            raw["uncertain"].astype(np.int64),
+            {"long_name": "starts with another label at this distance on one side or the other"},
+        ),
+        "uncertainty_tried": (
+            "distance",
+            raw["uncertainty_tried"].astype(np.int64),
+            {"long_name": "starts with known ends, drawn anew for each distance"},
+        ),
+    }
+
+
 def complete(
     dataset: xr.Dataset,
     raw: dict[str, Any],
@@ -108,6 +131,7 @@ def complete(
         "mean_settle": float(settled.mean()) if settled.size else -1.0,
         "longest_settle": int(settled.max()) if settled.size else -1,
         "basin_entropy": raw["basin_entropy"],
+        **_boundary(dataset, raw),
         "neighbours_agree": raw["neighbours_agree"],
         "neighbours_chance": raw["chance"],
         "unreliable": raw["unreliable"],
@@ -126,6 +150,28 @@ def complete(
     pendulum, _ = without_dimensions(model)
     dataset.attrs["summary"] = summarise(dataset, pendulum, bound_was_chosen=chosen)
     return dataset
+
+
+def _boundary(dataset: xr.Dataset, raw: dict[str, Any]) -> dict[str, float]:
+    """What tells how fractal the boundary is, as far as there is one."""
+    found: dict[str, float] = {}
+    if raw["boundary_boxes"]:
+        found["boundary_basin_entropy"] = raw["boundary_basin_entropy"]
+        found["boundary_boxes"] = raw["boundary_boxes"]
+        if math.isfinite(raw["boundary_stderr"]):
+            found["boundary_basin_entropy_stderr"] = raw["boundary_stderr"]
+        found["log2_criterion"] = int(
+            passes_log2(raw["boundary_basin_entropy"], raw["boundary_stderr"])
+        )
+    if "uncertainty_eps" in dataset:
+        law = fitted_map(dataset)
+        if law is not None:
+            found["uncertainty_exponent"] = law.value
+            found["uncertainty_exponent_stderr"] = law.stderr
+            found["uncertainty_exponent_low"], found["uncertainty_exponent_high"] = law.ci95
+            found["uncertainty_eps_low"] = float(law.eps[0])
+            found["uncertainty_eps_high"] = float(law.eps[law.scales - 1])
+    return found
 
 
 def table(attractors: list[dict[str, Any]], count: int, units: Units) -> dict[str, Any]:

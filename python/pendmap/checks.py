@@ -101,8 +101,8 @@ def flag(name: str, value: object) -> bool:
     return value
 
 
-def call(name: str, value: object) -> None:
-    """Refuse what is neither ``None`` nor can be called.
+def call(name: str, value: object, of: str = "two numbers, done and in all") -> None:
+    """Refuse what is neither ``None`` nor can be called, as a function ``of`` something.
 
     Raises
     ------
@@ -110,8 +110,7 @@ def call(name: str, value: object) -> None:
         If it is something else.
     """
     if value is not None and not callable(value):
-        allowed = "allowed is a function of two numbers, done and in all"
-        raise InputError(f"{name} is {shown(value)}: {allowed}")
+        raise InputError(f"{name} is {shown(value)}: allowed is a function of {of}")
 
 
 def of_type(name: str, value: object, kind: type, example: str) -> None:

@@ -33,6 +33,7 @@ __all__ = [
 TABLE: Final = "table1"
 FIGURES: Final = {
     "1": "Critical curves, and the three strange attractors",
+    "2": "Tumbling chaos",
     "3": "The parametric pendulum",
     "4": "A decay, its velocity and half cycles",
     "5": "The decrement of each three peaks",
@@ -41,7 +42,9 @@ FIGURES: Final = {
     TABLE: "Damping by each method, and what its simulation misses (%)",
 }
 """What can be drawn, by the names a user types."""
-_LATER: Final = ("2", "8", "9")
+_LATER: Final = ("8", "9")
+_TRANSIENT: Final = 500
+"""Periods that are left out before figure 2 begins."""
 _PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
 
 PRINTED: Final = {
@@ -95,6 +98,23 @@ def report(seed: int = 0) -> IdentificationReport:
         return identify_experiment(read_experiment(path))
 
 
+def tumbling(periods: int = 6000) -> list[xr.Dataset]:
+    """Return trajectories at the paper's three points of tumbling chaos, without their transients.
+
+    Each begins at ``theta = 1`` at rest; the first 500 of all ``periods`` are left out.
+    """
+    from pendmap.model import PRESETS  # noqa: PLC0415 (likewise)
+    from pendmap.trajectory import simulate  # noqa: PLC0415
+
+    runs = []
+    for name in ("fig2a", "fig2b", "fig2c"):
+        pendulum, samples = PRESETS[name], 48
+        run = simulate(pendulum, 1.0, 0.0, periods * pendulum.period, tol=1e-7, samples=samples)
+        after = {"time": slice(_TRANSIENT * samples, None), "period": slice(_TRANSIENT, None)}
+        runs.append(run.isel(after))
+    return runs
+
+
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     """Draw one figure, or the table, into a file.
 
@@ -123,6 +143,8 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":
         return figures.draw_tongues(_critical(), path, title=title, marks=_strange())
+    if key == "2":
+        return figures.draw_tumbling(tumbling(), path, title=title)
     if key == "3":
         return figures.draw_pendulum(path, title=title)
     found = report(seed)

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.model.units import TIME, Units
-from pendmap.words import counted
+from pendmap.words import counted, written
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -146,6 +146,8 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
             f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
             f"{rate}{mirror}."
         )
+    if len(lines) > 1:
+        lines.append("These shares are the basin stability in this window.")
     if not lines:
         lines.append("No attractor was found.")
     return lines
@@ -165,6 +167,29 @@ def _own_period(attrs: Mapping[Any, Any]) -> str:
     return f"{units.own_period} = {units.given(math.tau, TIME):.4g} s" if units.si else "2 pi"
 
 
+def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
+    """Say how fractal the boundary is, as far as there is one."""
+    lines = []
+    if "boundary_basin_entropy" in attrs:
+        value = attrs["boundary_basin_entropy"]
+        line = f"Boundary basin entropy {value:.3f}"
+        if attrs["log2_criterion"]:
+            line += " is above ln 2 = 0.693: the boundary is fractal (log 2 criterion)"
+        lines.append(f"{line}.")
+    if "uncertainty_exponent" in attrs:
+        value, error = attrs["uncertainty_exponent"], attrs["uncertainty_exponent_stderr"]
+        low, high = (attrs[f"uncertainty_exponent_{end}"] for end in ("low", "high"))
+        value, low, high, dimension = (
+            written(number, error) for number in (value, low, high, 2 - value)
+        )
+        near, far = attrs["uncertainty_eps_low"], attrs["uncertainty_eps_high"]
+        lines.append(
+            f"Uncertainty exponent {value} [{low}, {high}], boundary dimension {dimension}, from "
+            f"distances of {near:.1e} to {far:.1e} of the window."
+        )
+    return lines
+
+
 def _texture(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     if not (dataset["label"] > 0).any():
@@ -178,6 +203,7 @@ def _texture(dataset: xr.Dataset) -> list[str]:
             f"Basin entropy {a['basin_entropy']:.3f}; neighbouring cells agree in "
             f"{100 * agree:.1f} %, chance alone gives {100 * chance:.1f} %{verdict}."
         )
+        lines += _boundary(a)
     if a["labels_sampled"]:
         halved = f"half the step changes {100 * a['unreliable_half_step']:.1f} %"
         mirror = a.get("unreliable_mirror")

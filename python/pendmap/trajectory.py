@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core, checks
+from pendmap.energy import FORMULA, energy
 from pendmap.errors import InputError
 from pendmap.grid import starts
 from pendmap.model import Units, without_dimensions
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.model import Pendulum, Rig
+
+    Floats = NDArray[np.float64]
+    Live = Callable[[Floats, Floats, Floats], object]
 
 __all__ = ["advance", "simulate"]
 
@@ -45,8 +49,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol: float = 1e-9,
     samples: int | None = None,
     lyapunov: bool = False,
+    live: Live | None = None,
 ) -> xr.Dataset:
-    """One trajectory, its time history and its stroboscopic (Poincare) section.
+    """One trajectory: time history, stroboscopic (Poincare) section and energy.
 
     Parameters
     ----------
@@ -74,12 +79,18 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         and ``exponent_to`` say from which tau to which). It is the exponent of an attractor only if
         the trajectory was on it all that time: a chaotic transient has a positive one, wherever it
         ends. :func:`pendmap.basins` gives those of the attractors. Sticking may leave none.
+    live : callable, optional
+        Called with times, angles and velocities, three arrays of one length in the units of the
+        result, of the samples that are new since the last call: about every 50 ms while it
+        integrates, and at the end. Their values are those of the result. With it Ctrl-C ends the
+        trajectory with the last sample instead of raising; the attribute ``interrupted`` is 1 then.
 
     Returns
     -------
     xarray.Dataset
-        ``theta`` (not wrapped) and ``velocity`` over ``time``; ``section_theta`` (wrapped to
-        (-pi, pi]) and ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn,
+        ``theta`` (not wrapped), ``velocity`` and ``energy`` (over m g l, ``v^2 / 2 + 1 - cos
+        theta``, 0 at rest) over ``time``; ``section_theta`` (wrapped to (-pi, pi]) and
+        ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn,
         stick, release, stuck for ever) and ``event_theta`` over ``event``, located to rounding. The
         attribute ``stuck`` is 1 if friction holds the pendulum at the end.
 
@@ -87,9 +98,12 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is not finite or outside its range.
+    KeyboardInterrupt
+        After Ctrl-C, without ``live`` or before the first sample.
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
+    checks.call("live", live, "three arrays, times, angles and velocities")
     theta, velocity = checks.number("theta", theta), checks.number("velocity", velocity)
     until, tol = checks.number("until", until), checks.number("tol", tol)
     lyapunov = checks.flag("lyapunov", lyapunov)
@@ -111,12 +125,16 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     try:
         start = (theta, units.bare(velocity, VELOCITY))
         end = units.bare(until, TIME)
-        raw = _core.simulate(pendulum.parameters, start, end, tol, samples, lyapunov)
+        shown = None if live is None else _in_units(live, units)
+        raw = _core.simulate(pendulum.parameters, start, end, tol, samples, lyapunov, shown)
     except ValueError as error:
         raise InputError(str(error)) from None
     time, speed = units.given(raw["time"], TIME), units.given(raw["velocity"], VELOCITY)
     event_time = units.given(raw["event_time"], TIME)
-    angle = raw["theta"][::samples]
+    once = np.arange(0, time.size, samples)
+    if raw["time"][once[-1]] < (1 - 1e-9) * once[-1] / samples * pendulum.period:
+        once = once[:-1]  # the end, between two samples
+    angle = raw["theta"][once]
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
     dataset = xr.Dataset(
         {
@@ -126,9 +144,14 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
                 speed,
                 {"units": units.of_velocity, "long_name": units.derivative},
             ),
+            "energy": (
+                "time",
+                energy(raw["theta"], speed, model.attributes),
+                {"units": "1", "long_name": "energy over m g l", "formula": FORMULA},
+            ),
             "section_theta": ("period", wrapped, {"units": "rad"}),
-            "section_velocity": ("period", speed[::samples], {"units": units.of_velocity}),
-            "section_time": ("period", time[::samples], {"units": units.of_time}),
+            "section_velocity": ("period", speed[once], {"units": units.of_velocity}),
+            "section_time": ("period", time[once], {"units": units.of_time}),
             "event_time": ("event", event_time, {"units": units.of_time}),
             "event_kind": ("event", np.array(raw["event_kind"], dtype="U14")),
             "event_theta": ("event", raw["event_theta"], {"units": "rad"}),
@@ -139,6 +162,10 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         },
     )
     turns = round((float(raw["theta"][-1]) - theta) / math.tau)
+    asked = {}
+    if raw["interrupted"]:
+        asked = {"interrupted": 1, "until_asked": until}
+        until = float(time[-1])
     dataset.attrs = {
         "kind": "trajectory",
         "title": model.title,
@@ -146,6 +173,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "theta0": theta,
         "velocity0": velocity,
         "until": until,
+        **asked,
         "tol": tol,
         "reached_error": raw["reached_error"],
         "end_error": raw["end_error"],
@@ -161,6 +189,15 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         [_summary(dataset, units), *of_motion(model.effects, "angle and velocity here are")]
     )
     return dataset
+
+
+def _in_units(live: Live, units: Units) -> Live:
+    """Return what hands samples over in these units."""
+
+    def shown(times: Floats, theta: Floats, velocity: Floats) -> None:
+        live(units.given(times, TIME), theta, units.given(velocity, VELOCITY))
+
+    return shown
 
 
 def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
@@ -199,14 +236,20 @@ def _since_start(turns: int) -> str:
 def _summary(dataset: xr.Dataset, units: Units) -> str:
     a = dataset.attrs
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
-    lines = [
+    lines = []
+    if a.get("interrupted"):
+        asked = units.at(format(a["until_asked"], "g"))
+        lines.append(f"INTERRUPTED before {asked}: this is what was computed until then.")
+    error = a["end_error"]
+    at_end = f" and by {error:.1e} at the end" if math.isfinite(error) else ""
+    lines += [
         (
             f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad"
             f"{_since_start(a['turns'])}, velocity = {units.spoken(format(velocity, '.9g'))}."
         ),
         (
             f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
-            f"after 5 periods and by {a['end_error']:.1e} at the end "
+            f"after 5 periods{at_end} "
             f"({a['steps_per_period']} steps a period)."
         ),
     ]

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::accuracy::{PERIODS, TOLERANCES};
 use super::course::{Course, FINEST};
 use super::event::{Event, EventKind};
-use super::flight::Flight;
 use super::sample::{Sampled, sample};
 use super::stroboscopic::State;
 use super::tangent::{Number, Tangent};
@@ -50,6 +49,8 @@ pub struct Trajectory {
     pub stuck: bool,
     /// Turns, sticks and releases.
     pub events: Vec<Event>,
+    /// Whether it was stopped before its last time; nothing is known of the error at its end then.
+    pub interrupted: bool,
 }
 
 /// What to compute.
@@ -78,12 +79,29 @@ pub fn simulate(
     request: &Request,
     cancel: &AtomicBool,
 ) -> Result<Trajectory, Error> {
+    let run = simulate_watched(pendulum, request, cancel, &mut |_, _| ())?;
+    if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
+}
+
+/// The same, and each sample is shown to `seen`, with its time, as soon as it is known. If `cancel` is
+/// set after the first of them the trajectory ends with the last one.
+///
+/// # Errors
+/// As of [`simulate`]; [`Error::Interrupted`] only before there is a sample.
+pub fn simulate_watched(
+    pendulum: &Pendulum,
+    request: &Request,
+    cancel: &AtomicBool,
+    seen: &mut dyn FnMut(f64, State),
+) -> Result<Trajectory, Error> {
     check(request)?;
     // Far from 0 the angle's last place would be all that steps can resolve: whole turns wait outside.
     let far = request.start[0].abs() > FAR && pendulum.check_mappable().is_ok();
     let turns = if far { TAU * (request.start[0] / TAU).round() } else { 0.0 };
     let start = [request.start[0] - turns, request.start[1]];
-    let mut trajectory = from(pendulum, &Request { start, ..*request }, cancel)?;
+    let nearer = Request { start, ..*request };
+    let mut shown = |time: f64, [theta, velocity]: State| seen(time, [theta + turns, velocity]);
+    let mut trajectory = from(pendulum, &nearer, cancel, &mut shown)?;
     if far {
         for theta in &mut trajectory.theta {
             *theta += turns;
@@ -95,32 +113,56 @@ pub fn simulate(
     Ok(trajectory)
 }
 
-fn from(pendulum: &Pendulum, request: &Request, cancel: &AtomicBool) -> Result<Trajectory, Error> {
+fn from(
+    pendulum: &Pendulum,
+    request: &Request,
+    cancel: &AtomicBool,
+    seen: &mut dyn FnMut(f64, State),
+) -> Result<Trajectory, Error> {
     let (tolerance, reached_error) = choose(pendulum, request, cancel)?;
     let interval = pendulum.period() / request.samples as f64;
-    let time = times(request.until, interval);
-    let coarse = Run::to(pendulum, request, &[request.until], TIGHTENING * tolerance, cancel)?;
-    let (run, growth) = if request.lyapunov {
-        Run::stretched(pendulum, request, &time, tolerance, cancel)?
-    } else {
-        (Run::to(pendulum, request, &time, tolerance, cancel)?, Vec::new())
+    let mut time = times(request.until, interval);
+    seen(time[0], request.start);
+    let mut known = 1;
+    let mut show = |new: &mut dyn Iterator<Item = State>| {
+        for state in new {
+            seen(time[known], state);
+            known += 1;
+        }
     };
+    let (mut run, mut growth) = if request.lyapunov {
+        Run::stretched(pendulum, request, &time, tolerance, cancel, &mut show)
+    } else {
+        (Run::to(pendulum, request, &time, tolerance, cancel, &mut show), Vec::new())
+    };
+    let interrupted = known < time.len() && cancel.load(Ordering::Relaxed);
+    if interrupted {
+        time.truncate(known);
+        run.states.truncate(known);
+        growth.truncate(known - 1);
+    }
     let end = run.states[run.states.len() - 1];
     if !(end[0].is_finite() && end[1].is_finite()) {
         return Err(Error::Diverges);
     }
-    let periods = request.until / pendulum.period();
+    let last = time[time.len() - 1];
+    // What the last, unfinished step met lies beyond the last sample.
+    run.events.retain(|event| !interrupted || event.tau <= last);
+    let coarse = Run::to(pendulum, request, &[last], TIGHTENING * tolerance, cancel, &mut |_| ());
+    let unknown = cancel.load(Ordering::Relaxed);
+    let periods = last / pendulum.period();
     // What is held for ever neither parts nor comes together any more.
     let held = run.events.last().is_some_and(|e| e.kind == EventKind::StuckForEver);
     Ok(Trajectory {
         theta: run.states.iter().map(|state| state[0]).collect(),
         velocity: run.states.iter().map(|state| state[1]).collect(),
         reached_error,
-        end_error: distance(end, coarse.states[0]),
-        steps: (run.steps as f64 / periods).ceil() as usize,
+        end_error: if unknown { f64::NAN } else { distance(end, coarse.states[0]) },
+        steps: if periods > 0.0 { (run.steps as f64 / periods).ceil() as usize } else { 0 },
         exponent: if held { None } else { batch_means(&growth, interval) },
         stuck: run.stuck,
         events: run.events,
+        interrupted,
         time,
     })
 }
@@ -153,7 +195,8 @@ fn choose(
 ) -> Result<(f64, f64), Error> {
     let until = request.until.min(PERIODS as f64 * pendulum.period());
     let end = |tolerance: f64| {
-        Run::to(pendulum, request, &[until], tolerance, cancel).map(|run| run.states[0])
+        let run = Run::to(pendulum, request, &[until], tolerance, cancel, &mut |_| ());
+        if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run.states[0]) }
     };
     let mut tolerance = FIRST_TRY * request.tol;
     let (mut coarse, mut before) = (end(tolerance)?, f64::INFINITY);
@@ -186,6 +229,9 @@ fn distance(a: State, b: State) -> f64 {
 
 type Run = Sampled<f64>;
 
+/// Takes the states of new samples.
+type Show<'a> = &'a mut dyn FnMut(&mut dyn Iterator<Item = State>);
+
 impl Run {
     fn to(
         pendulum: &Pendulum,
@@ -193,11 +239,13 @@ impl Run {
         times: &[f64],
         tolerance: f64,
         cancel: &AtomicBool,
-    ) -> Result<Self, Error> {
+        show: Show<'_>,
+    ) -> Self {
         let course = Course::new(pendulum, true, tolerance, |_, value| value).watched();
-        let going = |_: &mut Flight<'_, f64>, _: &mut [State]| !cancel.load(Ordering::Relaxed);
-        let run = sample(&course, 0.0, request.start, times, going);
-        if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
+        sample(&course, 0.0, request.start, times, |_, new| {
+            show(&mut new.iter().copied());
+            !cancel.load(Ordering::Relaxed)
+        })
     }
 
     /// The same with the growth of a tangent from sample to sample, as logarithms.
@@ -207,12 +255,14 @@ impl Run {
         times: &[f64],
         tolerance: f64,
         cancel: &AtomicBool,
-    ) -> Result<(Self, Vec<f64>), Error> {
+        show: Show<'_>,
+    ) -> (Self, Vec<f64>) {
         let constant = |_, value| Tangent::<f64, 1>::constant(value);
         let course = Course::new(pendulum, true, tolerance, constant).watched();
         let start = request.start.map(|value| Tangent { value, slope: [FRAC_1_SQRT_2] });
         let (mut lengths, mut scale) = (vec![0.0], 0.0);
         let run = sample(&course, 0.0, start, times, |flight, new| {
+            show(&mut new.iter().map(|state| state.map(Number::value)));
             lengths.extend(new.iter().map(|state| scale + length(state).ln()));
             // Held near 1, so that it neither overflows nor vanishes.
             let now = length(&flight.state);
@@ -222,13 +272,10 @@ impl Run {
             }
             !cancel.load(Ordering::Relaxed)
         });
-        if cancel.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
-        }
         let growth = lengths.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let states = run.states.iter().map(|state| state.map(Number::value)).collect();
         let Sampled { signs, events, stuck, steps, .. } = run;
-        Ok((Self { states, signs, events, stuck, steps }, growth))
+        (Self { states, signs, events, stuck, steps }, growth)
     }
 }
 

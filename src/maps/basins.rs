@@ -6,6 +6,7 @@ use super::layers::{FiniteTime, finite_time};
 use super::reliability::{Reliability, reliability};
 use super::starts::Starts;
 use super::texture::{Texture, texture};
+use super::uncertainty::{Uncertainty, uncertainty};
 use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
 use crate::integrate::{State, Strobe, accuracy};
@@ -45,7 +46,8 @@ pub struct Options {
     pub threads: usize,
     /// Shifts the samples.
     pub seed: u64,
-    /// Whether to measure the share of labels that half the step or mirroring changes.
+    /// Whether to measure what needs further starts: the share of labels that half the step or
+    /// mirroring changes, and the share that changes nearby.
     pub check: bool,
 }
 
@@ -81,6 +83,8 @@ pub struct BasinMap {
     pub layer_periods: u32,
     /// Share of the starts of each attractor.
     pub fractions: Vec<f64>,
+    /// Starts whose label changes nearby; `None` for a list, and where it was not asked for.
+    pub uncertainty: Option<Uncertainty>,
     /// Texture of the labels.
     pub texture: Texture,
     /// What half the step and mirroring change.
@@ -171,7 +175,8 @@ pub fn basins(
         plane,
         layer_periods: 0,
         fractions: Vec::new(),
-        texture: Texture { basin_entropy: 0.0, neighbours_agree: 1.0, chance: 1.0 },
+        uncertainty: None,
+        texture: Texture::plain(),
         reliability: Reliability::default(),
         steps: strobe.steps(),
         reached_error,
@@ -193,6 +198,13 @@ pub fn basins(
                 &pool,
                 control,
             )?;
+        }
+        if let (true, Starts::Grid { theta, velocity }) = (options.check, starts) {
+            let again = |states: Vec<State>| {
+                let states = Starts::List(states);
+                Ok(label(&strobe, &catalogue, &states, None, bound, &pool, control)?.label)
+            };
+            map.uncertainty = Some(uncertainty([theta, velocity], options.seed, again)?);
         }
         map.labels = labels;
     } else {

@@ -5,7 +5,8 @@
 //! - [`basins`]: basins of attraction
 //! - [`label`]: every start to the attractor that captures it
 //! - [`layers`]: turns and exponents over a fixed time
-//! - [`texture`], [`reliability`]: how fine the basins are, and whether labels can be believed
+//! - [`texture`], [`uncertainty`]: how fine the basins are; [`reliability`]: whether labels can be
+//!   believed
 //! - [`lyapunov`]: the largest exponent of what a start reaches; [`growth`]: tangents of many starts
 //! - [`orbits`]: all closed orbits of one period and winding
 //! - [`resolution`], [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
@@ -33,4 +34,5 @@ pub mod resolution;
 pub mod starts;
 pub mod texture;
 pub mod tongues;
+pub mod uncertainty;
 mod vanishing;

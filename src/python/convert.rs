@@ -7,6 +7,8 @@ use pyo3::types::{PyDict, PyList};
 use crate::attractor::Attractor;
 use crate::integrate::trajectory::Trajectory;
 use crate::maps::basins::{BasinMap, CHAOS_BOUND, Plane};
+use crate::maps::texture::Texture;
+use crate::maps::uncertainty::Uncertainty;
 
 pub fn basin_map<'py>(py: Python<'py>, map: BasinMap) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
@@ -30,9 +32,11 @@ pub fn basin_map<'py>(py: Python<'py>, map: BasinMap) -> PyResult<Bound<'py, PyD
     dict.set_item("steps_per_period", map.steps)?;
     dict.set_item("reached_error", map.reached_error)?;
     dict.set_item("simd", map.path.name())?;
-    dict.set_item("basin_entropy", map.texture.basin_entropy)?;
-    dict.set_item("neighbours_agree", map.texture.neighbours_agree)?;
-    dict.set_item("chance", map.texture.chance)?;
+    texture(&dict, &map.texture)?;
+    let Uncertainty { eps, uncertain, tried } = map.uncertainty.unwrap_or_default();
+    dict.set_item("uncertainty_eps", eps.into_pyarray(py))?;
+    dict.set_item("uncertain", uncertain.into_pyarray(py))?;
+    dict.set_item("uncertainty_tried", tried.into_pyarray(py))?;
     dict.set_item("unreliable", map.reliability.either)?;
     dict.set_item("unreliable_half_step", map.reliability.half_step)?;
     dict.set_item("unreliable_mirror", map.reliability.mirror)?;
@@ -43,6 +47,16 @@ pub fn basin_map<'py>(py: Python<'py>, map: BasinMap) -> PyResult<Bound<'py, PyD
     let exponent = map.layers.map(|layers| layers.exponent.into_pyarray(py));
     dict.set_item("finite_time_exponent", exponent)?;
     Ok(dict)
+}
+
+pub fn texture(dict: &Bound<'_, PyDict>, texture: &Texture) -> PyResult<()> {
+    dict.set_item("basin_entropy", texture.basin_entropy)?;
+    dict.set_item("boundary_basin_entropy", texture.boundary_basin_entropy)?;
+    dict.set_item("boundary_stderr", texture.boundary_stderr)?;
+    dict.set_item("boxes", texture.boxes)?;
+    dict.set_item("boundary_boxes", texture.boundary_boxes)?;
+    dict.set_item("neighbours_agree", texture.neighbours_agree)?;
+    dict.set_item("chance", texture.chance)
 }
 
 pub fn attractor_dict<'py>(
@@ -76,6 +90,7 @@ pub fn trajectory<'py>(py: Python<'py>, run: Trajectory) -> PyResult<Bound<'py, 
     dict.set_item("steps_per_period", run.steps)?;
     dict.set_item("exponent", run.exponent)?;
     dict.set_item("stuck", run.stuck)?;
+    dict.set_item("interrupted", run.interrupted)?;
     let events = &run.events;
     let times: Vec<f64> = events.iter().map(|event| event.tau).collect();
     let thetas: Vec<f64> = events.iter().map(|event| event.theta).collect();

@@ -8,7 +8,9 @@ use super::watch::watched;
 use super::{Parameters, convert, pendulum};
 use crate::error::Error;
 use crate::maps::basins::{Options, basins};
+use crate::maps::control::pool;
 use crate::maps::starts::{Axis, Starts};
+use crate::maps::texture::of_cells;
 
 /// `(low, high, count)` as Python hands it over.
 pub type AxisTuple = (f64, f64, usize);
@@ -70,6 +72,20 @@ pub fn basins_list<'py>(
     }
     let states = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
     run(py, parameters, Starts::List(states), choices, progress)
+}
+
+/// Texture of labels in rows of so many columns.
+#[pyfunction]
+pub fn texture<'py>(
+    py: Python<'py>,
+    labels: PyReadonlyArray1<'py, i16>,
+    columns: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let cells = labels.as_slice()?.to_vec();
+    let found = watched(py, None, |_| Ok(of_cells(&cells, columns, &pool(0)?)))?;
+    let dict = PyDict::new(py);
+    convert::texture(&dict, &found)?;
+    Ok(dict)
 }
 
 fn run<'py>(

@@ -120,6 +120,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(maps::basins_grid, module)?)?;
     module.add_function(wrap_pyfunction!(maps::basins_list, module)?)?;
+    module.add_function(wrap_pyfunction!(maps::texture, module)?)?;
     module.add_function(wrap_pyfunction!(orbits::orbits, module)?)?;
     module.add_function(wrap_pyfunction!(planes::parameter_names, module)?)?;
     module.add_function(wrap_pyfunction!(planes::parameter_map, module)?)?;

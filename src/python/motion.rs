@@ -1,10 +1,14 @@
 //! Bindings of `integrate`.
 
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
-use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use std::mem::take;
+use std::sync::Mutex;
 
-use super::watch::watched;
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+use super::watch::{stopped, watched};
 use super::{Parameters, convert, pendulum};
 use crate::error::Error;
 use crate::integrate::trajectory::{self, Request};
@@ -77,8 +81,11 @@ pub fn choose_steps(
     Ok((strobe.steps(), error))
 }
 
-/// One trajectory.
+/// One trajectory. With `live` its samples are handed over as they come, `live(times, angles,
+/// velocities)`, and an interrupt ends it with the last one.
 #[pyfunction]
+#[pyo3(signature = (parameters, start, until, tol, samples, lyapunov, live=None))]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn simulate<'py>(
     py: Python<'py>,
     parameters: Parameters,
@@ -87,10 +94,40 @@ pub fn simulate<'py>(
     tol: f64,
     samples: usize,
     lyapunov: bool,
+    live: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let pendulum = pendulum(parameters)?;
     let request = Request { start: [start.0, start.1], until, tol, samples, lyapunov };
-    let run =
-        watched(py, None, |control| trajectory::simulate(&pendulum, &request, control.flag()))?;
+    let Some(live) = live else {
+        let run =
+            watched(py, None, |control| trajectory::simulate(&pendulum, &request, control.flag()))?;
+        return convert::trajectory(py, run);
+    };
+    let seen = Mutex::new([Vec::new(), Vec::new(), Vec::new()]);
+    let hand_over = |py: Python<'_>| {
+        let [times, angles, velocities] =
+            take(&mut *seen.lock().expect("no panic while it is held"));
+        if times.is_empty() {
+            return Ok(());
+        }
+        let arrays = [times, angles, velocities].map(|column: Vec<f64>| column.into_pyarray(py));
+        live.call1(py, PyTuple::new(py, arrays)?).map(|_| ())
+    };
+    let mut see = |time: f64, [theta, velocity]: State| {
+        let mut columns = seen.lock().expect("no panic while it is held");
+        for (column, value) in columns.iter_mut().zip([time, theta, velocity]) {
+            column.push(value);
+        }
+    };
+    let (result, stop) = stopped(
+        py,
+        |py, _| hand_over(py),
+        |control| trajectory::simulate_watched(&pendulum, &request, control.flag(), &mut see),
+    )?;
+    if let Some(error) = stop.filter(|e| !e.is_instance_of::<PyKeyboardInterrupt>(py)) {
+        return Err(error);
+    }
+    let run = result?;
+    hand_over(py)?;
     convert::trajectory(py, run)
 }

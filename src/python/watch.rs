@@ -20,6 +20,21 @@ pub fn watched<T: Send>(
     progress: Option<&Py<PyAny>>,
     work: impl FnOnce(&Control) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
+    let report = |py: Python<'_>, control: &Control| match progress {
+        Some(progress) => progress.call1(py, control.progress()).map(|_| ()),
+        None => Ok(()),
+    };
+    let (result, stop) = stopped(py, report, work)?;
+    stop.map_or_else(|| result.map_err(PyErr::from), Err)
+}
+
+/// The same with anything done at every pause; what `work` came to, and what stopped it, a signal or
+/// an error of `report`.
+pub fn stopped<T: Send>(
+    py: Python<'_>,
+    mut report: impl FnMut(Python<'_>, &Control) -> PyResult<()> + Send,
+    work: impl FnOnce(&Control) -> Result<T, Error> + Send,
+) -> PyResult<(Result<T, Error>, Option<PyErr>)> {
     let control = Control::default();
     py.detach(|| {
         thread::scope(|scope| {
@@ -32,9 +47,13 @@ pub fn watched<T: Send>(
             let mut stop: Option<PyErr> = None;
             loop {
                 match receiver.recv_timeout(PAUSE) {
-                    Ok(result) => return stop.map_or_else(|| result.map_err(PyErr::from), Err),
+                    Ok(result) => return Ok((result, stop)),
                     Err(RecvTimeoutError::Timeout) if stop.is_none() => {
-                        if let Err(error) = Python::attach(|py| report(py, progress, shared)) {
+                        let look = Python::attach(|py| {
+                            py.check_signals()?;
+                            report(py, shared)
+                        });
+                        if let Err(error) = look {
                             shared.cancel();
                             stop = Some(error);
                         }
@@ -47,12 +66,4 @@ pub fn watched<T: Send>(
             }
         })
     })
-}
-
-fn report(py: Python<'_>, progress: Option<&Py<PyAny>>, control: &Control) -> PyResult<()> {
-    py.check_signals()?;
-    if let Some(progress) = progress {
-        progress.call1(py, control.progress())?;
-    }
-    Ok(())
 }

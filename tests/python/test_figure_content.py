@@ -147,9 +147,18 @@ def test_a_real_map_has_the_basins_of_the_smooth_point() -> None:
 def test_the_parts_of_a_trajectory() -> None:
     dataset = motions.swing(periods=20, steps=30)
     figure = made(dataset)
-    assert titles(figure) == ["time history", "phase plane", "Poincaré section, once a period"]
-    history, phase, section = figure.axes
+    dashed = "energy (dashed: upside down at rest)"
+    assert titles(figure) == [
+        "time history",
+        dashed,
+        "phase plane",
+        "Poincaré section, once a period",
+    ]
+    history, level, phase, section = figure.axes
     assert points(history) == dataset.sizes["time"] + 1
+    early = np.asarray(level.lines[0].get_xydata())
+    first = 0.5 * dataset.velocity.values**2 + 1 - np.cos(dataset.theta.values)
+    assert early[:, 1] == pytest.approx(first[: len(early)])
     for line in phase.lines:
         xy = np.asarray(line.get_xydata())
         assert np.nanmax(np.abs(xy[:, 0])) <= math.pi + 1e-12

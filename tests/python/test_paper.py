@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 import pendmap
 from pendmap import paper_figures, virtual_rig
+from pendmap.figures import tumbling
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
 def test_a_figure_has_several_names(name: str) -> None:
     assert paper_figures.wanted(name) == ["4"]
     assert paper_figures.wanted("table 1") == paper_figures.wanted("table1") == ["table1"]
-    assert paper_figures.wanted("all") == ["3", "4", "5", "6", "7", "table1"]
+    assert paper_figures.wanted("all") == ["2", "3", "4", "5", "6", "7", "table1"]
 
 
 @pytest.mark.parametrize(
@@ -39,7 +42,7 @@ def test_what_is_not_there_is_refused_in_one_line(
     run = pendmap_command("paper", name)
     assert run.returncode == 2
     assert says in run.stderr
-    assert "allowed are 3, 4, 5, 6, 7, table1 and all" in run.stderr
+    assert "allowed are 2, 3, 4, 5, 6, 7, table1 and all" in run.stderr
     assert run.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
@@ -57,7 +60,7 @@ def test_all_that_are_there(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("paper", "all", "--out", "out", "--json")
     assert run.returncode == 0, run.stderr
     files = json.loads(run.stdout)["files"]
-    names = [*(f"figure_{k}.png" for k in range(3, 8)), "table_1.csv"]
+    names = [*(f"figure_{k}.png" for k in range(2, 8)), "table_1.csv"]
     assert files == [f"out/{name}" for name in names]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(names)
     assert all((tmp_path / name).stat().st_size > 300 for name in files)
@@ -104,3 +107,32 @@ def test_the_same_seed_gives_the_same_record() -> None:
     assert one.tobytes() == same.tobytes() != other.tobytes()
     with pytest.raises(pendmap.InputError, match="one figure"):
         paper_figures.draw("all", "a.png")
+
+
+def test_figure_2_is_persistent_tumbling_chaos_at_the_papers_points() -> None:
+    """Each turns over both ways, never settles, and fills a section of a dimension above 1."""
+    runs = paper_figures.tumbling(2000)
+    points = [(1.03, 0.87), (1.7, 0.87), (1.5, 1.8)]
+    assert [(run.attrs["p"], run.attrs["omega"]) for run in runs] == points
+    for run in runs:
+        assert run.attrs["gamma"] == 0.1
+        assert run.sizes["period"] == 1501
+        assert float(run.section_time[0]) == pytest.approx(float(run.time[0]))
+        turned = np.diff(np.round(run.theta.values[::48] / math.tau))
+        assert (turned > 0).sum() > 50 < (turned < 0).sum()
+        late = np.stack([run.section_theta.values, run.section_velocity.values], axis=1)[-1000:]
+        cells = {tuple(cell) for cell in np.floor(late / 0.1).astype(int).tolist()}
+        assert len(cells) > 200
+
+
+def test_figure_2_has_a_column_for_each_point(tmp_path: Path) -> None:
+    runs = paper_figures.tumbling(600)
+    sheet = tumbling.figure(runs, size=None, dpi=100, title="Figure 2")
+    assert len(sheet.axes) == 9
+    sections = sheet.axes[6:]
+    for axes, run in zip(sections, runs, strict=True):
+        drawn = sum(len(line.get_xydata()) for line in axes.lines)
+        assert drawn == run.sizes["period"]
+    with pytest.raises(pendmap.InputError, match="no room"):
+        tumbling.figure(runs, size=(2.0, 2.0), dpi=100, title=None)
+    assert paper_figures.draw("2", tmp_path / "2.png").stat().st_size > 50_000

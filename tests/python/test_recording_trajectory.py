@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import motions
 import pendmap
 import synthetic
 from pendmap import InputError
+from pendmap.pictures.curves import envelope
+from pendmap.viewer import trajectory
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -102,3 +107,46 @@ def test_what_no_recording_holds_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"velocity reaches 1e\+40: a recording holds"):
         recorded(run, tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_long_run_moves_at_both_ends_and_has_every_section_point(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trajectory, "MOVING", 1000)
+    monkeypatch.setattr(trajectory, "BINS", 500)
+    run = motions.swing(periods=100, steps=60, p=1.7, omega=0.87)
+    back = recorded(run, tmp_path)
+    time = run["time"].values
+    at = back.seconds("/pendulum/data/bob")
+    drawn = back.columns["/pendulum/data/bob"]["Points2D:positions"]
+    assert np.allclose(
+        np.sort(at[[row is not None for row in drawn]]), [*time[:1000], *time[-1000:]]
+    )
+    for path in ("/pendulum/data", "/phase/data/now"):
+        assert [row for row in back.columns[path]["Clear:is_recursive"] if row] == [[True]]
+    shown = back.rows("/state/theta", "Scalars:scalars")
+    assert 500 < shown.size <= 1002
+    assert shown.max() == run["theta"].values.max()
+    assert shown.min() == run["theta"].values.min()
+    assert len(back.rows("/poincare/data/points", "Points2D:positions")) == 101
+    said = back.one("/summary", "TextDocument:text")
+    assert "long run" in said
+    short = recorded(motions.swing(periods=12, steps=20), tmp_path)
+    assert "long run" not in short.one("/summary", "TextDocument:text")
+
+
+@given(count=st.integers(1, 400), bins=st.integers(1, 50), seed=st.integers(0, 9))
+def test_a_thinned_curve_keeps_its_lowest_and_highest(count: int, bins: int, seed: int) -> None:
+    values = np.random.default_rng(seed).normal(size=count)
+    time = np.arange(count, dtype=float)
+    at, kept = envelope(time, values, bins)
+    assert kept.size <= max(2 * bins + 2, 0) or count <= 2 * bins
+    assert (kept.min(), kept.max()) == (values.min(), values.max())
+    assert (at[0], at[-1]) == (0, count - 1)
+    assert (np.diff(at) > 0).all()
+    assert np.array_equal(values[at.astype(int)], kept)
+    # Between two neighbours that are kept nothing lies beyond the bins' ends.
+    if count > 2 * bins:
+        edges = np.linspace(0, count, bins + 1).astype(int)
+        for low, high in itertools.pairwise(edges):
+            assert {values[low:high].min(), values[low:high].max()} <= set(kept)

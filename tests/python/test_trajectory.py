@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
+import threading
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 from scipy.special import ellipk
 
 import pendmap
-from pendmap import InputError, Pendulum
+from pendmap import InputError, Pendulum, Rig
 
 
 def test_trajectories_of_independent_tools(truths: dict[str, Any]) -> None:
@@ -105,3 +109,97 @@ def test_bad_requests_are_refused(words: dict[str, Any], complaint: str) -> None
     request: dict[str, Any] = {"theta": 1.0, "velocity": 0.0, "until": 10.0} | words
     with pytest.raises(InputError, match=complaint):
         pendmap.simulate(Pendulum(), **request)
+
+
+def test_energy_is_kept_without_drive_and_damping_and_lost_by_damping() -> None:
+    free = pendmap.simulate(Pendulum(gamma=0, p=0), 2.0, 0.3, 200.0, tol=1e-12)
+    assert float(np.ptp(free.energy.values)) < 1e-10
+    assert float(free.energy[0]) == pytest.approx(0.3**2 / 2 + 1 - math.cos(2.0), rel=1e-15)
+    # dE/dtau = -gamma v^2, summed up by Simpson's rule.
+    damped = pendmap.simulate(Pendulum(gamma=0.2, p=0), 2.0, 0.3, 4 * math.pi, tol=1e-12)
+    lost = simpson(0.2 * damped.velocity.values**2, x=damped.time.values)
+    assert float(damped.energy[0] - damped.energy[-1]) == pytest.approx(lost, abs=1e-7)
+    rig = Rig(w0=6.2, c_over_m=0.05)
+    swung = pendmap.simulate(rig, 1.0, 2.0, 3.0)
+    bare = (swung.velocity.values / 6.2) ** 2 / 2 + 1 - np.cos(swung.theta.values)
+    assert swung.energy.values == pytest.approx(bare, rel=1e-12)
+
+
+def test_a_section_holds_no_end_between_two_samples() -> None:
+    """Until 7.5 of 8 samples: the end is the ninth value, and lies in no section."""
+    pendulum = Pendulum()
+    for samples, until in ((8, 7.5 / 8), (8, 1.0), (1, 1.5), (4, 2.0)):
+        run = pendmap.simulate(pendulum, 1.0, 0.0, until * pendulum.period, samples=samples)
+        assert run.section_time.values == pytest.approx(
+            pendulum.period * np.arange(int(until) + 1), abs=1e-12
+        )
+
+
+def watched(pendulum: Pendulum | Rig, until: float, **words: Any) -> tuple[Any, np.ndarray]:  # noqa: ANN401
+    """A trajectory, and what was handed over of it meanwhile, shape (3, N)."""
+    parts: list[np.ndarray] = []
+    run = pendmap.simulate(
+        pendulum, 1.0, 0.5, until, live=lambda *part: parts.append(np.stack(part)), **words
+    )
+    return run, np.concatenate(parts, axis=1)
+
+
+@pytest.mark.parametrize(
+    "pendulum",
+    [
+        Pendulum(p=1.7, omega=0.87),
+        Pendulum(p=1.5, omega=0.87, theta_r=0.2, phase=0.4),
+        Pendulum(p=0.9, effects=(pendmap.Effect("drive_chirp", {"r": 1e-4}),), lab_time=3.0),
+        Rig(w0=6.2, c_over_m=0.3, Tr=0.5, p=1.2, Omega=7.0),
+    ],
+)
+@pytest.mark.parametrize("lyapunov", [False, True])
+def test_what_is_shown_meanwhile_is_the_trajectory_bit_for_bit(
+    pendulum: Pendulum | Rig,
+    lyapunov: bool,  # noqa: FBT001 (a parameter of the test)
+) -> None:
+    run, shown = watched(pendulum, 40.3, lyapunov=lyapunov)
+    alone = pendmap.simulate(pendulum, 1.0, 0.5, 40.3, lyapunov=lyapunov)
+    for name, values in zip(("time", "theta", "velocity"), shown, strict=True):
+        assert np.array_equal(values, alone[name].values)
+        assert np.array_equal(values, run[name].values)
+    assert np.array_equal(run.event_time.values, alone.event_time.values)
+    assert "interrupted" not in run.attrs
+
+
+def test_far_angles_are_shown_where_they_are() -> None:
+    parts: list[np.ndarray] = []
+    run = pendmap.simulate(Pendulum(), 1e6, 0.0, 9.0, live=lambda *p: parts.append(np.stack(p)))
+    assert np.array_equal(np.concatenate(parts, axis=1)[1], run.theta.values)
+
+
+def test_an_interrupt_leaves_what_was_computed() -> None:
+    """The part until then is that of the whole trajectory."""
+    pendulum, seen = Pendulum(p=1.0), 0
+
+    def show(time: np.ndarray, *_: np.ndarray) -> None:
+        nonlocal seen
+        if not seen:
+            threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+        seen += time.size
+
+    run = pendmap.simulate(pendulum, 1.0, 0.0, 1e6, live=show, samples=16)
+    assert run.attrs["interrupted"] == 1
+    assert run.attrs["until_asked"] == 1e6
+    assert run.attrs["until"] == float(run.time[-1]) < 1e6
+    assert seen == run.sizes["time"] > 1
+    assert "INTERRUPTED before tau = 1e+06" in run.attrs["summary"]
+    whole = pendmap.simulate(pendulum, 1.0, 0.0, 200.0, samples=16)
+    same = min(run.sizes["time"], 1000)
+    assert np.array_equal(run.theta.values[:same], whole.theta.values[:same])
+    assert (run.event_time.values <= float(run.time[-1])).all()
+
+
+def test_what_the_watcher_raises_ends_it() -> None:
+    def show(*_: np.ndarray) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        pendmap.simulate(Pendulum(), 1.0, 0.0, 1e6, live=show)
+    with pytest.raises(InputError, match="live"):
+        pendmap.simulate(Pendulum(), 1.0, 0.0, 10.0, live=3)  # type: ignore[arg-type]

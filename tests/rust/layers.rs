@@ -82,7 +82,7 @@ fn texture_of_known_patterns() {
     assert!((halves.neighbours_agree - 740.0 / 760.0).abs() < 1e-12);
     assert!((halves.chance - 0.5).abs() < 1e-12);
     // A chequerboard: 13 and 12 cells in each box of 25.
-    let chequers = pattern(&|column, row| ((column + row) % 2) as i16);
+    let chequers = pattern(&|column, row| ((column + row) % 2) as i16 + 1);
     let (a, b) = (13.0_f64 / 25.0, 12.0_f64 / 25.0);
     assert!((chequers.basin_entropy + a * a.ln() + b * b.ln()).abs() < 1e-12);
     assert!(chequers.neighbours_agree.abs() < 1e-12 && (chequers.chance - 0.5).abs() < 1e-12);

@@ -11,9 +11,9 @@
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
 //!   they change
 //! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
-//! - [`maps`], [`layers`], [`threads`]: whole planes; [`planes`]: of parameters
+//! - [`maps`], [`layers`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
 //! - [`exponents`]: how fast neighbouring motions part, through friction too
-//! - [`maps`], [`layers`], [`threads`]: whole planes; [`tongues`]: where rest is stable
+//! - [`tongues`]: where rest is stable
 //! - [`properties`]: what holds for every pendulum
 //! - [`input`]: what is refused, and in which words
 
@@ -57,3 +57,4 @@ mod threads;
 mod tongues;
 mod traps;
 mod truths;
+mod uncertainty;

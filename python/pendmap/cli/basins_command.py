@@ -88,6 +88,8 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "seconds",
         "reached_error",
         "basin_entropy",
+        "boundary_basin_entropy",
+        "boundary_basin_entropy_stderr",
         "unreliable",
         "labels_sampled",
         "unreliable_half_step",
@@ -111,9 +113,27 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "units": a["units"],
         "attractors": [_attractor(dataset, k) for k in range(dataset.sizes["attractor"])],
         **{name: a.get(name) for name in names},
+        "log2_criterion": bool(a["log2_criterion"]) if "log2_criterion" in a else None,
+        "uncertainty_exponent": _exponent(a),
         "mean_settle": a["mean_settle"] if settled else None,
         "longest_settle": a["longest_settle"] if settled else None,
         "summary": a["summary"].split("\n"),
+    }
+
+
+def _exponent(attrs: dict[Any, Any]) -> dict[str, Any] | None:
+    """Of the boundary, with its dimension; none where no boundary was met."""
+    if "uncertainty_exponent" not in attrs:
+        return None
+    value = attrs["uncertainty_exponent"]
+    low, high = (attrs[f"uncertainty_exponent_{end}"] for end in ("low", "high"))
+    return {
+        "value": value,
+        "stderr": attrs["uncertainty_exponent_stderr"],
+        "ci95": [low, high],
+        "dimension": 2 - value,
+        "dimension_ci95": [2 - high, 2 - low],
+        "eps": [attrs["uncertainty_eps_low"], attrs["uncertainty_eps_high"]],
     }
 
 

@@ -14,11 +14,18 @@ from pendmap.cli.options import (
 )
 from pendmap.cli.show import show
 from pendmap.cli.types import NUMBER, Whole
+from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pendmap.model import Pendulum, Rig
+    from pendmap.viewer import Live
+
 __all__ = ["command"]
+
+
+_VIEWER = "127.0.0.1:9876"
 
 
 @click.command("simulate")
@@ -35,22 +42,60 @@ __all__ = ["command"]
     "--samples", type=Whole(1, MOST_SAMPLES), help="Samples a period.  [default: 64 or more]"
 )
 @click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
+@click.option(
+    "--live",
+    is_flag=False,
+    flag_value=_VIEWER,
+    metavar="[HOST:PORT]",
+    help=f"Show it in a running viewer while it is computed.  [default: {_VIEWER}]",
+)
 @click.option("--quiet", is_flag=True, help="No summary.")
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
-    """Integrate one trajectory: time history, phase plane, Poincaré section.
+    """Integrate one trajectory: time history, energy, phase plane, Poincaré section.
 
     Writes simulate.nc, simulate.png and simulate.rrd if no output is named. --json alone writes no
-    file. --view writes the recording it opens: simulate.rrd, or what --rerun names.
+    file. --view writes the recording it opens: simulate.rrd, or what --rerun names. --live needs a
+    viewer that runs (rerun --bind 127.0.0.1); Ctrl-C then ends the trajectory where it is, and what
+    was computed is written.
     """
-    file = given["model"]
+    file, address = given["model"], given.pop("live")
     model = model_from(given)
     outputs = Outputs.take(given, "simulate", reads=[file])
+    start = (given.pop("theta"), given.pop("velocity"))
+    live = None if address is None else _sender(model, start, address)
 
     from pendmap.trajectory import simulate
 
-    start = (given.pop("theta"), given.pop("velocity"), given.pop("until"))
-    show(simulate(model, *start, **given), outputs, fields)
+    dataset = simulate(model, *start, given.pop("until"), live=live, **given)
+    gone = None if live is None else _finished(live, dataset)
+    show(dataset, outputs, fields)
+    if gone is not None:
+        raise click.ClickException(f"--live: {gone}")
+    if dataset.attrs.get("interrupted"):
+        written = (outputs.out, outputs.plot, outputs.rerun)
+        raise KeyboardInterrupt(*(str(path) for path in written if path is not None))
+
+
+def _sender(model: Pendulum | Rig, start: tuple[float, float], address: str) -> Live:
+    """Connect to the viewer before anything is computed."""
+    from pendmap import viewer
+
+    try:
+        return viewer.Live(model, start, address)
+    except (viewer.ViewerError, InputError) as error:
+        raise click.UsageError(f"--live: {error}") from error
+
+
+def _finished(live: Live, dataset: xr.Dataset) -> Exception | None:
+    """Send the rest; return why that was not possible, for what was computed is written first."""
+    from pendmap import viewer
+
+    try:
+        live.finish(dataset)
+    except viewer.ViewerError as error:
+        return error
+    return None
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
@@ -67,6 +112,8 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "tol_reached": bool(a["reached_error"] <= a["tol"]),
         "reached_error": a["reached_error"],
         "end_error": a["end_error"],
+        "interrupted": bool(a.get("interrupted", 0)),
+        "energy": float(dataset["energy"].values[-1]),
     }
     if a["lyapunov"]:
         names = {"exponent": "exponent", "stderr": "exponent_stderr"}

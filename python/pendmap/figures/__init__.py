@@ -49,6 +49,7 @@ __all__ = [
     "draw_record",
     "draw_runs",
     "draw_tongues",
+    "draw_tumbling",
     "write_report",
 ]
 
@@ -85,8 +86,8 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     and points in the phase plane. Of a map over two parameters: the kinds of attractor, striped
     where several coexist, and the largest exponent. Of a bifurcation diagram: stroboscopic angles,
     sweeps up and down, exponents. Of critical curves: stable regions and their boundaries. Of
-    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history, phase
-    plane, Poincare section. Of an exponent: growth along the start, the running mean, its
+    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history,
+    energy, phase plane, Poincare section. Of an exponent: growth along the start, the running mean, its
     distribution. Of a lifetime: the survival curve with its tail, and the mean over where the tail
     begins.
 
@@ -101,8 +102,8 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
         Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map;
-        ``history``, ``phase`` or ``section`` of a trajectory; ``growth``, ``average`` or
-        ``distribution`` of an exponent; ``survival`` or ``tail`` of a lifetime; ``theta`` or
+        ``history``, ``energy``, ``phase`` or ``section`` of a trajectory; ``growth``, ``average``
+        or ``distribution`` of an exponent; ``survival`` or ``tail`` of a lifetime; ``theta`` or
         ``velocity`` of a bifurcation diagram; of critical curves the plane: ``omega-p`` or
         ``e-alpha2``; of a map over two parameters ``kinds``, ``exponent``, ``attractors``,
         ``period``, ``winding``, ``undecided`` or ``share KIND``.
@@ -441,4 +442,30 @@ def draw_pendulum(
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         style.write(pendulum.figure(size=size, dpi=resolution, title=title), part)
+    return Path(path)
+
+
+def draw_tumbling(
+    runs: Sequence[xr.Dataset],
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+    title: str | None = None,
+) -> Path:
+    """Draw time history, phase plane and Poincare section of trajectories, a column each: figure 2.
+
+    Parameters
+    ----------
+    runs : sequence of Dataset
+        Trajectories of :func:`pendmap.simulate`, from the instant from which they are shown.
+    path, size, dpi, title
+        As for :func:`draw_pendulum`, whose result and errors are those here.
+    """
+    from pendmap.figures import tumbling  # noqa: PLC0415 (likewise)
+
+    resolution = style.resolution(dpi)
+    style.check_size(size, resolution)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(tumbling.figure(runs, size=size, dpi=resolution, title=title), part)
     return Path(path)

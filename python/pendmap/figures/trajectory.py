@@ -1,4 +1,4 @@
-"""The figure of one trajectory: time history, phase plane, Poincare section."""
+"""The figure of one trajectory: time history, energy, phase plane, Poincare section."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.patches import Patch
 
+from pendmap.energy import energy
 from pendmap.errors import InputError
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
 from pendmap.model.units import Units
 from pendmap.pictures import layers as layering
 from pendmap.pictures import names, plane
+from pendmap.pictures.curves import envelope
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PARTS", "figure"]
 
-PARTS = ("history", "phase", "section")
+PARTS = ("history", "energy", "phase", "section")
 """Parts of the figure by the name a user types."""
 
 LATE = 0.2
@@ -32,8 +34,17 @@ LATE = 0.2
 FLAT = 0.1
 """Range in rad under which a history counts as a straight line."""
 
-MANY = 500
-"""Points of a section above which they are drawn smaller."""
+SIZES = ((500, 2.6), (20_000, 1.3), (math.inf, 0.6))
+"""Sizes of the points of a section, each up to so many of them."""
+
+UPSIDE_DOWN = 2.0
+"""Energy over m g l of a pendulum that rests upside down."""
+
+MOST_DRAWN = 20_000
+"""Bins of a curve against time that is drawn by its lowest and highest values."""
+
+MOST_PERIODS = 200
+"""Periods of which the phase curve is drawn whole; of more it is the last half of so many."""
 
 LEGEND_ROOM = 2.6
 """Inches of a panel whose title leaves room for a legend beside it."""
@@ -54,29 +65,34 @@ def figure(
         raise InputError(f"no layer {layer!r} in a trajectory; it has {', '.join(PARTS)}")
     if colormap is not None:
         raise InputError(f"colormap {colormap!r}: a trajectory's figure has no colour map")
-    width, height = size or ((5.6, 5.3) if layer in ("phase", "section") else (8.6, 6.9))
-    if size is None and layer == "history":
+    width, height = size or ((5.6, 5.3) if layer in ("phase", "section") else (8.6, 8.2))
+    if size is None and layer in ("history", "energy"):
         height = 3.6
     across, down = width - sheets.LEFT - sheets.RIGHT, height - sheets.TOP - sheets.BOTTOM
-    gap_x, gap_y = 0.8, 0.9
-    need = (2.0, 2.2) if layer is None else (sheets.LEAST, sheets.LEAST)
+    gap_x, gap_y, gap_energy = 0.8, 0.9, 0.4
+    need = (2.0, 3.2) if layer is None else (sheets.LEAST, sheets.LEAST)
     if across < need[0] or down < need[1]:
         least = f"{width - across + need[0]:.1f} x {height - down + need[1]:.1f}"
         raise InputError(
             f"size {size} leaves no room for the panels; it must be at least {least} inches"
         )
     sheet = sheets.headed((width, height), dpi, "Trajectory", _subtitle(dataset))
-    draw = {"history": _history, "phase": _phase, "section": _section}
+    draw = {"history": _history, "energy": _energy, "phase": _phase, "section": _section}
     if layer is not None:
         draw[layer](sheets.place(sheet, sheets.LEFT, sheets.BOTTOM, across, down), dataset, "")
         return sheet
-    half, top = (across - gap_x) / 2, 0.36 * (down - gap_y)
-    low = down - gap_y - top
-    first = sheets.place(sheet, sheets.LEFT, height - sheets.TOP - top, across, top)
-    second = sheets.place(sheet, sheets.LEFT, sheets.BOTTOM, half, low)
-    third = sheets.place(sheet, sheets.LEFT + half + gap_x, sheets.BOTTOM, half, low)
-    for axes, part, mark in zip((first, second, third), PARTS, "abc", strict=True):
+    half, rest = (across - gap_x) / 2, down - gap_y - gap_energy
+    top, middle = 0.32 * rest, 0.2 * rest
+    low = rest - top - middle
+    bottom = sheets.BOTTOM + low + gap_y
+    first = sheets.place(sheet, sheets.LEFT, bottom + middle + gap_energy, across, top)
+    second = sheets.place(sheet, sheets.LEFT, bottom, across, middle)
+    third = sheets.place(sheet, sheets.LEFT, sheets.BOTTOM, half, low)
+    fourth = sheets.place(sheet, sheets.LEFT + half + gap_x, sheets.BOTTOM, half, low)
+    for axes, part, mark in zip((first, second, third, fourth), PARTS, "abcd", strict=True):
         draw[part](axes, dataset, f"({mark}) ")
+    first.set_xlabel("")
+    first.tick_params(labelbottom=False)  # one clock for both
     return sheet
 
 
@@ -89,20 +105,42 @@ def _subtitle(dataset: xr.Dataset) -> str:
 
 
 def _history(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
-    time, theta = dataset["time"].values, dataset["theta"].values
-    late = _late(time)
-    axes.plot(time[: late + 1], theta[: late + 1], color=_EARLY_COLOUR, lw=1.0)
-    axes.plot(time[late:], theta[late:], color=_LATE_COLOUR, lw=1.0)
-    axes.margins(x=0.0, y=0.06)
+    _against_time(axes, dataset, dataset["theta"].values)
     low, high = axes.get_ylim()
     if high - low < FLAT:
         axes.set_ylim(low - FLAT, high + FLAT)
     style.scale(axes, "y", axes.get_ylim(), names.ANGLE, angle=True)
+    _at_rest(axes, dataset)
+    axes.set_title(mark + "time history")
+
+
+def _energy(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
+    theta, velocity = dataset["theta"].values, dataset["velocity"].values
+    _against_time(axes, dataset, energy(theta, velocity, dataset.attrs))
+    low, high = axes.get_ylim()
+    if high - low < FLAT:
+        axes.set_ylim(low - FLAT, high + FLAT)
+    low, high = axes.get_ylim()
+    style.scale(axes, "y", (low, high), "E / (m g l)")
+    if low < UPSIDE_DOWN < high:  # above it, it can go over the top
+        axes.axhline(UPSIDE_DOWN, color=style.QUIET, lw=0.8, ls=(0, (4, 3)), zorder=0)
+    named = "energy" + (" (dashed: upside down at rest)" if low < UPSIDE_DOWN < high else "")
+    axes.set_title(mark + named)
+
+
+def _against_time(axes: Axes, dataset: xr.Dataset, values: npt.NDArray[np.float64]) -> None:
+    """Draw a curve against time, its last part dark; a long one by its lowest and highest."""
+    time = dataset["time"].values
+    late = _late(time)
+    for part, colour in (
+        (slice(None, late + 1), _EARLY_COLOUR),
+        (slice(late, None), _LATE_COLOUR),
+    ):
+        axes.plot(*envelope(time[part], values[part], MOST_DRAWN), color=colour, lw=1.0)
+    axes.margins(x=0.0, y=0.06)
     if time[-1] > time[0]:
         clock = names.clock(Units.of(dataset.attrs))
         style.scale(axes, "x", (float(time[0]), float(time[-1])), clock)
-    _at_rest(axes, dataset)
-    axes.set_title(mark + "time history")
 
 
 def _at_rest(axes: Axes, dataset: xr.Dataset) -> None:
@@ -141,8 +179,12 @@ def resting(dataset: xr.Dataset) -> npt.NDArray[np.float64]:
 
 def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     theta, velocity = dataset["theta"].values, dataset["velocity"].values
-    late = _late(dataset["time"].values)
-    early = plane.broken_at_wrap(theta[: late + 1], velocity[: late + 1])
+    late, first, which = _late(dataset["time"].values), 0, ""
+    if dataset.sizes["period"] > MOST_PERIODS:
+        beginning = dataset["section_time"].values[-1 - MOST_PERIODS // 2]
+        late = first = int(np.searchsorted(dataset["time"].values, beginning))
+        which = f", the last {MOST_PERIODS // 2} periods"
+    early = plane.broken_at_wrap(theta[first : late + 1], velocity[first : late + 1])
     last = plane.broken_at_wrap(theta[late:], velocity[late:])
     axes.plot(early[:, 0], early[:, 1], color=_EARLY_COLOUR, lw=0.5)
     axes.plot(last[:, 0], last[:, 1], color=_LATE_COLOUR, lw=0.7)
@@ -150,14 +192,14 @@ def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
         rest = plane.wrapped(theta[-1:])
         axes.plot(rest, velocity[-1:], "o", ms=3.5, mew=0, color=_LATE_COLOUR)
     style.phase_plane(axes, (-math.pi, math.pi), plane.padded(velocity), Units.of(dataset.attrs))
-    axes.set_title(mark + "phase plane")
+    axes.set_title(mark + "phase plane" + which)
 
 
 def _section(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     theta, velocity = dataset["section_theta"].values, dataset["section_velocity"].values
     time = dataset["time"].values
     late = dataset["section_time"].values >= time[_late(time)] if time.size else []
-    size = 1.3 if theta.size > MANY else 2.6
+    size = next(size for most, size in SIZES if theta.size <= most)
     for which, colour in ((~np.asarray(late, bool), _EARLY_COLOUR), (late, _LATE_COLOUR)):
         axes.plot(theta[which], velocity[which], "o", ms=size, mew=0, color=colour)
     speeds = plane.padded(dataset["velocity"].values)

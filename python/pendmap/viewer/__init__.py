@@ -2,7 +2,7 @@
 
 ``record`` looks at what a dataset holds and writes its recording, ``record_identification`` writes
 that of what was found in records, ``record_discrepancy`` that of what a model lacks;
-``open_viewer`` shows one.
+``open_viewer`` shows one; ``Live`` sends a trajectory to a running viewer while it is computed.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from pendmap.viewer import (
 )
 from pendmap.viewer.discrepancy import record_discrepancy
 from pendmap.viewer.identification import record_identification
+from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
 from pendmap.viewer.window import (
     NoDisplayError,
     NotARecordingError,
@@ -42,11 +43,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "ADDRESS",
     "SUFFIXES",
+    "Live",
     "NoDisplayError",
+    "NobodyListensError",
     "NotARecordingError",
     "RecordingNotFoundError",
     "ViewerError",
+    "check_address",
     "check_display",
     "open_viewer",
     "record",

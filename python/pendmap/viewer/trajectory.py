@@ -3,31 +3,50 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pendmap.energy import energy
 from pendmap.errors import InputError
-from pendmap.model.units import TIME, VELOCITY, Units
-from pendmap.pictures import names, plane
+from pendmap.model.units import TIME, Units
+from pendmap.pictures import curves, names, plane
 from pendmap.viewer import columns, frame
 from pendmap.viewer.columns import FASTEST, LATEST, Look
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     import xarray as xr
 
-__all__ = ["blueprint", "log"]
+    Attributes = Mapping[Any, Any]
+
+__all__ = [
+    "BINS",
+    "Motion",
+    "behind",
+    "blueprint",
+    "curve",
+    "frame_of",
+    "layout",
+    "log",
+    "moving",
+    "refuse_beyond",
+    "section",
+    "series",
+    "still",
+    "summary",
+]
 
 Floats = npt.NDArray[np.float64]
 
 ARM = (120, 130, 145)
 BOB = (213, 94, 0)
-CURVE = (120, 150, 190)
+LINE = (120, 150, 190)
 PIVOT = (0, 158, 115)
 TRAIL = (230, 159, 0)
 
@@ -40,22 +59,49 @@ TRAILS = 20000
 MANY = 1000
 """Points of a section above which they are drawn smaller."""
 
+MOVING = 100_000
+"""Samples at the beginning and at the end of a long trajectory at which everything moves."""
+
+BINS = 100_000
+"""Bins of a long series, which is logged by its lowest and highest values."""
+
+CURVE, CURVE_PERIODS = 200_000, 100
+"""Samples and periods of the phase curve that are drawn at most, the last ones."""
+
 _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "theta": (lambda _: names.ANGLE, (0, 114, 178)),
     "omega": (names.speed, (213, 94, 0)),
-    "energy": (lambda _: "energy", (0, 158, 115)),
+    "energy": (lambda _: "energy E / (m g l)", (0, 158, 115)),
 }
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Samples of a trajectory: times, angles, velocities, three arrays of one length."""
+
+    time: Floats
+    theta: Floats
+    velocity: Floats
+
+    def part(self, first: int, last: int) -> Motion:
+        """Return the samples from one number up to, without, another."""
+        cut = slice(first, last)
+        return Motion(self.time[cut], self.theta[cut], self.velocity[cut])
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
     """Return the layout: pendulum and summary left; phase plane, section and state right."""
-    around = _frame(dataset)
+    return layout(dataset.attrs, frame_of(dataset.attrs, dataset["velocity"].values))
+
+
+def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
+    """Return the same of a trajectory with these attributes, in this frame."""
     so_far = rrb.VisibleTimeRange(
         frame.TIMELINE,
         start=rrb.TimeRangeBoundary.infinite(),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
-    reach = 1.25 + _stroke(dataset)
+    reach = 1.25 + _stroke(attrs)
     pendulum = rrb.Spatial2DView(
         origin="/pendulum",
         name="Pendulum",
@@ -85,23 +131,53 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     time = dataset["time"].values.astype(float)
     theta = dataset["theta"].values.astype(float)
     velocity = dataset["velocity"].values.astype(float)
-    units = Units.of(dataset.attrs)
-    _refuse_beyond(time, velocity)
+    refuse_beyond(time, velocity)
+    attrs = dataset.attrs
+    still(stream, attrs, frame_of(attrs, velocity))
+    summary(stream, dataset)
+    motion = Motion(time, theta, velocity)
+    series(stream, attrs, motion, BINS)
+    first, last = min(time.size, MOVING), max(time.size - MOVING, MOVING)
+    moving(stream, attrs, motion.part(0, first))
+    if last < time.size:
+        rest(stream, float(time[first]))
+        moving(stream, attrs, motion.part(last, time.size))
+    curve(stream, attrs, motion)
+    section(
+        stream,
+        dataset["section_time"].values.astype(float),
+        dataset["section_theta"].values,
+        dataset["section_velocity"].values,
+        dataset["period"].values,
+    )
+
+
+def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
+    """Log what the trajectory says of itself, and what of a long one is shown."""
     clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
+    units = Units.of(dataset.attrs)
     if units.si:
         clock = "The time of the viewer is that of the rig."
-    frame.summary(stream, dataset, clock)
-    around = _frame(dataset)
-    for root in ("phase", "poincare"):
-        around.log(stream, root)
-    _state(stream, time, theta, velocity, units)
-    _pendulum(stream, dataset, time, theta)
-    _phase(stream, time, theta, velocity)
-    _section(stream, dataset)
+    time, parts = dataset["time"].values, [clock]
+    if time.size > 2 * MOVING:
+        ends = (units.at(f"{time[k]:.6g}") for k in (MOVING, time.size - MOVING))
+        parts.append(
+            "This is a long run: the pendulum moves up to {} and from {} on; curves against time "
+            "are drawn by their lowest and highest values; the section has all points.".format(
+                *ends
+            )
+        )
+    frame.summary(stream, dataset, *parts)
 
 
-def _refuse_beyond(time: Floats, velocity: Floats) -> None:
-    """Refuse what a recording cannot hold: its places are single precision, its times ns."""
+def refuse_beyond(time: Floats, velocity: Floats) -> None:
+    """Refuse what a recording cannot hold: its places are single precision, its times ns.
+
+    Raises
+    ------
+    InputError
+        For a time or a velocity beyond that.
+    """
     fastest = float(np.max(np.abs(velocity), initial=0.0))
     if fastest > FASTEST:
         raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
@@ -109,79 +185,121 @@ def _refuse_beyond(time: Floats, velocity: Floats) -> None:
         raise InputError(f"until is {time[-1]:g}: a recording holds up to {LATEST:g}")
 
 
-def _frame(dataset: xr.Dataset) -> frame.Frame:
-    speeds = plane.padded(dataset["velocity"].values)
-    return frame.Frame((-math.pi, math.pi), speeds, Units.of(dataset.attrs))
+def frame_of(attrs: Attributes, velocity: Floats) -> frame.Frame:
+    """Return the frame of the phase plane that holds these velocities."""
+    return frame.Frame((-math.pi, math.pi), plane.padded(velocity), Units.of(attrs))
 
 
-def _stroke(dataset: xr.Dataset) -> float:
+def _stroke(attrs: Attributes) -> float:
     """Return the amplitude of the pivot's motion in lengths of the pendulum, p / omega^2."""
-    omega = float(dataset.attrs["omega"])
-    return abs(float(dataset.attrs["p"])) / omega**2 if omega else 0.0
+    omega = float(attrs["omega"])
+    return abs(float(attrs["p"])) / omega**2 if omega else 0.0
 
 
-def _state(
-    stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Floats, units: Units
-) -> None:
-    """Log angle, velocity and energy theta'^2 / 2 + 1 - cos theta, 0 at rest, 2 upside down.
-
-    The energy is over m g l, in all units.
-    """
-    energy = 0.5 * units.bare(velocity, VELOCITY) ** 2 + 1.0 - np.cos(theta)
-    for name, values in (("theta", theta), ("omega", velocity), ("energy", energy)):
-        said, colour = _STATE[name]
-        text = said(units)
-        path = f"state/{name}"
-        stream.log(path, rr.SeriesLines(colors=[colour], names=[text], widths=[1.5]), static=True)
-        stream.send_columns(path, [columns.at(time)], rr.Scalars.columns(scalars=values))
-
-
-def _pendulum(stream: rr.RecordingStream, dataset: xr.Dataset, time: Floats, theta: Floats) -> None:
-    """Log the pendulum in lengths of its arm, x to the right, y upward, the angle from hanging.
-
-    The effective gravity 1 + p cos(omega tau + phase) is that of a pivot at height
-    -(p / omega^2) cos(omega tau + phase).
-    """
-    omega, phase = float(dataset.attrs["omega"]), float(dataset.attrs.get("phase", 0.0))
-    stroke = math.copysign(_stroke(dataset), float(dataset.attrs["p"]))
-    tau = Units.of(dataset.attrs).bare(time, TIME)
-    height = -stroke * np.cos(omega * tau + phase)
-    pivot = np.stack([np.zeros_like(height), height], axis=1)
-    bob = pivot + np.stack([np.sin(theta), -np.cos(theta)], axis=1)
+def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) -> None:
+    """Log what does not move: frames, the rail of the pivot."""
+    for root in ("phase", "poincare"):
+        around.log(stream, root)
+    stroke = _stroke(attrs)
     stream.log("pendulum/data", rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0])), static=True)
-    rail = [[[0.0, -abs(stroke) - 0.05], [0.0, abs(stroke) + 0.05]]]
+    rail = [[[0.0, -stroke - 0.05], [0.0, stroke + 0.05]]]
     thin = rr.Radius.ui_points(0.75)
     stream.log(
         "pendulum/axes/rail", rr.LineStrips2D(rail, colors=[frame.INK], radii=thin), static=True
     )
-    columns.points(stream, "pendulum/data/pivot", time, pivot, Look(PIVOT, 4.0))
-    columns.points(stream, "pendulum/data/bob", time, bob, Look(BOB, 9.0))
-    arm = np.stack([pivot, bob], axis=1)
-    columns.strips(stream, "pendulum/data/arm", time, arm, Look(ARM, 2.0))
-    turns = omega or 1.0
+
+
+def series(stream: rr.RecordingStream, attrs: Attributes, motion: Motion, bins: int) -> None:
+    """Log angle, velocity and energy against time, by their lowest and highest in so many bins."""
+    units, theta, velocity = Units.of(attrs), motion.theta, motion.velocity
+    for name, values in (
+        ("theta", theta),
+        ("omega", velocity),
+        ("energy", energy(theta, velocity, attrs)),
+    ):
+        said, colour = _STATE[name]
+        path = f"state/{name}"
+        style = rr.SeriesLines(colors=[colour], names=[said(units)], widths=[1.5])
+        stream.log(path, style, static=True)
+        at, shown = curves.envelope(motion.time, values, bins)
+        stream.send_columns(path, [columns.at(at)], rr.Scalars.columns(scalars=shown))
+
+
+def moving(
+    stream: rr.RecordingStream,
+    attrs: Attributes,
+    motion: Motion,
+    *,
+    since: int = 0,
+    every: int = 1,
+) -> None:
+    """Log the pendulum in lengths of its arm, x to the right, y upward, and its phase point.
+
+    The effective gravity 1 + p cos(omega tau + phase) is that of a pivot at height
+    -(p / omega^2) cos(omega tau + phase). Samples before ``since`` have been logged and are there
+    for the trail; of the others every so many are.
+    """
+    time, theta, velocity = motion.time, motion.theta, motion.velocity
+    omega, phase = float(attrs["omega"]), float(attrs.get("phase", 0.0))
+    stroke = math.copysign(_stroke(attrs), float(attrs["p"]))
+    tau = Units.of(attrs).bare(time, TIME)
+    height = -stroke * np.cos(omega * tau + phase)
+    pivot = np.stack([np.zeros_like(height), height], axis=1)
+    bob = pivot + np.stack([np.sin(theta), -np.cos(theta)], axis=1)
+    new = np.arange(since, time.size, every)
+    columns.points(stream, "pendulum/data/pivot", time[new], pivot[new], Look(PIVOT, 4.0))
+    columns.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
+    arm = np.stack([pivot[new], bob[new]], axis=1)
+    columns.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
+    chosen = new[:: max(1, -(-new.size // TRAILS))]
+    back = behind(attrs, time)
+    trail = bob[np.maximum(chosen[:, None] - back[None, :], 0)]
+    columns.strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
+    now = np.stack([plane.wrapped(theta[new]), velocity[new]], axis=1)
+    columns.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
+
+
+def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
+    """Return how many samples ago the points of the trail are, falling to 0: about one period."""
+    tau = Units.of(attrs).bare(time, TIME)
+    turns = float(attrs["omega"]) or 1.0
     samples = (
         2 * math.pi / turns / max(float(np.median(np.diff(tau))), 1e-12) if time.size > 1 else 1
     )
     every = max(1, math.ceil(samples / TRAIL_POINTS))
-    chosen = np.arange(0, time.size, max(1, -(-time.size // TRAILS)))
-    back = every * np.arange(min(TRAIL_POINTS, max(2, math.ceil(samples / every))))[::-1]
-    trail = bob[np.maximum(chosen[:, None] - back[None, :], 0)]
-    columns.strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
+    count = min(TRAIL_POINTS, max(2, math.ceil(samples / every)))
+    return every * np.arange(count, dtype=np.int64)[::-1]
 
 
-def _phase(stream: rr.RecordingStream, time: Floats, theta: Floats, velocity: Floats) -> None:
-    """Log the whole curve, broken where the angle wraps, and the point that runs along it."""
-    curve = plane.broken_at_wrap(theta, velocity).astype(np.float32)
-    lines = rr.LineStrips2D([curve], colors=[CURVE], radii=rr.Radius.ui_points(0.6))
+def rest(stream: rr.RecordingStream, time: float) -> None:
+    """Log that what moves is not shown from this time on."""
+    stream.set_time(frame.TIMELINE, duration=time)
+    for path in ("pendulum/data", "phase/data/now"):
+        stream.log(path, rr.Clear(recursive=True))
+    stream.reset_time()
+
+
+def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Motion) -> None:
+    """Log the curve in the phase plane of the last periods, broken where the angle wraps."""
+    period = Units.of(attrs).given(2 * math.pi / (float(attrs["omega"]) or 1.0), TIME)
+    first = int(np.searchsorted(motion.time, motion.time[-1] - CURVE_PERIODS * period))
+    first = max(first, motion.time.size - CURVE)
+    points = plane.broken_at_wrap(motion.theta[first:], motion.velocity[first:])
+    lines = rr.LineStrips2D(
+        [points.astype(np.float32)], colors=[LINE], radii=rr.Radius.ui_points(0.6)
+    )
     stream.log("phase/data/curve", lines, static=True)
-    now = np.stack([plane.wrapped(theta), velocity], axis=1)
-    columns.points(stream, "phase/data/now", time, now, Look(BOB, 6.0))
 
 
-def _section(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
+def section(
+    stream: rr.RecordingStream,
+    time: Floats,
+    theta: Floats,
+    velocity: Floats,
+    period: npt.NDArray[np.int64],
+) -> None:
     """Log one point a period; the view shows those up to the cursor, so the section grows."""
-    time = dataset["section_time"].values.astype(float)
-    at = np.stack([dataset["section_theta"].values, dataset["section_velocity"].values], axis=1)
+    at = np.stack([plane.wrapped(theta), velocity], axis=1)
     size = 1.4 if time.size > MANY else 2.5
-    period = rr.TimeColumn("period", sequence=dataset["period"].values.astype(np.int64))
-    columns.points(stream, "poincare/data/points", time, at, Look(BOB, size), period)
+    number = rr.TimeColumn("period", sequence=period.astype(np.int64))
+    columns.points(stream, "poincare/data/points", time, at, Look(BOB, size), number)

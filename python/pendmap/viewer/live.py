@@ -1,0 +1,170 @@
+"""A trajectory in a running viewer, while it is computed."""
+
+from __future__ import annotations
+
+import math
+import socket
+import uuid
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pendmap.errors import InputError
+from pendmap.viewer import frame, trajectory
+from pendmap.viewer.window import ViewerError
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import xarray as xr
+
+    from pendmap.model import Pendulum, Rig
+
+    Floats = npt.NDArray[np.float64]
+
+__all__ = ["ADDRESS", "Live", "NobodyListensError", "check_address"]
+
+ADDRESS: Final = "127.0.0.1:9876"
+"""Where a viewer listens unless it is told otherwise."""
+
+BLOCK: Final = 1000
+"""Samples that are sent at a time, at least."""
+_PROBE: Final = 2.0
+_FLUSH: Final = 20.0
+_MOVING: Final = 200_000
+"""Samples up to which everything moves at each of them; afterwards at some of each block."""
+_LATER: Final = 1000
+_PORTS: Final = 65_535
+
+
+class NobodyListensError(ViewerError):
+    """No viewer listens at an address."""
+
+
+def check_address(address: str) -> tuple[str, int]:
+    """Return host and port of ``HOST:PORT``, at which a viewer listens.
+
+    A connection without a listener would wait for a quarter of a minute, and then say nothing.
+
+    Raises
+    ------
+    InputError
+        If it is no address.
+    NobodyListensError
+        If nobody listens there; the message says what to start.
+    """
+    host, colon, port = address.rpartition(":")
+    if not (colon and host and port.isdecimal() and 0 < int(port) <= _PORTS):
+        raise InputError(f"address is {address!r}: allowed is HOST:PORT, such as {ADDRESS}")
+    host = host.strip("[]")
+    try:
+        with socket.create_connection((host, int(port)), _PROBE):
+            pass
+    except OSError as error:
+        raise NobodyListensError(
+            f"no viewer listens at {address} ({error.strerror or error}): start one with "
+            f"'rerun --bind {host} --port {port}'"
+        ) from None
+    return host, int(port)
+
+
+class Live:
+    """Sends the samples of a trajectory to a viewer in blocks, as ``live`` of pendmap.simulate.
+
+    Parameters
+    ----------
+    model : Pendulum or Rig
+        The model.
+    start : (float, float)
+        Angle and velocity at the start.
+    address : str
+        ``HOST:PORT`` of the viewer.
+
+    Raises
+    ------
+    InputError, NobodyListensError
+        As of :func:`check_address`.
+    """
+
+    def __init__(
+        self, model: Pendulum | Rig, start: tuple[float, float], address: str = ADDRESS
+    ) -> None:
+        host, port = check_address(address)
+        self._attrs = dict(model.attributes)
+        self._period = model.period
+        fastest = max(abs(start[1]), 2 * math.sqrt(1 + abs(model.p)) * model.units.w0)
+        self._around = trajectory.frame_of(self._attrs, np.array([-fastest, fastest]))
+        self._waiting: list[Floats] = []
+        self._before = np.empty((3, 0))
+        self._sent = 0
+        # A name of its own each time: what goes by one name is one recording to the viewer.
+        self._stream: rr.RecordingStream = frame.identified(uuid.uuid4().hex)
+        with frame.strict():
+            url = f"rerun+http://{f'[{host}]' if ':' in host else host}:{port}/proxy"
+            layout = trajectory.layout(self._attrs, self._around)
+            self._stream.connect_grpc(url, default_blueprint=layout)
+            self._stream.send_recording_name(f"trajectory: {model.title}")
+            trajectory.still(self._stream, self._attrs, self._around)
+            frame.text(self._stream, "summary", f"{model.title}\n\nUnder way.")
+
+    def __call__(self, time: Floats, theta: Floats, velocity: Floats) -> None:
+        """Take samples; send them when there are enough."""
+        self._waiting.append(np.stack([time, theta, velocity]))
+        if sum(part.shape[1] for part in self._waiting) >= BLOCK:
+            self._send()
+
+    def finish(self, dataset: xr.Dataset) -> None:
+        """Send what is left, the whole phase curve and what the trajectory says of itself.
+
+        Raises
+        ------
+        ViewerError
+            If the viewer went away.
+        """
+        self._send()
+        velocity = dataset["velocity"].values
+        with frame.strict():
+            self._frame(velocity)
+            motion = trajectory.Motion(dataset["time"].values, dataset["theta"].values, velocity)
+            trajectory.curve(self._stream, self._attrs, motion)
+            trajectory.summary(self._stream, dataset)
+        try:
+            self._stream.flush(timeout_sec=_FLUSH)
+        except (RuntimeError, ValueError, TimeoutError) as error:
+            raise ViewerError(f"the viewer did not take all that was sent: {error}") from None
+        finally:
+            self._stream.disconnect()
+
+    def _send(self) -> None:
+        if not self._waiting:
+            return
+        time, theta, velocity = block = np.concatenate(self._waiting, axis=1)
+        self._waiting = []
+        trajectory.refuse_beyond(time, velocity)
+        with frame.strict():
+            self._widen(velocity)
+            early = self._sent < _MOVING
+            bins = trajectory.BINS if early else _LATER
+            motion = trajectory.Motion(time, theta, velocity)
+            trajectory.series(self._stream, self._attrs, motion, bins)
+            whole, since = np.concatenate([self._before, block], axis=1), self._before.shape[1]
+            every = 1 if early else -(-time.size // _LATER)
+            motion = trajectory.Motion(*whole)
+            trajectory.moving(self._stream, self._attrs, motion, since=since, every=every)
+            period = np.round(time / self._period).astype(np.int64)
+            once = np.abs(time / self._period - period) < 1e-9 * (1 + np.abs(period))
+            trajectory.section(self._stream, time[once], theta[once], velocity[once], period[once])
+        self._sent += time.size
+        kept = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
+        self._before = whole[:, -kept:]
+
+    def _widen(self, velocity: Floats) -> None:
+        """Draw the frames anew where the motion is faster than they hold."""
+        fastest = float(np.abs(velocity).max())
+        if fastest > self._around.y[1]:
+            self._frame(1.5 * fastest * np.array([-1.0, 1.0]))
+
+    def _frame(self, velocity: Floats) -> None:
+        self._around = trajectory.frame_of(self._attrs, velocity)
+        trajectory.still(self._stream, self._attrs, self._around)
+        self._stream.send_blueprint(trajectory.layout(self._attrs, self._around))

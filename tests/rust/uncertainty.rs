@@ -1,0 +1,89 @@
+//! How many starts are uncertain, in planes whose boundary is known.
+
+use std::f64::consts::PI;
+
+use pendmap::error::Error;
+use pendmap::integrate::State;
+use pendmap::maps::basins::{Options, basins};
+use pendmap::maps::control::Control;
+use pendmap::maps::starts::{Axis, Starts};
+use pendmap::maps::uncertainty::{Uncertainty, uncertainty};
+
+use crate::support::{driven, plane};
+
+/// A window of so many cells, far from the unit square.
+fn window(side: usize) -> [Axis; 2] {
+    [(-PI, PI), (2.0, 3.0)].map(|(low, high)| Axis { low, high, count: side })
+}
+
+fn measured(side: usize, seed: u64, of: impl Fn(f64, f64) -> i16) -> Uncertainty {
+    let [theta, velocity] = window(side);
+    uncertainty([&theta, &velocity], seed, |states: Vec<State>| {
+        let part = |value: f64, axis: &Axis| (value - axis.low) / (axis.high - axis.low);
+        let labels = states.iter().map(|s| of(part(s[0], &theta), part(s[1], &velocity)));
+        Ok::<_, Error>(labels.collect())
+    })
+    .expect("labels")
+}
+
+/// How far each count is from what a share says, in standard deviations.
+fn deviations(found: &Uncertainty, share: impl Fn(f64) -> f64) -> Vec<f64> {
+    let all = found.eps.iter().zip(&found.uncertain).zip(&found.tried);
+    all.map(|((eps, uncertain), tried)| {
+        let (f, n) = (share(*eps), *tried as f64);
+        (*uncertain as f64 - n * f) / (n * f * (1.0 - f)).sqrt()
+    })
+    .collect()
+}
+
+#[test]
+fn near_a_circle_the_share_is_its_length_times_the_mean_reach() {
+    // A start within eps |cos| of the line, on either side: 2 eps 2/pi over a length of 2 pi r.
+    let radius = 0.3;
+    let inside = |x: f64, y: f64| 1 + i16::from((x - 0.5).hypot(y - 0.5) < radius);
+    let found = measured(1000, 3, inside);
+    assert!(found.eps.len() > 4 && found.eps.is_sorted_by(|a, b| a > b), "{found:?}");
+    for deviation in deviations(&found, |eps| 8.0 * radius * eps) {
+        assert!(deviation.abs() < 4.0, "{found:?}");
+    }
+    assert_ne!(measured(1000, 4, inside), found);
+    assert_eq!(measured(1000, 3, inside), found);
+}
+
+#[test]
+fn random_labels_are_uncertain_at_any_distance() {
+    let random = |x: f64, y: f64| {
+        let mixed = (x.to_bits() ^ y.to_bits().rotate_left(29)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        1 + ((mixed >> 40) % 2) as i16
+    };
+    let found = measured(100, 0, random);
+    assert!(found.eps.first() == Some(&2_f64.powi(-6)) && found.eps.last() < Some(&2e-8));
+    let far = deviations(&found, |_| 0.75).into_iter().filter(|d| d.abs() > 3.0).count();
+    assert!(far <= 1, "{found:?}");
+}
+
+#[test]
+fn starts_with_unknown_ends_are_left_out() {
+    // Half of the plane is unknown: beside the line in the other half all is as before.
+    let half = |x: f64, y: f64| if y < 0.5 { 0 } else { 1 + i16::from(x > 0.4) };
+    let found = measured(1000, 1, half);
+    for (k, deviation) in deviations(&found, |eps| 4.0 * eps / PI).into_iter().enumerate() {
+        assert!(deviation.abs() < 4.0 + 20.0 * found.eps[k], "{found:?}");
+    }
+    assert_eq!(measured(1000, 1, |_, _| 1), Uncertainty::default());
+    assert_eq!(measured(1000, 1, |_, _| -1), Uncertainty::default());
+}
+
+#[test]
+fn a_map_has_it_and_a_list_or_a_hasty_map_has_not() {
+    let pendulum = driven(0.1, 0.6, 2.0);
+    let made = |starts: &Starts, check: bool| {
+        let options = Options { check, ..Options::default() };
+        basins(&pendulum, starts, &options, &Control::default()).expect("a map").uncertainty
+    };
+    let grid = plane(60);
+    let found = made(&grid, true).expect("a grid that is checked");
+    assert!(found.uncertain.iter().sum::<u64>() > 100, "{found:?}");
+    assert_eq!(made(&grid, false), None);
+    assert_eq!(made(&Starts::List(vec![[1.0, 0.0], [2.0, 0.0]]), true), None);
+}
