@@ -11,6 +11,7 @@ import xarray as xr
 
 from pendmap import _core, checks
 from pendmap.cell_search import STARTS, CellSearch
+from pendmap.critical_curves import tongues
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, VELOCITY
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["entries", "parameter_map", "undecided"]
 
 _LISTED = 10
+_FREQUENCIES = 300
 
 
 def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -45,6 +47,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     max_periods: int | None = None,
     threads: int | None = None,
     seed: int = 0,
+    curves: bool = False,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
     """The set of attractors over a plane of two parameters.
@@ -81,6 +84,9 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         Number of threads; by default one a processor. The result does not depend on it.
     seed : int
         Shifts the initial conditions.
+    curves : bool
+        Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
+        ``omega`` (or ``Omega``): figures draw them over the map.
     progress : callable, optional
         Called now and then with the number of cells done and in all.
 
@@ -113,6 +119,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     checks.call("progress", progress)
     search = CellSearch(starts, box, tol, max_periods, threads, seed)
     theta, velocity = search.initial(units)
+    drawn = _curves(model, columns, rows) if checks.flag("curves", curves) else None
     began = time.perf_counter()
     try:
         raw = _core.parameter_map(
@@ -128,6 +135,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     except ValueError as error:
         raise InputError(str(error)) from None
     dataset = _dataset(raw, (columns, rows), units)
+    if drawn is not None:
+        dataset = dataset.assign(drawn)
     dataset.attrs = {
         "kind": "parameter_map",
         "title": title(model, columns, rows),
@@ -188,6 +197,27 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
     }
     coordinates = {axis.name: (axis.name, axis.values, axis.attributes) for axis in (columns, rows)}
     return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
+
+
+def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
+    """Return the critical curves between the ends of the axes, before anything else is computed."""
+    by_name = {axis.name.lower(): axis for axis in axes}
+    if set(by_name) != {"p", "omega"}:
+        given = " and ".join(axis.name for axis in axes)
+        raise InputError(f"curves over {given}: allowed are p and omega")
+    omega, p = by_name["omega"], by_name["p"]
+    frequency = np.linspace(omega.bare[0], omega.bare[-1], _FREQUENCIES)
+    if omega.values.size == 1 or p.bare[-1] <= 0:
+        raise InputError("curves: allowed with ranges of omega and of p above 0")
+    found = tongues(model, frequency, float(p.bare[-1]))
+    scale = omega.values[-1] / omega.bare[-1]
+    return {
+        "curve_omega": ("curve_frequency", scale * frequency, omega.attributes),
+        "curve_fold": ("curve_frequency", found["fold"].values, p.attributes),
+        "curve_index": ("curve_point", found["index"].values),
+        "curve_p": ("curve_point", found["p"].values, p.attributes),
+        "curve_multiplier": ("curve_point", found["multiplier"].values),
+    }
 
 
 def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[str, Any]:

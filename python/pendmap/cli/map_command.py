@@ -19,6 +19,9 @@ __all__ = ["command"]
 
 @click.command("map")
 @varied_model_options
+@click.option(
+    "--curves", is_flag=True, help="Draw the critical curves of rest over it (p and omega)."
+)
 @search_options
 @progress_options
 @output_options()

@@ -87,9 +87,9 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     where several coexist, and the largest exponent. Of a bifurcation diagram: stroboscopic angles,
     sweeps up and down, exponents. Of critical curves: stable regions and their boundaries. Of
     Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history,
-    energy, phase plane, Poincare section. Of an exponent: growth along the start, the running mean, its
-    distribution. Of a lifetime: the survival curve with its tail, and the mean over where the tail
-    begins.
+    energy, phase plane, Poincare section. Of an exponent: growth along the start, the running mean,
+    its distribution. Of a lifetime: the survival curve with its tail, and the mean over where the
+    tail begins.
 
     Parameters
     ----------

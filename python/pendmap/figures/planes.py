@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, Normalize, TwoSlopeNorm, to_rgb
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
@@ -25,6 +27,11 @@ _LEADING = ("kinds", "exponent")
 _RATIO = 0.85
 _STRIPE = 0.045
 """Inches of a stripe, along a row."""
+_CURVE: dict[str, Any] = {
+    "color": style.INK,
+    "linewidth": 1.1,
+    "path_effects": [withStroke(linewidth=2.6, foreground="white")],
+}
 _COUNTS = ("attractors", "period", "winding")
 _MOST_COUNT = 8
 _MAPS = {"exponent": "RdBu_r", "attractors": "viridis", "period": "viridis", "winding": "viridis"}
@@ -48,6 +55,11 @@ def figure(
     handles: list[Any] = [
         Patch(facecolor=kind.colour, edgecolor=style.QUIET, linewidth=0.5) for kind in listed
     ]
+    curves = drawn.curves(dataset)
+    for name, (style_, lines) in curves.items():
+        if any(np.isfinite(line).all(axis=1).sum() > 1 for line in lines):
+            texts.append(name)
+            handles.append(Line2D([], [], linestyle=style_, **_CURVE))
     mark = len(shown) > 1
     panels = [
         Panel(
@@ -82,6 +94,9 @@ def figure(
             )
         else:
             _scalar(axes, bar, dataset, one, extent=extent, colormap=colormap)
+        for style_, lines in curves.values():
+            for line in lines:
+                axes.plot(*line.T, linestyle=style_, **_CURVE)
         axes.set_xlim(*across)
         axes.set_ylim(*up)
         for which, ends, name in zip("xy", (across, up), drawn.axes(dataset), strict=True):

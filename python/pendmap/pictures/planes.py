@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from pendmap import palette
 from pendmap.errors import InputError
-from pendmap.pictures import layers, plane
+from pendmap.pictures import layers, plane, tongues
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -40,6 +40,8 @@ LAYERS = {
     "undecided": "share of the starts undecided",
 }
 """Layers by the name a user types; ``share KIND`` is the share of the starts of a kind."""
+
+Stroke = Literal["-", "--", ":"]
 
 _MOST = 13
 _LEAST = 0.002
@@ -184,6 +186,31 @@ def edges(dataset: xr.Dataset) -> tuple[tuple[float, float], tuple[float, float]
     """Return the outer edges of columns and rows."""
     across, up = (str(dataset.attrs[which]) for which in ("columns", "rows"))
     return plane.cell_edges(dataset[across]), plane.cell_edges(dataset[up])
+
+
+def curves(dataset: xr.Dataset) -> dict[str, tuple[Stroke, list[npt.NDArray[np.float64]]]]:
+    """Return the critical curves of a map: for each name a line style and polylines, shape (m, 2).
+
+    Empty where they were not asked for.
+    """
+    if "curve_p" not in dataset:
+        return {}
+    omega = dataset["curve_omega"].values
+    rows = tongues.by_frequency(dataset, "curve_", omega.size)
+    turned = str(dataset.attrs["rows"]).lower() == "omega"
+
+    def to(line: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return line[:, ::-1] if turned else line
+
+    fold = to(np.stack([omega, dataset["curve_fold"].values], axis=1))
+    return {
+        "rest: multiplier +1": ("-", [to(line) for line in tongues.joined(omega, rows, 1)]),
+        "rest: multiplier −1": (
+            "--",
+            [to(line) for line in tongues.joined(omega, rows, -1)],
+        ),
+        "fold of the oscillation born there": (":", [fold]),
+    }
 
 
 def named(dataset: xr.Dataset, name: str) -> str:

@@ -14,7 +14,7 @@ from pendmap.critical_curves import PLANES
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["COLOURS", "Chart", "by_frequency", "chart"]
+__all__ = ["COLOURS", "Chart", "by_frequency", "chart", "joined"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -107,8 +107,8 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
 
     damped = by_frequency(dataset, "", omega.size)
     bare = by_frequency(dataset, "undamped_", omega.size)
-    lines = {m: [to(line) for line in _joined(omega, damped, m)] for m in COLOURS}
-    undamped = [to(line) for m in COLOURS for line in _joined(omega, bare, m)]
+    lines = {m: [to(line) for line in joined(omega, damped, m)] for m in COLOURS}
+    undamped = [to(line) for m in COLOURS for line in joined(omega, bare, m)]
     flags = dataset["stable_above"].values
     first = dataset["stable_at_first"].values
     stable = [to(area) for area in _stable(omega, dataset, flags, first, p_max)]
@@ -149,7 +149,7 @@ def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tupl
     return found
 
 
-def _joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int) -> list[Floats]:
+def joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int) -> list[Floats]:
     """Return the lines through the points with this multiplier.
 
     Counted from below, the two boundaries of a tongue keep their places; where the count changes
