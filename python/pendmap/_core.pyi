@@ -16,6 +16,8 @@ __all__ = [
     "fit_rows",
     "fit_runs",
     "formula",
+    "growth",
+    "lyapunov",
     "orbits",
     "period",
     "simd",
