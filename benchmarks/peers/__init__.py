@@ -2,3 +2,10 @@
 
 Each method is a class with ``label``, ``setting`` and ``advance``; see `peers.common.Method`.
 """
+
+from __future__ import annotations
+
+import sys
+
+# numba looks for the package coverage, and would find the benchmark of that name.
+sys.modules.setdefault("coverage", None)  # type: ignore[arg-type]

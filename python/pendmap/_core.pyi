@@ -17,6 +17,8 @@ __all__ = [
     "fit_rows",
     "fit_runs",
     "formula",
+    "growth",
+    "lyapunov",
     "orbits",
     "parameter_map",
     "parameter_names",

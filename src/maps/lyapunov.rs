@@ -4,37 +4,23 @@
 //! ensemble of trajectories on the attractor, with a standard error from their spread. A chaotic
 //! transient has a positive exponent too: what counts is what captured it.
 
-use rayon::prelude::*;
-
 use super::basins::{MAX_PERIODS, SEARCH_BOUND, SEARCH_SAMPLE};
 use super::control::{Control, pool};
+use super::ensemble::{Ensemble, NEAR, ROUND, Run};
 use super::growth::Bundle;
 use super::starts::{Axis, Starts};
 use crate::attractor::capture::{Fate, Outcome, outcomes};
-use crate::attractor::chaos::mean_and_error;
 use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
-use crate::integrate::{State, Strobe, accuracy};
+use crate::integrate::{State, accuracy};
 use crate::lanes::Path;
 use crate::model::Pendulum;
-use crate::model::pendulum::Route;
-use crate::orbit::PoincareMap;
 
-/// Trajectories of an ensemble.
-pub const TRAJECTORIES: usize = 256;
-/// Periods of a window: what a finite-time exponent of the result is over.
-pub const WINDOW: usize = 20;
-/// Windows between two looks at the error.
-const ROUND: usize = 10;
-/// Rounds at least.
-const LEAST_ROUNDS: usize = 2;
 /// Periods that each trajectory is followed for at the most, where nothing is said.
 const MOST: u32 = 20_000;
 /// Where nothing is damped the tangent of regular motion grows in proportion to time, and no number
 /// of periods is enough.
 const MOST_UNDAMPED: u32 = 2_000;
-/// Members of the ensemble begin so near points of the attractor.
-const NEAR: f64 = 1e-6;
 /// Periods dropped at least: tangents turn into the direction of growth, the members part.
 const DROPPED: f64 = 100.0;
 /// Beyond growing from [`NEAR`] to 1, members grow apart by this power of e before they count.
@@ -47,9 +33,6 @@ const COURSE: [usize; 2] = [100, 4_000];
 const TAKEN: u32 = 64;
 /// Last points of a trajectory that say in which region it lives.
 const LAST_POINTS: usize = 16;
-/// Trajectories and periods whose shrinking of phase area gives the sum of both exponents.
-const AREA: [usize; 2] = [32, 60];
-
 /// What to compute, and how well.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
@@ -80,21 +63,6 @@ pub enum End {
     Undecided,
     /// Out of the range of numbers, or ever faster.
     Failed,
-}
-
-/// Growth along an ensemble.
-#[derive(Clone, Debug)]
-pub struct Ensemble {
-    /// Logarithms of the growth over [`WINDOW`] periods, a row for each trajectory.
-    pub growth: Vec<Vec<f64>>,
-    /// Periods dropped before.
-    pub dropped: u32,
-    /// Mean exponent per unit of tau.
-    pub exponent: f64,
-    /// Its standard error, from the spread of the trajectories.
-    pub stderr: f64,
-    /// Sum of both exponents, and its standard error; minus infinity where friction stops the motion.
-    pub sum: (f64, f64),
 }
 
 /// The exponent of what a start reaches.
@@ -159,9 +127,10 @@ pub fn lyapunov(
         reached_error,
         path,
     };
-    let mut run = Run { strobe: &strobe, request, pool: &pool, control };
+    let Request { precision, seed, .. } = *request;
+    let run = Run { strobe: &strobe, precision, seed, pool: &pool, control };
     if pendulum.is_dissipative() {
-        run.reach(&seeds, &mut result)?;
+        run.reach(&seeds, request.max_periods, &mut result)?;
     } else {
         let most = request.max_periods.unwrap_or(MOST_UNDAMPED);
         let states = run.members(&[start]);
@@ -174,16 +143,14 @@ pub fn lyapunov(
     Ok(result)
 }
 
-struct Run<'a> {
-    strobe: &'a Strobe,
-    request: &'a Request,
-    pool: &'a rayon::ThreadPool,
-    control: &'a Control,
-}
-
 impl Run<'_> {
     /// Follows the start to its end.
-    fn reach(&mut self, seeds: &[State], result: &mut Exponent) -> Result<(), Error> {
+    fn reach(
+        &self,
+        seeds: &[State],
+        max_periods: Option<u32>,
+        result: &mut Exponent,
+    ) -> Result<(), Error> {
         let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH);
         catalogue.search(self.strobe, seeds, SEARCH_BOUND, self.control.flag());
         self.control.check()?;
@@ -201,7 +168,7 @@ impl Run<'_> {
             let per_period = chaos.exponent * self.strobe.pendulum.period();
             let apart = (APART - NEAR.ln()) / per_period;
             let dropped = apart.clamp(DROPPED, MOST_DROPPED).ceil() as u32;
-            let most = self.request.max_periods.unwrap_or(MOST);
+            let most = max_periods.unwrap_or(MOST);
             let states = self.members(&chaos.points);
             let (ensemble, ends) = self.ensemble(&states, dropped, most)?;
             result.lost = self.lost(&mut catalogue, &ensemble, &ends)?;
@@ -245,55 +212,6 @@ impl Run<'_> {
         Ok(catalogue.region_of(&points))
     }
 
-    /// States near `points`, drawn by the seed.
-    fn members(&self, points: &[State]) -> Vec<State> {
-        let mut draw = Draw(self.request.seed);
-        let near = |x: f64, part: f64| x + NEAR * (2.0 * part - 1.0);
-        (0..TRAJECTORIES)
-            .map(|_| {
-                let [theta, velocity] = points[(draw.next() * points.len() as f64) as usize];
-                [near(theta, draw.next()), near(velocity, draw.next())]
-            })
-            .collect()
-    }
-
-    /// Growth along trajectories from `states`, until the error is small enough or `most` periods are
-    /// over; and where they are then.
-    fn ensemble(
-        &self,
-        states: &[State],
-        dropped: u32,
-        most: u32,
-    ) -> Result<(Ensemble, Vec<State>), Error> {
-        let (pool, control) = (self.pool, self.control);
-        let period = self.strobe.pendulum.period();
-        let most_windows = (most as usize / WINDOW).max(LEAST_ROUNDS);
-        let mut bundle = Bundle::new(states);
-        control.begin(0);
-        bundle.grow(self.strobe, 1, dropped as usize, pool, control)?;
-        let mut growth: Vec<Vec<f64>> = vec![Vec::new(); states.len()];
-        loop {
-            let done = growth[0].len();
-            let new = ROUND.min(most_windows - done);
-            control.begin(done + new);
-            let rows = bundle.grow(self.strobe, new, WINDOW, pool, control)?;
-            for (all, row) in growth.iter_mut().zip(rows) {
-                all.extend(row);
-            }
-            let done = done + new;
-            let time = (done * WINDOW) as f64 * period;
-            let means: Vec<f64> = growth.iter().map(|row| row.iter().sum::<f64>() / time).collect();
-            let (exponent, stderr) = mean_and_error(&means);
-            let enough =
-                done >= LEAST_ROUNDS * ROUND && stderr <= self.request.precision * exponent.abs();
-            if enough || done >= most_windows || !exponent.is_finite() {
-                let ends = bundle.states();
-                let sum = self.sum(&ends)?;
-                return Ok((Ensemble { growth, dropped, exponent, stderr, sum }, ends));
-            }
-        }
-    }
-
     /// How many of the `ends` of an ensemble are captured: by what is known, or by what a search finds
     /// from those whose neighbours come together.
     fn lost(
@@ -316,49 +234,5 @@ impl Run<'_> {
         let found = outcomes(self.strobe, &catalogue.traps, TAKEN, ends, self.control.flag());
         let found = found.ok_or(Error::Interrupted)?;
         Ok(found.iter().filter(|o| o.fate != Fate::Open).count())
-    }
-
-    /// The sum of both exponents: the mean rate at which phase area grows, with its standard error.
-    ///
-    /// Viscous damping shrinks it evenly, by `exp(-gamma tau)`. At a turn under friction it jumps by
-    /// the ratio of the accelerations, and a stick leaves none.
-    fn sum(&self, states: &[State]) -> Result<(f64, f64), Error> {
-        let pendulum = &self.strobe.pendulum;
-        if pendulum.route() == Route::Smooth {
-            return Ok((-pendulum.gamma, 0.0));
-        }
-        let map = PoincareMap::new(pendulum);
-        let stride = states.len().div_ceil(AREA[0]);
-        let some: Vec<State> = states.iter().step_by(stride).copied().collect();
-        let rates: Vec<f64> = self.pool.install(|| {
-            some.par_iter()
-                .map(|start| {
-                    self.control.check()?;
-                    let (mut state, mut sum) = (*start, 0.0);
-                    for _ in 0..AREA[1] {
-                        let image = map.once(state);
-                        let area = image.product.unwrap_or_else(|| image.derivative.determinant());
-                        sum += area.abs().ln();
-                        state = image.state;
-                    }
-                    Ok(sum / (AREA[1] as f64 * pendulum.period()))
-                })
-                .collect::<Result<_, Error>>()
-        })?;
-        Ok(mean_and_error(&rates))
-    }
-}
-
-/// Numbers in [0, 1) that a seed decides: Steele, Lea & Flood (2014), "Fast splittable pseudorandom
-/// number generators" (SplitMix64).
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 }

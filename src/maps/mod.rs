@@ -7,7 +7,8 @@
 //! - [`layers`]: turns and exponents over a fixed time
 //! - [`texture`], [`uncertainty`]: how fine the basins are; [`reliability`]: whether labels can be
 //!   believed
-//! - [`lyapunov`]: the largest exponent of what a start reaches; [`growth`]: tangents of many starts
+//! - [`lyapunov`]: the largest exponent of what a start reaches; [`ensemble`], [`growth`]: of many
+//!   trajectories
 //! - [`orbits`]: all closed orbits of one period and winding
 //! - [`resolution`], [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
 //! - [`bifurcation`]: along one parameter, all attractors, and one followed up and down
@@ -23,6 +24,7 @@ pub mod bifurcation;
 pub mod cell;
 mod chebyshev;
 pub mod control;
+pub mod ensemble;
 pub mod growth;
 pub mod label;
 pub mod layers;

@@ -12,8 +12,9 @@ use crate::integrate::{State, Strobe};
 use crate::lanes::Path;
 use crate::maps::basins::CHAOS_BOUND;
 use crate::maps::control::pool;
+use crate::maps::ensemble::WINDOW;
 use crate::maps::growth::Bundle;
-use crate::maps::lyapunov::{End, Request, WINDOW, lyapunov as exponent_of};
+use crate::maps::lyapunov::{End, Request, lyapunov as exponent_of};
 
 /// Numerical choices as Python hands them over.
 #[derive(FromPyObject)]

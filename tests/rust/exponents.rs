@@ -7,8 +7,9 @@ use nalgebra::Vector2;
 use pendmap::attractor::Kind;
 use pendmap::integrate::{State, Strobe};
 use pendmap::maps::control::{Control, pool};
+use pendmap::maps::ensemble::TRAJECTORIES;
 use pendmap::maps::growth::Bundle;
-use pendmap::maps::lyapunov::{End, Exponent, Request, TRAJECTORIES, lyapunov};
+use pendmap::maps::lyapunov::{End, Exponent, Request, lyapunov};
 use pendmap::model::Pendulum;
 use pendmap::orbit::PoincareMap;
 

@@ -1,0 +1,130 @@
+"""pynamicalsys: its largest exponent of a flow, one start after another, on all threads of numba.
+
+Its manual calls `ContinuousDynamicalSystem.lyapunov` in a loop of Python, which runs on one thread;
+here the compiled function behind it is called from a parallel loop, which is quicker by more than
+the threads. It scales the tangent after every step. Its tangent begins in a direction of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numba
+import numpy as np
+from pynamicalsys import ContinuousDynamicalSystem
+from pynamicalsys.continuous_time.lyapunov import maximum_lyapunov_exponent
+from pynamicalsys.continuous_time.step import evolve_system
+from pynamicalsys.continuous_time.step_methods import rk4_step_wrapped
+
+from peers.common import Case, Regular, loosest
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+LADDER = tuple(sorted({round(24 * 1.05**k) for k in range(120)}))
+
+
+@numba.njit
+def _slope(time: float, u: Floats, parameters: Floats) -> Floats:
+    gamma, p, omega = parameters
+    out = np.zeros_like(u)
+    out[0] = u[1]
+    out[1] = -gamma * u[1] - (1.0 + p * math.cos(omega * time)) * math.sin(u[0])
+    return out
+
+
+@numba.njit
+def _jacobian(time: float, u: Floats, parameters: Floats) -> Floats:
+    gamma, p, omega = parameters
+    out = np.zeros((2, 2))
+    out[0, 1] = 1.0
+    out[1, 0] = -(1.0 + p * math.cos(omega * time)) * math.cos(u[0])
+    out[1, 1] = -gamma
+    return out
+
+
+@numba.njit(parallel=True)
+def _exponents(
+    theta: Floats, velocity: Floats, parameters: Floats, until: float, step: float
+) -> Floats:
+    out = np.empty(theta.size)
+    for i in numba.prange(theta.size):
+        start = np.array([theta[i], velocity[i]])
+        found = maximum_lyapunov_exponent(
+            start, parameters, until, _slope, _jacobian, None, step, 1e-6, 1e-3, rk4_step_wrapped
+        )
+        out[i] = found[0, 0]
+    return out
+
+
+@numba.njit(parallel=True)
+def _ends(theta: Floats, velocity: Floats, parameters: Floats, until: float, step: float) -> Floats:
+    out = np.empty((2, theta.size))
+    for i in numba.prange(theta.size):
+        start = np.array([theta[i], velocity[i]])
+        end = evolve_system(start, parameters, until, _slope, step, 1e-6, 1e-3, rk4_step_wrapped)
+        out[0, i], out[1, i] = end[0], end[1]
+    return out
+
+
+class Pynamical:
+    """The fixed-step method for one case."""
+
+    label = "pynamicalsys"
+
+    def __init__(self, case: Case, steps: int) -> None:
+        """Choose the steps a forcing period."""
+        self.case, self.steps = case, steps
+        self.parameters = np.array([case.gamma, case.p, case.omega])
+
+    @property
+    def setting(self) -> str:
+        """The integrator and the steps, in words."""
+        return f"rk4, {self.steps} steps a period"
+
+    def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
+        """Return unwrapped angle and velocity, shape (N,), after whole forcing periods."""
+        step = self.case.period / self.steps
+        until = periods * self.case.period
+        ends = _ends(theta, velocity, self.parameters, until, step)
+        return ends[0], ends[1]
+
+    def exponents(self, theta: Floats, velocity: Floats, periods: int) -> Floats:
+        """Return the finite-time exponents, shape (N,)."""
+        step = self.case.period / self.steps
+        return _exponents(theta, velocity, self.parameters, periods * self.case.period, step)
+
+
+class PynamicalLoop(Pynamical):
+    """The same as its manual has it: a loop of Python over its class."""
+
+    label = "pynamicalsys"
+
+    @property
+    def setting(self) -> str:
+        """The integrator, the steps and the loop, in words."""
+        return f"rk4, {self.steps} steps a period, its class in a loop, one thread"
+
+    def exponents(self, theta: Floats, velocity: Floats, periods: int) -> Floats:
+        """Return the finite-time exponents, shape (N,)."""
+        system = ContinuousDynamicalSystem(
+            equations_of_motion=_slope,
+            jacobian=_jacobian,
+            system_dimension=2,
+            parameters=self.parameters,
+        )
+        system.integrator("rk4", time_step=self.case.period / self.steps)
+        until = periods * self.case.period
+        each = (
+            system.lyapunov([x, v], until, num_exponents=1, endpoint=False)
+            for x, v in zip(theta, velocity, strict=True)
+        )
+        return np.array(list(each), dtype=np.float64)
+
+
+def at_error(case: Case, sample: Regular, target: float) -> Pynamical:
+    """Return the method with the fewest steps a period whose error is at most `target`."""
+    return loosest(lambda steps: Pynamical(case, steps), LADDER, sample, target)
