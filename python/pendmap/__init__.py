@@ -25,9 +25,10 @@ from pendmap.model import (
 from pendmap.model.library import EffectDefinition, EffectParameter, effects
 
 if TYPE_CHECKING:
+    from pendmap.critical_curves import tongues
     from pendmap.grid import Axis, Grid
-    from pendmap.maps import basins, basins_of
     from pendmap.homoclinic import melnikov
+    from pendmap.maps import basins, basins_of
     from pendmap.orbits import orbit
     from pendmap.records import (
         Experiment,
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
         read_experiment,
     )
     from pendmap.store import load, save
-    from pendmap.critical_curves import tongues
     from pendmap.trajectory import advance, simulate
 
     __version__: str

@@ -141,8 +141,8 @@ def _critical() -> xr.Dataset:
     """Return the critical curves of figure 1: alpha^2 up to 1.6, e up to 2.6."""
     import numpy as np  # noqa: PLC0415
 
-    from pendmap.model import Pendulum  # noqa: PLC0415
     from pendmap.critical_curves import tongues  # noqa: PLC0415
+    from pendmap.model import Pendulum  # noqa: PLC0415
 
     square = np.linspace(_SQUARES[0], _SQUARES[1], _COLUMNS)[::-1]
     p_max = _HIGHEST / _SQUARES[0]

@@ -8,12 +8,12 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pendmap.critical_curves import NEAR, PLANES
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
 from pendmap.pictures import layers as layering
 from pendmap.pictures import tongues as drawn
-from pendmap.critical_curves import NEAR, PLANES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.pictures import tongues as drawn
 from pendmap.critical_curves import NEAR
+from pendmap.pictures import tongues as drawn
 from pendmap.viewer import frame
 from pendmap.viewer.panel import Panel
 
