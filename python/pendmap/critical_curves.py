@@ -65,7 +65,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         The model; its own ``p``, ``omega`` and phase do not matter. With gamma = 0 the curves are
         those of Mathieu's equation. Effects count; rest must stay a solution.
     omega : array_like, optional
-        Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3.
+        Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3,
+        evenly in omega or, for the plane of eq. 1.4, in 1/omega^2.
     p_max : float
         Largest amplitude, up to 100.
     plane : str
@@ -96,7 +97,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
-    frequencies = grids.frequencies(np.linspace(*OMEGA) if omega is None else omega)
+    frequencies = grids.frequencies(_usual(plane) if omega is None else omega)
     p_max = checks.number("p_max", p_max)
     checks.call("progress", progress)
     if plane not in PLANES:
@@ -153,6 +154,14 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = [*_summary(dataset), *of_motion(model.effects, "curves are")]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
+
+
+def _usual(plane: str) -> NDArray[np.float64]:
+    """Return frequencies that are evenly spread in the plane."""
+    if plane == PLANES[0]:
+        return np.linspace(*OMEGA)
+    low, high, count = OMEGA
+    return np.asarray(1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count)))
 
 
 def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, Any]:

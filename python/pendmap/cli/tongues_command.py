@@ -23,7 +23,6 @@ __all__ = ["command"]
     "--omega",
     "omegas",
     type=VALUES,
-    default="0.5:3:200",
     help="Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
 )
 @click.option("--p-max", type=NUMBER, default=6.0, help="Largest amplitude.  [default: 6]")

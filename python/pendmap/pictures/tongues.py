@@ -36,6 +36,9 @@ _NAMES = {
 _PARTED = 0.3
 """Asymptotic curves that err more are not drawn: they say nothing there."""
 
+_TIP = 0.6
+"""An undamped tongue goes down to its tip from below this amplitude."""
+
 _JUMP = 0.6
 """Lines are joined over a change of p, between two frequencies, of at most this part of the mean
 ``p`` and a little."""
@@ -108,7 +111,7 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
     damped = by_frequency(dataset, "", omega.size)
     bare = by_frequency(dataset, "undamped_", omega.size)
     lines = {m: [to(line) for line in joined(omega, damped, m)] for m in COLOURS}
-    undamped = [to(line) for m in COLOURS for line in joined(omega, bare, m)]
+    undamped = [to(_tipped(line, m, omega)) for m in COLOURS for line in joined(omega, bare, m)]
     flags = dataset["stable_above"].values
     first = dataset["stable_at_first"].values
     stable = [to(area) for area in _stable(omega, dataset, flags, first, p_max)]
@@ -181,7 +184,7 @@ def joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int)
         done += _paired(ended)
         begun = [[(w, p)] for j, p in enumerate(values) if j not in used]
         # Two that begin next to one another turn back between the frequencies.
-        for lower, upper in itertools.pairwise(begun):
+        for lower, upper in itertools.pairwise(begun if w > omega[0] else []):
             if _tip(lower[0], upper[0]) and len(lower) == 1:
                 upper.insert(0, lower[0])
         open_ = [*on, *begun]
@@ -206,11 +209,31 @@ def _paired(
     return done
 
 
+def _tipped(line: Floats, multiplier: int, omega: Floats) -> Floats:
+    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, where a line goes round it.
+
+    There the linear equation without drive has the multiplier ``(-1)^k``, whatever the model.
+    """
+    spacing = float(np.diff(omega).max())
+    for k in range(1 if multiplier < 0 else 2, 9, 2):
+        tip = 2 / k
+        for i in range(len(line) - 1):
+            (w0, p0), (w1, p1) = line[i], line[i + 1]
+            around = min(w0, w1) - spacing < tip < max(w0, w1) + spacing
+            passed = w0 == w1 or (w0 - tip) * (w1 - tip) < 0
+            if around and passed and 0 < max(p0, p1) < _TIP:
+                line = np.insert(line, i + 1, (tip, 0.0), axis=0)
+                break
+    return line
+
+
 def _ahead(line: list[tuple[float, float]], w: float) -> float:
     """Where a line would be at the next frequency."""
     if len(line) == 1:
         return line[-1][1]
     (w0, p0), (w1, p1) = line[-2:]
+    if w0 == w1:  # begun where a curve turns back
+        return p1
     return p1 + (p1 - p0) * (w - w1) / (w1 - w0)
 
 
