@@ -15,8 +15,10 @@ from pendmap import (
     Pendulum,
     Rig,
     basins,
+    bifurcation,
     figures,
     paper_figures,
+    parameter_map,
     read_experiment,
     simulate,
     virtual_rig,
@@ -113,7 +115,17 @@ def diagnosis() -> None:
         figures.write_report(diagnose(read_experiment(places.experiment)), HERE / "lab.md")
 
 
+def planes() -> None:
+    """The attractors over p and omega, and against p."""
+    plane = {"p": (0.05, 2.5, 200), "omega": (0.5, 3.0, 200)}
+    figures.draw(
+        parameter_map(Pendulum(), plane, curves=True), HERE / "plane.png", dpi=110, layer="kinds"
+    )
+    figures.draw(bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110)
+
+
 if __name__ == "__main__":
+    planes()
     figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
     figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
     friction()

@@ -110,7 +110,7 @@ def kinds(dataset: xr.Dataset) -> list[Kind]:
         own = [set(members) & set(one) for one in sets(dataset)]
         total = float(sum(s for s, has in zip(share, own, strict=True) if has))
         name = _OTHERS[family] if len(members) > 1 else members[0]
-        like = "oscillation 12:0" if family == "oscillation" else "rotation 10:+10"
+        like = "oscillation 12:0" if family == "oscillation" else "rotation 9:+9"
         found.append(_kind(name, like, tuple(members), total))
     return sorted(found, key=lambda kind: _place(kind.name))
 
