@@ -40,9 +40,9 @@ __all__ = ["CURVES", "first_tongue", "first_tongue_second_order", "second_tongue
 
 
 def first_tongue(omega: Floats, gamma: float) -> Floats:
-    """Critical ``p`` of the first tongue to first order, ``2 sqrt(a^2 + c^2)``."""
+    """Critical ``p`` of the first tongue to first order; nan nearer to the second tongue."""
     a, c = 1 - omega**2 / 4, gamma * omega / 2
-    return np.asarray(2 * np.hypot(a, c))
+    return np.where(omega > 1.0, 2 * np.hypot(a, c), np.nan)
 
 
 def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:

@@ -74,7 +74,8 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
         axes.plot(near[:, 0], near[:, 1], linestyle=look, color=style.INK, linewidth=1.0)
         axes.plot(far[:, 0], far[:, 1], linestyle=look, color=style.INK, linewidth=0.5, alpha=0.45)
     axes.plot(chart.fold[:, 0], chart.fold[:, 1], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
-    axes.plot(chart.beyond[:, 0], chart.beyond[:, 1], color="#c8c8c8", linewidth=3.0, zorder=1)
+    if chart.beyond[0, 1] != chart.beyond[-1, 1]:
+        axes.plot(chart.beyond[:, 0], chart.beyond[:, 1], color="#c8c8c8", linewidth=3.0, zorder=1)
     if marks:
         for p, omega, name in marks:
             turned = plane == PLANES[1]
