@@ -261,8 +261,8 @@ fn doublings_leave_an_orbit_of_twice_the_period() {
         // Of long periods there are many orbits elsewhere: only those here are asked for.
         let [theta, velocity] = point(entry);
         let mut here = request(2 * n, 2 * w, 40);
-        here.theta = Axis::new("theta", theta - 0.2, theta + 0.2, 40).expect("an axis");
-        here.velocity = Axis::new("velocity", velocity - 0.2, velocity + 0.2, 40).expect("it");
+        here.theta = Axis::new("theta", theta - 0.03, theta + 0.03, 40).expect("an axis");
+        here.velocity = Axis::new("velocity", velocity - 0.03, velocity + 0.03, 40).expect("it");
         let [before, after] = [p - BESIDE, p + BESIDE].map(|p| {
             let pendulum = driven(0.1, p, 2.0);
             orbits(&pendulum, &here, &Control::default()).expect("a search").closed
