@@ -258,7 +258,15 @@ fn doublings_leave_an_orbit_of_twice_the_period() {
         let own = |orbits: &[PeriodicOrbit]| near(orbits, point(entry))[0].multipliers.0[0].re;
         let (stable, lost) = (own(&before), own(&after));
         assert!(-1.0 < stable && stable < -0.99 && lost < -1.0, "{name}: {stable}, {lost}");
-        let [before, after] = about(p, 2.0, 2 * n, 2 * w);
+        // Of long periods there are many orbits elsewhere: only those here are asked for.
+        let [theta, velocity] = point(entry);
+        let mut here = request(2 * n, 2 * w, 40);
+        here.theta = Axis::new("theta", theta - 0.03, theta + 0.03, 40).expect("an axis");
+        here.velocity = Axis::new("velocity", velocity - 0.03, velocity + 0.03, 40).expect("it");
+        let [before, after] = [p - BESIDE, p + BESIDE].map(|p| {
+            let pendulum = driven(0.1, p, 2.0);
+            orbits(&pendulum, &here, &Control::default()).expect("a search").closed
+        });
         assert!(near(&before, point(entry)).is_empty(), "{name}");
         let doubled = near(&after, point(entry));
         assert!(doubled.len() == 1 && doubled[0].is_stable(), "{name}: {}", doubled.len());
