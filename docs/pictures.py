@@ -121,7 +121,9 @@ def planes() -> None:
     figures.draw(
         parameter_map(Pendulum(), plane, curves=True), HERE / "plane.png", dpi=110, layer="kinds"
     )
-    figures.draw(bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110)
+    figures.draw(
+        bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110
+    )
 
 
 if __name__ == "__main__":

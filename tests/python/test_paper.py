@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 def test_a_figure_has_several_names(name: str) -> None:
     assert paper_figures.wanted(name) == ["4"]
     assert paper_figures.wanted("table 1") == paper_figures.wanted("table1") == ["table1"]
-    assert paper_figures.wanted("all") == ["2", "3", "4", "5", "6", "7", "table1"]
+    assert paper_figures.wanted("all") == ["1", "2", "3", "4", "5", "6", "7", "table1"]
 
 
 @pytest.mark.parametrize(
     ("name", "says"),
     [
         ("8", "not there yet"),
-        ("figure 2", "not there yet"),
+        ("figure 9", "not there yet"),
         ("10", "'10' is not one"),
         ("x", "'x'"),
     ],
@@ -42,7 +42,7 @@ def test_what_is_not_there_is_refused_in_one_line(
     run = pendmap_command("paper", name)
     assert run.returncode == 2
     assert says in run.stderr
-    assert "allowed are 2, 3, 4, 5, 6, 7, table1 and all" in run.stderr
+    assert "allowed are 1, 2, 3, 4, 5, 6, 7, table1 and all" in run.stderr
     assert run.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
@@ -60,7 +60,7 @@ def test_all_that_are_there(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("paper", "all", "--out", "out", "--json")
     assert run.returncode == 0, run.stderr
     files = json.loads(run.stdout)["files"]
-    names = [*(f"figure_{k}.png" for k in range(2, 8)), "table_1.csv"]
+    names = [*(f"figure_{k}.png" for k in range(1, 8)), "table_1.csv"]
     assert files == [f"out/{name}" for name in names]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(names)
     assert all((tmp_path / name).stat().st_size > 300 for name in files)

@@ -9,7 +9,7 @@ use crate::support::driven;
 use crate::truths::{list, number, table, truths};
 
 fn at(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Vec<Curve> {
-    tongues(pendulum, omegas, p_max, 0, &Control::default()).expect("curves")
+    tongues(pendulum, omegas, p_max, true, 0, &Control::default()).expect("curves")
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn the_fold_below_a_subcritical_onset() {
 #[test]
 fn what_is_asked_for_wrongly_is_refused() {
     let control = Control::default();
-    let ask = |pendulum: &Pendulum, p_max: f64| tongues(pendulum, &[2.0], p_max, 0, &control);
+    let ask = |pendulum: &Pendulum, p_max: f64| tongues(pendulum, &[2.0], p_max, true, 0, &control);
     let plain = driven(0.1, 1.0, 2.0);
     assert!(matches!(ask(&plain, 0.0), Err(Error::Range { name: "p_max", .. })));
     let rubbing = plain.clone().with_friction(0.1).expect("in range");
