@@ -10,6 +10,7 @@ __all__ = [
     "advance",
     "basins_grid",
     "basins_list",
+    "bifurcation",
     "choose_steps",
     "default_threads",
     "effects",

@@ -139,7 +139,7 @@ fn band(cells: &[i16], columns: usize, rows: usize, top: usize) -> Band {
 /// `-sum p ln p` over the shares of these counts.
 fn entropy(counts: &[(i16, usize)]) -> f64 {
     let total = counts.iter().map(|(_, number)| *number).sum::<usize>() as f64;
-    counts.iter().map(|(_, number)| *number as f64 / total).map(|p| -p * p.ln()).sum()
+    counts.iter().map(|(_, number)| *number as f64 / total).map(|p| p * (1.0 / p).ln()).sum()
 }
 
 fn count(counts: &mut Vec<(i16, usize)>, label: i16, number: usize) {

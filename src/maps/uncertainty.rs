@@ -8,8 +8,11 @@ use crate::error::Error;
 use crate::integrate::State;
 
 /// Distances are powers of two of the window's sides, from the first to the last exponent. Greater
-/// ones see several strips of a basin at once, where the law has not begun.
+/// ones see several strips of a basin at once, where the law has not begun; ...
 const SCALES: [i32; 2] = [-6, -26];
+/// ... they are taken where a short and smooth boundary leaves fewer distances than `LEAST_SCALES`.
+const WIDEST: i32 = -4;
+const LEAST_SCALES: usize = 5;
 /// Starts at every other distance that say how many each takes.
 const PILOT: usize = 512;
 /// Uncertain starts that are aimed at for each distance.
@@ -76,11 +79,18 @@ pub fn uncertainty(
         }
         Ok(counts)
     };
-    let pilot: Vec<(i32, usize)> =
-        (SCALES[1]..=SCALES[0]).rev().step_by(2).map(|scale| (scale, PILOT)).collect();
-    let seen = counted(&pilot)?;
     let cells = (window[0].count * window[1].count) as f64;
-    let plan = plan(&pilot, &seen, (LABELS[1] * cells).clamp(LABELS[0], LABELS[2]));
+    let labels = (LABELS[1] * cells).clamp(LABELS[0], LABELS[2]);
+    let mut planned = |widest: i32| -> Result<Vec<(i32, usize)>, Error> {
+        let pilot: Vec<(i32, usize)> =
+            (SCALES[1]..=widest).rev().step_by(2).map(|scale| (scale, PILOT)).collect();
+        let seen = counted(&pilot)?;
+        Ok(plan(&pilot, &seen, labels))
+    };
+    let mut plan = planned(SCALES[0])?;
+    if plan.len() < LEAST_SCALES {
+        plan = planned(WIDEST)?;
+    }
     let counts = counted(&plan)?;
     Ok(Uncertainty {
         eps: plan.iter().map(|(scale, _)| 2_f64.powi(*scale)).collect(),

@@ -57,7 +57,7 @@ fn chaos(cell: &Cell) -> Vec<Kind> {
 #[test]
 fn each_cell_has_the_reference_attractors() {
     for p in [0.5, 0.6, 1.0] {
-        let map = mapped(&driven(0.1, 1.0, 2.0), vec![p], vec![2.0], 9, 1);
+        let map = mapped(&driven(0.1, 1.0, 2.0), vec![p], vec![2.0], 100, 1);
         let known = attractors_at(p);
         let mut wanted: Vec<_> = known.iter().map(|k| (k.n, k.w)).collect();
         wanted.sort_unstable();
@@ -134,9 +134,14 @@ fn the_points_of_figure_2_are_tumbling_chaos_and_nothing_else() {
 
 #[test]
 fn transients_however_long_are_no_chaos() {
+    // On the saddle the exponent is 0.15 and more; chaos of a cascade's end has less.
+    let transient = |cell: &Cell| {
+        cell.found.iter().any(|f| f.attractor.kind.is_chaotic() && f.attractor.exponent > 0.1)
+    };
+
     let map = mapped(&driven(0.1, 1.0, 2.0), evenly(1.15, 1.79, 33), vec![2.0], 9, 0);
     for (p, cell) in evenly(1.15, 1.79, 33).into_iter().zip(&map.cells) {
-        assert!(!chaos(cell).contains(&Kind::TumblingChaos), "p = {p}");
+        assert!(!transient(cell), "p = {p}");
         assert!(!closed(cell).is_empty(), "p = {p}");
     }
 }
@@ -160,8 +165,10 @@ fn bifurcations_of_the_diagram_are_at_their_places() {
         diagram.map.cells.iter().map(own).collect()
     };
     let base = driven(0.1, 1.0, 2.0);
-    let fold = count(&diagram(&base, values(entry("rot_SN"))), (1, 1));
-    assert_eq!(fold, [vec![0; 11], vec![1; 11]].concat());
+    // No start finds the rotation near its fold: it is followed there from where it is easily found.
+    let ahead = evenly(entry("rot_SN") - 10.5 * step, entry("rot_SN") + 189.5 * step, 201);
+    let fold = count(&diagram(&base, ahead), (1, 1));
+    assert_eq!(fold, [vec![0; 11], vec![1; 190]].concat());
     let twins = count(&diagram(&base, values(entry("osc_SB"))), (2, 0));
     assert_eq!(twins, [vec![1; 11], vec![2; 11]].concat());
     let doubled = diagram(&base, values(entry("rot_PD1")));
