@@ -118,9 +118,8 @@ def diagnosis() -> None:
 def planes() -> None:
     """The attractors over p and omega, and against p."""
     plane = {"p": (0.05, 2.5, 200), "omega": (0.5, 3.0, 200)}
-    figures.draw(
-        parameter_map(Pendulum(), plane, curves=True), HERE / "plane.png", dpi=110, layer="kinds"
-    )
+    found = parameter_map(Pendulum(), plane, curves=True)
+    figures.draw(found, HERE / "plane.png", dpi=90, layer="kinds", size=(9.4, 9.4))
     figures.draw(
         bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110
     )
