@@ -23,6 +23,8 @@ STARTS = 9
 """Initial conditions of a cell where nothing is said."""
 _SPREAD = 1000
 _PLASTIC = 1.324717957244746
+_CELLS = 61
+"""After so many cells initial conditions come again: a prime, so that columns differ too."""
 
 
 def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
@@ -97,8 +99,8 @@ class CellSearch:
         return Grid(Axis(-math.pi, math.pi, _SPREAD), Axis(-reach, reach, _SPREAD))
 
     def initial(self, units: Units) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the initial conditions without dimensions."""
-        theta, velocity = spread(self.within(units), self.starts, self.seed)
+        """Return initial conditions without dimensions; each cell takes those after the last's."""
+        theta, velocity = spread(self.within(units), _CELLS * self.starts, self.seed)
         return theta, units.bare(velocity, VELOCITY)
 
     @property

@@ -104,6 +104,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
             axis.kernel,
             theta,
             velocity,
+            starts,
             first,
             tol,
             max_periods,

@@ -29,6 +29,8 @@ pub struct Request {
     pub axis: Range,
     /// Where the trajectories of the search start.
     pub starts: Vec<State>,
+    /// How many of them each value takes, in turn.
+    pub each: usize,
     /// Where what is followed starts, at either end; by default on the attractor that most starts end on.
     pub first: Option<State>,
     /// As of [`MapRequest`].
@@ -75,6 +77,7 @@ pub fn bifurcation(
     let asked = MapRequest {
         axes,
         starts: request.starts.clone(),
+        each: request.each,
         tol: request.tol,
         bound: request.bound,
         kept: KEPT,

@@ -56,8 +56,10 @@ pub struct Hint {
 /// How every cell is searched.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// Where the trajectories start.
+    /// Where trajectories start: each cell takes `each` of these, the next one those after them.
     pub starts: Vec<State>,
+    /// How many starts a cell has.
+    pub each: usize,
     /// Periods after which a search begins to watch what is left; by default what damping asks for.
     pub bound: Option<u32>,
     /// Points that are kept of an attractor that does not close.
@@ -65,9 +67,15 @@ pub struct Search {
 }
 
 impl Search {
-    /// The attractors of a pendulum: rests, orbits that `hints` lead to, and where the starts end.
+    /// The attractors of cell `number`: rests, orbits that `hints` lead to, and where its starts end.
     #[must_use]
-    pub fn cell(&self, strobe: &Strobe, hints: &[Hint], cancel: &AtomicBool) -> Cell {
+    pub fn cell(
+        &self,
+        number: usize,
+        strobe: &Strobe,
+        hints: &[Hint],
+        cancel: &AtomicBool,
+    ) -> Cell {
         let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
         // At rest nothing moves it away, however unstable: such points are no starts.
         catalogue.take_over(strobe, &[([0.0, 0.0], 1), ([PI, 0.0], 1)], cancel);
@@ -77,7 +85,9 @@ impl Search {
             cycles.iter().filter_map(|hint| Some((hint.point, hint.n?))).collect();
         let lost = catalogue.take_over(strobe, &cycles, cancel);
         further.extend(lost.into_iter().map(|point| Hint { point, n: None, w: 0 }));
-        let mut starts = self.starts.clone();
+        let first = number.wrapping_mul(self.each);
+        let own = |k: usize| self.starts[(first + k) % self.starts.len()];
+        let mut starts: Vec<State> = (0..self.each).map(own).collect();
         starts.extend(further.iter().map(|hint| hint.point));
         let bound = self.bound.unwrap_or_else(|| bound(&strobe.pendulum));
         let endings = catalogue.endings(strobe, &starts, bound, cancel);
@@ -128,7 +138,7 @@ impl Search {
                 Ending::Open(_) => placed.next().flatten(),
                 Ending::Failed => None,
             };
-            if k >= self.starts.len() {
+            if k >= self.each {
                 continue;
             }
             match (end, ending) {
@@ -137,7 +147,7 @@ impl Search {
                 (None, _) => undecided += 1,
             }
         }
-        let share = |count: usize| count as f64 / self.starts.len().max(1) as f64;
+        let share = |count: usize| count as f64 / self.each.max(1) as f64;
         let found = catalogue
             .attractors
             .iter()

@@ -1,8 +1,8 @@
 //! All closed orbits of one period and winding in a box of starts, those that repel too.
 //!
 //! Newton's method begins wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped,
-//! may vanish ([`super::vanishing`]), by differences
-//! first ([`super::approach`]). Next to an orbit near its birth it is begun again, repelled by
+//! may vanish (`vanishing.rs`), by differences
+//! first (`approach.rs`). Next to an orbit near its birth it is begun again, repelled by
 //! all that is known: branches that are about to meet lie nearer to one another than any cell.
 
 use std::f64::consts::TAU;

@@ -1,6 +1,6 @@
 //! Which attractors exist over a plane of two parameters.
 //!
-//! From a coarse grid to the finest, each cell is searched from the same starts and from the
+//! From a coarse grid to the finest, each cell is searched from a few starts, others than the next one's, and from the
 //! attractors of its neighbours on the coarser grids; then cells take over what their neighbours have and
 //! they lack. A cell sees only what earlier passes have left, so nothing depends on the order in which threads
 //! work.
@@ -37,8 +37,10 @@ pub struct Range {
 pub struct Request {
     /// The parameters of columns and rows.
     pub axes: [Range; 2],
-    /// Where the trajectories start.
+    /// Where trajectories start: what few starts miss in one cell those of others find.
     pub starts: Vec<State>,
+    /// How many of them each cell takes, in turn.
+    pub each: usize,
     /// The 95th percentile of the error after five periods, on sampled cells.
     pub tol: f64,
     /// Periods after which a trajectory that nothing captures is watched for as long again; by default
@@ -132,7 +134,7 @@ pub fn parameter_map(
     let plane = Plane { base, axes: &request.axes };
     let [columns, rows] = plane.size();
     let count = columns * rows;
-    if count == 0 || request.starts.is_empty() {
+    if count == 0 || request.starts.is_empty() || request.each == 0 {
         let name = if count == 0 { "cells" } else { "starts" };
         return Err(Error::Range { name, value: 0.0, allowed: "1 or more" });
     }
@@ -141,8 +143,8 @@ pub fn parameter_map(
     let probes = Starts::List(request.starts.clone()).sampled_states(PROBES, 0);
     let path = Path::choose()?;
     let resolution = pool.install(|| Resolution::new(&plane, &probes, request.tol, path))?;
-    let search =
-        Search { starts: request.starts.clone(), bound: request.bound, kept: request.kept };
+    let &Request { each, bound, kept, .. } = request;
+    let search = Search { starts: request.starts.clone(), each, bound, kept };
     let strobe = |cell: usize| resolution.strobe(&plane.pendulum(cell), plane.place(cell));
     control.begin(count);
     let mut cells: Vec<Option<Cell>> = vec![None; count];
@@ -161,7 +163,7 @@ pub fn parameter_map(
                 let around = plane.neighbours(*cell, stride, true);
                 let others = around.iter().filter_map(|other| known[*other].as_ref());
                 let hints = Cell::hints(others, strobe.pendulum.is_mirror_symmetric());
-                let cell = search.cell(&strobe, &hints, control.flag());
+                let cell = search.cell(*cell, &strobe, &hints, control.flag());
                 control.add(1);
                 Ok(cell)
             };
@@ -189,7 +191,7 @@ pub fn parameter_map(
                 }
                 let mut hints = Cell::hints(std::iter::once(&known[cell]), symmetric);
                 hints.extend(lacking);
-                Ok(Some((cell, search.cell(&strobe, &hints, control.flag()))))
+                Ok(Some((cell, search.cell(cell, &strobe, &hints, control.flag()))))
             };
             (0..count)
                 .into_par_iter()

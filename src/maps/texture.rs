@@ -78,7 +78,8 @@ pub fn of_cells(cells: &[i16], columns: usize, pool: &rayon::ThreadPool) -> Text
     let same: usize = bands.iter().map(|b| b.same).sum();
     let boxes: usize = bands.iter().map(|b| b.boxes).sum();
     let mixed: Vec<f64> = bands.into_iter().flat_map(|b| b.mixed).collect();
-    let (sum, number) = (mixed.iter().sum::<f64>(), mixed.len() as f64);
+    // The sum of nothing is -0.
+    let (sum, number) = (0.0 + mixed.iter().sum::<f64>(), mixed.len() as f64);
     let mean = if mixed.is_empty() { 0.0 } else { sum / number };
     let spread = mixed.iter().map(|s| (s - mean).powi(2)).sum::<f64>();
     let several = mixed.len() > 1;

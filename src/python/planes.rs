@@ -22,7 +22,7 @@ pub fn parameter_names(parameters: Parameters) -> PyResult<Vec<String>> {
 
 /// The attractors over a plane of two parameters: columns over all attractors of all cells, and over cells.
 #[pyfunction]
-#[pyo3(signature = (parameters, axes, theta, velocity, tol, bound, threads, progress=None))]
+#[pyo3(signature = (parameters, axes, theta, velocity, each, tol, bound, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn parameter_map<'py>(
     py: Python<'py>,
@@ -30,6 +30,7 @@ pub fn parameter_map<'py>(
     axes: (RangeTuple, RangeTuple),
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
+    each: usize,
     tol: f64,
     bound: Option<u32>,
     threads: usize,
@@ -39,8 +40,15 @@ pub fn parameter_map<'py>(
     let range = |(index, values): RangeTuple| Range { index, values };
     let starts: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
-    let request =
-        Request { axes: [range(axes.0), range(axes.1)], starts, tol, bound, kept: 1, threads };
+    let request = Request {
+        axes: [range(axes.0), range(axes.1)],
+        starts,
+        each,
+        tol,
+        bound,
+        kept: 1,
+        threads,
+    };
     let map = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
     let dict = attractors_of(py, &map.cells)?;
     dict.set_item("reached_error", map.resolution.reached_error)?;
@@ -51,7 +59,7 @@ pub fn parameter_map<'py>(
 
 /// The attractors along one parameter, their points, and what is followed up and down.
 #[pyfunction]
-#[pyo3(signature = (parameters, axis, theta, velocity, first, tol, bound, threads, progress=None))]
+#[pyo3(signature = (parameters, axis, theta, velocity, each, first, tol, bound, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn bifurcation<'py>(
     py: Python<'py>,
@@ -59,6 +67,7 @@ pub fn bifurcation<'py>(
     axis: RangeTuple,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
+    each: usize,
     first: Option<(f64, f64)>,
     tol: f64,
     bound: Option<u32>,
@@ -71,6 +80,7 @@ pub fn bifurcation<'py>(
     let request = diagram::Request {
         axis: Range { index: axis.0, values: axis.1 },
         starts,
+        each,
         first: first.map(|(theta, velocity)| [theta, velocity]),
         tol,
         bound,

@@ -31,14 +31,23 @@ fn mapped(
     threads: usize,
 ) -> ParameterMap {
     let axes = [Range { index: P, values: p }, Range { index: OMEGA, values: omega }];
-    let request = Request { axes, starts: starts(count), tol: 1e-6, bound: None, kept: 1, threads };
+    let request = Request {
+        axes,
+        starts: starts(61 * count),
+        each: count,
+        tol: 1e-6,
+        bound: None,
+        kept: 1,
+        threads,
+    };
     parameter_map(base, &request, &Control::default()).expect("a map")
 }
 
 fn diagram(base: &Pendulum, p: Vec<f64>) -> Diagram {
     let axis = Range { index: P, values: p };
-    let (starts, first) = (starts(9), None);
-    let request = bifurcation::Request { axis, starts, first, tol: 1e-6, bound: None, threads: 0 };
+    let (starts, each, first) = (starts(549), 9, None);
+    let request =
+        bifurcation::Request { axis, starts, each, first, tol: 1e-6, bound: None, threads: 0 };
     bifurcation(base, &request, &Control::default()).expect("a diagram")
 }
 
