@@ -202,6 +202,7 @@ impl Catalogue {
         cancel: &AtomicBool,
     ) -> bool {
         let returns = near_returns(strobe, alive, self.effort.longest_cycle);
+        let known = self.orbits.len();
         let (mut found, mut tries) = (Vec::new(), 0);
         for (_, start, n) in returns {
             let held = |e: &Ellipse| e.height([wrapped(start[0]), start[1]]) < 1.0;
@@ -222,7 +223,7 @@ impl Catalogue {
             }
             found.extend(traps);
         }
-        if !found.is_empty() {
+        if self.orbits.len() > known {
             self.rebuild(&strobe.pendulum);
         }
         !found.is_empty()
@@ -236,7 +237,9 @@ impl Catalogue {
         cancel: &AtomicBool,
     ) -> Vec<Ellipse> {
         let own = ellipses(strobe, &orbit, &self.effort.trap, cancel);
-        if own.is_empty() {
+        // One that no trap holds is there all the same: in a brisk search it is listed, and what comes
+        // near it is placed by Newton's method.
+        if own.is_empty() && self.effort.precise {
             return own;
         }
         let mut traps = own.clone();
