@@ -116,9 +116,9 @@ impl Job for Stretch<'_> {
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
         if self.turns.len() <= S::Few::WIDTH {
-            self.of::<S::Few>(isa)
+            self.of::<S::Few>(isa);
         } else {
-            self.of::<S::Narrow>(isa)
+            self.of::<S::Narrow>(isa);
         }
     }
 }

@@ -33,13 +33,13 @@ impl<const K: usize> Interpolant<K> {
             let angle = |j: usize| PI * (j as f64 + 0.5) / count as f64;
             let values: Vec<Values<K>> =
                 (0..count).map(|j| function(made.place(angle(j).cos()))).collect();
-            for k in 0..K {
+            for (k, series) in made.series.iter_mut().enumerate() {
                 let coefficient = |i: usize| {
                     let sum: f64 =
                         (0..count).map(|j| values[j][k] * (i as f64 * angle(j)).cos()).sum();
                     sum * if i == 0 { 1.0 } else { 2.0 } / count as f64
                 };
-                made.series[k] = (0..count).map(coefficient).collect();
+                *series = (0..count).map(coefficient).collect();
             }
             let resolved = made.series.iter().all(|series| {
                 let largest = series.iter().fold(0.0_f64, |m, c| m.max(c.abs()));

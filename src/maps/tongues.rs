@@ -55,6 +55,9 @@ pub struct Curve {
     pub fold: Option<Fold>,
 }
 
+/// A function of the monodromy matrix and its product that vanishes at critical amplitudes.
+type Vanishing = fn(Values<5>) -> f64;
+
 /// All critical amplitudes up to `p_max` at each of the frequencies, with `folds` if asked for.
 ///
 /// # Errors
@@ -149,10 +152,10 @@ fn along(pendulum: &Pendulum, omega: f64, p_max: f64, folds: bool) -> Curve {
         let begin: Values<5> = std::array::from_fn(|k| panel.value(k, end(i)));
         let even = (begin[0] - begin[3]).abs() < ALIKE * (1.0 + begin[0].abs())
             && (begin[4] - 1.0).abs() < ALIKE;
-        let functions: Vec<(f64, fn(Values<5>) -> f64)> = if even {
-            vec![(0.0, |m| m[1]), (0.0, |m| m[2])]
+        let functions: [(f64, Vanishing); 2] = if even {
+            [(0.0, |m| m[1]), (0.0, |m| m[2])]
         } else {
-            vec![(1.0, |m| gap(1.0, m)), (-1.0, |m| gap(-1.0, m))]
+            [(1.0, |m| gap(1.0, m)), (-1.0, |m| gap(-1.0, m))]
         };
         for (multiplier, function) in functions {
             for zero in panel.zeros(function) {

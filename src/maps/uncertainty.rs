@@ -29,7 +29,7 @@ const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
 const SIDES: usize = 3;
 
 /// How many starts are uncertain: some of them have another label than a start at a distance `eps`,
-/// on one side or on the other, in a direction drawn at random for each (Grebogi, McDonald, Ott &
+/// on one side or on the other, in a direction drawn at random for each (Grebogi, `McDonald`, Ott &
 /// Yorke 1983, Physics Letters A 99, 415).
 ///
 /// Starts are drawn anew for each distance, so the counts are independent and binomial. Those with an
@@ -114,10 +114,10 @@ fn plan(pilot: &[(i32, usize)], seen: &[[u64; 2]], labels: f64) -> Vec<(i32, usi
         }
         enough
     };
-    for k in 0..told {
-        add(pilot[k].0, share(k));
+    for (k, (scale, _)) in pilot.iter().take(told).enumerate() {
+        add(*scale, share(k));
         if k + 1 < told {
-            add(pilot[k].0 - 1, (share(k) * share(k + 1)).sqrt());
+            add(scale - 1, (share(k) * share(k + 1)).sqrt());
         }
     }
     // Beyond what the pilot tells the share may fall as on a smooth boundary.
@@ -130,7 +130,7 @@ fn plan(pilot: &[(i32, usize)], seen: &[[u64; 2]], labels: f64) -> Vec<(i32, usi
     wanted.into_iter().map(|(scale, starts)| (scale, (part * starts).ceil() as usize)).collect()
 }
 
-/// Random numbers by SplitMix64 (Steele, Lea & Flood 2014, OOPSLA): the same on every machine.
+/// Random numbers by `SplitMix64` (Steele, Lea & Flood 2014, OOPSLA): the same on every machine.
 struct Draw {
     state: u64,
 }

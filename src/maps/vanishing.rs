@@ -67,7 +67,7 @@ pub(super) fn places(
         let around = |cell: &Cell| {
             let [x, y] = cell.corner;
             (0..25).map(move |k| {
-                let (i, j) = ((k % 5) as f64 - 1.0, (k / 5) as f64 - 1.0);
+                let (i, j) = (f64::from(k % 5) - 1.0, f64::from(k / 5) - 1.0);
                 [x + i * half[0], y + j * half[1]]
             })
         };
