@@ -54,12 +54,12 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     Every cell is searched from a few initial conditions, other ones than its neighbours', and from
     points of its neighbours' attractors: grids become finer from every eighth cell to all, each
-    cell beginning also from what its neighbours on the coarser grid have; then, in two passes, from
-    what the cells beside it have and it lacks. So branches that coexist are followed, and nothing
-    depends on the order of the work. Trajectories run until a stable orbit, found by Newton's
-    method, has captured them. Those that nothing captures are watched for as long again; where none
-    of a set of them ends and their exponent is positive by four standard errors, the set is chaos
-    of its kind. What is left is undecided.
+    cell beginning also from what its neighbours on the coarser grid have; then, in six passes, from
+    what cells at distances from eight to one have and it lacks. So branches that coexist are
+    followed, and nothing depends on the order of the work. Trajectories run until a stable orbit,
+    found by Newton's method, has captured them. Those that nothing captures are watched for as long
+    again; where none of a set of them ends and their exponent is positive by four standard errors,
+    the set is chaos of its kind. What is left is undecided.
 
     Parameters
     ----------

@@ -94,10 +94,17 @@ impl Search {
         self.told(strobe, &catalogue, &endings)
     }
 
-    /// Those of `hints` that promise what `cell` does not have: chaos of its kind, a stable orbit that Newton's
-    /// method finds from there, or an orbit of that period and winding that may have changed into another.
+    /// Those of `hints` that promise what `cell` does not have: a stable orbit that Newton's method finds
+    /// from there; from a cell `beside` it also chaos of its kind, or an orbit of that period and winding
+    /// that may have changed into another.
     #[must_use]
-    pub fn promising(&self, strobe: &Strobe, cell: &Cell, hints: Vec<Hint>) -> Vec<Hint> {
+    pub fn promising(
+        &self,
+        strobe: &Strobe,
+        cell: &Cell,
+        hints: Vec<Hint>,
+        beside: bool,
+    ) -> Vec<Hint> {
         let symmetric = strobe.pendulum.is_mirror_symmetric();
         let unlike =
             |hint: &Hint| !cell.found.iter().any(|f| hint.is_like(&f.attractor, symmetric));
@@ -107,9 +114,9 @@ impl Search {
         }
         let map = PoincareMap::of_steps(strobe);
         let promises = |hint: &Hint| {
-            let Some(n) = hint.n else { return true };
+            let Some(n) = hint.n else { return beside };
             let orbit = newton::find(&map, hint.point, n, REACH).filter(PeriodicOrbit::is_stable);
-            let Some(orbit) = orbit else { return !cell.has(n, hint.w) };
+            let Some(orbit) = orbit else { return beside && !cell.has(n, hint.w) };
             let has = |orbit: &PeriodicOrbit| {
                 let own = |p: &State| orbit.contains(*p, SAME);
                 cell.found

@@ -18,8 +18,9 @@ use crate::model::Pendulum;
 
 /// Cells between those of the coarsest grid.
 const COARSEST: usize = 8;
-/// Passes in which neighbours exchange their attractors.
-const EXCHANGES: usize = 2;
+/// Distances over which cells exchange their attractors, pass after pass: what one cell alone has found
+/// comes to all that can have it.
+const EXCHANGES: [usize; 6] = [8, 4, 2, 1, 1, 1];
 /// Starts of that measurement.
 const PROBES: usize = 100;
 
@@ -176,16 +177,16 @@ pub fn parameter_map(
     }
     let mut cells: Vec<Cell> = cells.into_iter().flatten().collect();
     let mut searched_again = 0;
-    for _ in 0..EXCHANGES {
+    for stride in EXCHANGES {
         let known = &cells;
         let again: Vec<(usize, Cell)> = pool.install(|| {
             let one = |cell: usize| {
                 control.check()?;
                 let strobe = strobe(cell);
                 let symmetric = strobe.pendulum.is_mirror_symmetric();
-                let around = plane.neighbours(cell, 1, false);
+                let around = plane.neighbours(cell, stride, false);
                 let theirs = Cell::hints(around.iter().map(|c| &known[*c]), symmetric);
-                let lacking = search.promising(&strobe, &known[cell], theirs);
+                let lacking = search.promising(&strobe, &known[cell], theirs, stride == 1);
                 if lacking.is_empty() {
                     return Ok(None);
                 }

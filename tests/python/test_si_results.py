@@ -219,8 +219,8 @@ def test_axes_are_named_in_the_units_of_the_result() -> None:
         with rc_context(style.RC):
             sheet = trajectory.figure(run, layer=None, size=None, dpi=50.0, colormap=None)
             sheet.canvas.draw()
-        history, phase, _ = sheet.axes
-        assert history.get_xlabel() == clock
+        _, energy, phase, _ = sheet.axes
+        assert energy.get_xlabel() == clock
         assert phase.get_ylabel() == speed
         for text in sheet.texts:
             assert text.get_window_extent().x1 <= sheet.bbox.x1, text.get_text()
