@@ -84,7 +84,7 @@ def test_bad_input_is_refused_and_leaves_nothing(
 
 
 def test_a_dataset_of_another_kind_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"kind None.*basins, trajectory"):
+    with pytest.raises(InputError, match=r"kind None.*basins, .*trajectory"):
         figures.draw(xr.Dataset(), tmp_path / "a.png")
     with pytest.raises(InputError, match="list of starts"):
         figures.draw(synthetic.painted().isel(theta=0, drop=True), tmp_path / "a.png")
@@ -93,7 +93,7 @@ def test_a_dataset_of_another_kind_is_refused(tmp_path: Path) -> None:
 def test_a_trajectory_has_its_own_layers(tmp_path: Path) -> None:
     dataset = motions.swing(periods=3, steps=20)
     figures.draw(dataset, tmp_path / "a.png", layer="section", dpi=50)
-    with pytest.raises(InputError, match=r"'labels'.*history, phase, section"):
+    with pytest.raises(InputError, match=r"'labels'.*history, energy, phase, section"):
         figures.draw(dataset, tmp_path / "b.png", layer="labels")
 
 
