@@ -21,7 +21,10 @@ __all__ = ["command"]
     help="Figure to write: .png .svg .pdf.  [default: FILE with .png]",
 )
 @click.option(
-    "--layer", help="One part alone: labels, settle, turns, exponent; history, phase, section."
+    "--layer",
+    help="One part alone: labels, settle, turns, exponent of basins; kinds, exponent, attractors,"
+    " period, winding, undecided, 'share KIND' of a map; history, energy, phase, section of a"
+    " trajectory; theta, velocity of a bifurcation diagram; omega-p, e-alpha2 of critical curves.",
 )
 @click.option("--size", help="Width x height in inches, like 8x4.")
 @click.option("--dpi", type=click.IntRange(20, 1200), help="Pixels an inch of a .png.")
