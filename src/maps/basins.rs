@@ -30,6 +30,8 @@ pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + Effort::THOROUGH.watch);
 /// settling time that the search saw before it counts as chaotic.
 const PATIENCE: u32 = 10;
 const LEAST_BOUND: u32 = 200;
+/// Cells of a map from which its uncertainty exponent is worth the starts that it takes: about as many.
+const LEAST_CELLS: usize = 40_000;
 /// The bound where none is given.
 pub(crate) const MAX_PERIODS: u32 = 4000;
 
@@ -199,7 +201,8 @@ pub fn basins(
                 control,
             )?;
         }
-        if let (true, Starts::Grid { theta, velocity }) = (options.check, starts) {
+        let enough = options.check && starts.len() >= LEAST_CELLS;
+        if let (true, Starts::Grid { theta, velocity }) = (enough, starts) {
             let again = |states: Vec<State>| {
                 let states = Starts::List(states);
                 Ok(label(&strobe, &catalogue, &states, None, bound, &pool, control)?.label)
