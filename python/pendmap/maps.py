@@ -88,7 +88,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         the starts were drawn at random, more than that of a grid. ``basin_entropy``,
         ``boundary_basin_entropy`` and ``uncertainty_exponent`` say how the basins are interwoven:
         see :func:`pendmap.basin_entropy` and :func:`pendmap.uncertainty_exponent`; the counts
-        behind the exponent are ``uncertain`` of ``uncertainty_tried`` starts over ``distance``.
+        behind the exponent, from 10,000 cells on, are ``uncertain`` of ``uncertainty_tried``
+        starts over ``distance``.
 
     Raises
     ------

@@ -284,7 +284,8 @@ def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
     if "uncertainty_eps" not in dataset:
         raise InputError(
             "this dataset has no counts of uncertain starts: allowed are maps of pendmap.basins "
-            "whose labels tell basins apart, made with check=True; or dataset['label']"
+            "of 10,000 cells or more whose labels tell basins apart, made with check=True; or "
+            "dataset['label']"
         )
     found = fitted_map(dataset)
     if found is None:

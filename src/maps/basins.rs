@@ -30,8 +30,9 @@ pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + Effort::THOROUGH.watch);
 /// settling time that the search saw before it counts as chaotic.
 const PATIENCE: u32 = 10;
 const LEAST_BOUND: u32 = 200;
-/// Cells of a map from which its uncertainty exponent is worth the starts that it takes: about as many.
-const LEAST_CELLS: usize = 40_000;
+/// Cells of a map from which its uncertainty exponent is worth the 50,000 starts that it takes; a
+/// smaller map is a sketch, whatever a start costs.
+const LEAST_CELLS: usize = 10_000;
 /// The bound where none is given.
 pub(crate) const MAX_PERIODS: u32 = 4000;
 

@@ -75,15 +75,16 @@ fn starts_with_unknown_ends_are_left_out() {
 }
 
 #[test]
-fn a_map_has_it_and_a_list_or_a_hasty_map_has_not() {
+fn a_map_has_it_and_a_list_a_hasty_map_or_a_sketch_has_not() {
     let pendulum = driven(0.1, 0.6, 2.0);
     let made = |starts: &Starts, check: bool| {
         let options = Options { check, ..Options::default() };
         basins(&pendulum, starts, &options, &Control::default()).expect("a map").uncertainty
     };
-    let grid = plane(60);
+    let grid = plane(100);
     let found = made(&grid, true).expect("a grid that is checked");
     assert!(found.uncertain.iter().sum::<u64>() > 100, "{found:?}");
     assert_eq!(made(&grid, false), None);
+    assert_eq!(made(&plane(99), true), None);
     assert_eq!(made(&Starts::List(vec![[1.0, 0.0], [2.0, 0.0]]), true), None);
 }
