@@ -74,11 +74,13 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     """All periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
 
     An orbit is a fixed point of ``P^n(x) - (2 pi w, 0)``, ``P`` the stroboscopic map. The
-    displacement is computed on the centres of the grid's cells; Newton's method begins wherever
-    both its components change sign around four of them, and at each that has the least one of its
-    neighbourhood. What closes to 1e-12 is kept, with the Floquet multipliers, the eigenvalues of
-    the derivative of ``P^n``, also where friction stops the pendulum on its way. An orbit whose
-    neighbours in the plane lie nearer than a cell may be missed: a finer grid shows.
+    displacement is compared with its linear part on every cell of the grid; cells in which it
+    cannot vanish are left, the others quartered, four times. Newton's method begins in those that
+    remain, first by differences, then on the precise map, and beside orbits near their birth with
+    the known ones divided out. What closes to 1e-12, or as far as rounding lets it where the
+    multipliers are large, is kept, with the Floquet multipliers, the eigenvalues of the derivative
+    of ``P^n``, also where friction stops the pendulum on its way. An orbit whose neighbours in the
+    plane lie nearer than a cell may be missed: a finer grid shows.
 
     States that friction holds for ever are a set, and none of them is listed.
 

@@ -9,8 +9,10 @@ use super::poincare::{PoincareMap, closing_gap};
 use crate::integrate::State;
 use crate::integrate::accuracy::{distance, wrapped};
 
-/// Largest `|P^n(x) - x|` of an orbit that counts as found.
+/// Largest `|P^n(x) - x|` of an orbit that counts as found, where rounding allows it; ...
 pub const RESIDUAL: f64 = 1e-12;
+/// ... else this times the derivative: what rounding moves a point by grows by that until it comes back.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Largest relative deviation of a period's shrinking of area from the exact product.
 pub const PRODUCT: f64 = 1e-9;
 const ITERATIONS: usize = 16;
@@ -69,9 +71,9 @@ impl PeriodicOrbit {
 
 /// Newton's method on `P^n(x) - x` from `start`; then the smallest period that divides `n`.
 ///
-/// `None` if it does not converge to a residual below [`RESIDUAL`], wanders further than `reach`,
-/// or if phase area does not
-/// shrink by the product that the damping and the turns give it.
+/// `None` if it does not converge to a residual below [`RESIDUAL`], or below what rounding leaves where
+/// the derivative of `P^n` is large, wanders further than `reach`, or if phase area does not shrink by
+/// the product that the damping and the turns give it.
 #[must_use]
 pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<PeriodicOrbit> {
     find_other(map, start, n, reach, &[])
@@ -109,19 +111,25 @@ fn lowest(points: &[State]) -> usize {
     (0..points.len()).min_by(|a, b| points[*a][0].total_cmp(&points[*b][0])).unwrap_or(0)
 }
 
+/// The least gap that can be told from none.
+fn least_gap(derivative: &Matrix2<f64>) -> f64 {
+    RESIDUAL.max(ROUNDING * derivative.norm())
+}
+
 fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]) -> Option<State> {
     let mut point = start;
+    // How large the gap is over the least one.
     let mut best: Option<(f64, State)> = None;
     let mut first = f64::INFINITY;
     for iteration in 0..ITERATIONS {
         let image = map.iterate(point, n);
         let gap = closing_gap(point, image.state);
-        let size = gap.norm();
+        let size = gap.norm() / least_gap(&image.derivative);
         if iteration == 0 {
             first = size;
         }
         // What repels lets the gap grow first.
-        if iteration == PROMISING && known.is_empty() && size > 0.1 * first && size > RESIDUAL {
+        if iteration == PROMISING && known.is_empty() && size > 0.1 * first && size > 1.0 {
             break;
         }
         if !size.is_finite() || distance(point, start) > reach {
@@ -129,7 +137,7 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
         }
         match best {
             // At the level of rounding the gap no longer falls: that is the end.
-            Some((least, _)) if size >= least && least < RESIDUAL => break,
+            Some((least, _)) if size >= least && least < 1.0 => break,
             Some((least, _)) if size >= least => {}
             _ => best = Some((size, point)),
         }
@@ -140,7 +148,7 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
         point = [point[0] + damped * step[0], point[1] + damped * step[1]];
     }
     let (least, point) = best?;
-    (least < RESIDUAL).then_some(point)
+    (least < 1.0).then_some(point)
 }
 
 /// Newton's step of the gap times `m(x)`: along the step of the gap, over `1 - step . grad m / m`.
@@ -190,7 +198,7 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
             (ad - bc - each).abs() <= PRODUCT * (ad.abs() + bc.abs() + each.abs())
         })
     });
-    (area_shrinks && residual < 10.0 * RESIDUAL).then_some(PeriodicOrbit {
+    (area_shrinks && residual < 10.0 * least_gap(&monodromy[0])).then_some(PeriodicOrbit {
         n,
         w,
         points,
