@@ -33,7 +33,7 @@ lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of impor
 bench: $(VENV)/.develop ## criterion, then the comparisons with other tools
 	$(BIN)/pip install --quiet -r benchmarks/requirements.txt
 	cargo bench --locked
-	for script in integration friction exponents maps autonomous threads_memory rig coverage; do \
+	for script in integration friction exponents parameters maps autonomous threads_memory rig coverage; do \
 		$(BIN)/python benchmarks/$$script.py || exit 1; done
 
 $(VENV)/bin/maturin:

@@ -18,6 +18,7 @@ from pendmap import (
     bifurcation,
     figures,
     paper_figures,
+    paper_motions,
     parameter_map,
     read_experiment,
     simulate,
@@ -125,8 +126,22 @@ def planes() -> None:
     )
 
 
+def forced() -> None:
+    """A rig's runs that tumble beside the ensemble of the model that its decay gives."""
+    model = paper_figures.report().methods["combined_repaired"].rig
+    figures.draw_motions(
+        paper_motions.tumbling(model),
+        HERE / "tumbling.png",
+        steady=False,
+        title="Tumbling until it settles",
+        subtitle="virtual rig, and the model that was identified from its free decay",
+        dpi=110,
+    )
+
+
 if __name__ == "__main__":
     planes()
+    forced()
     figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
     figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
     friction()

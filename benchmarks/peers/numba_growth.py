@@ -1,7 +1,8 @@
 """Growth of a tangent beside each start, by the numba RK4 in blocks, on all threads of numba.
 
 The state is that of `numba_rk4` in blocks of 32 starts with a table of cosines; the tangent goes
-through the same stages and is scaled back to length 1 once a period.
+through the same stages and is scaled back to length 1 once a period. Each start has a drive of its
+own strength; the last stroboscopic points are kept where there is room for them.
 """
 
 from __future__ import annotations
@@ -22,30 +23,36 @@ if TYPE_CHECKING:
 
 
 @numba.njit(fastmath=True, parallel=True)
-def _grow(  # noqa: PLR0913, PLR0917 (compiled: arrays and numbers alone)
-    case: tuple[float, float, float],
+def grow(  # noqa: PLR0913, PLR0917 (compiled: arrays and numbers alone)
+    gamma: float,
+    omega: float,
+    p: Floats,
     theta: Floats,
     velocity: Floats,
     growth: Floats,
+    points: Floats,
     steps: int,
     periods: int,
 ) -> None:
-    gamma, p, omega = case
+    """Advance N starts in place; add up growth, shape (N,); fill points, shape (N, kept, 2)."""
+    kept = points.shape[1]
     h = 2.0 * math.pi / omega / steps
-    force = np.empty(2 * steps + 1)
+    wave = np.empty(2 * steps + 1)
     for k in range(2 * steps + 1):
-        force[k] = 1.0 + p * math.cos(math.pi * k / steps)
+        wave[k] = math.cos(math.pi * k / steps)
     for block in numba.prange((theta.size + BLOCK - 1) // BLOCK):
         first = block * BLOCK
         angle, speed, ln = np.empty(BLOCK), np.empty(BLOCK), np.zeros(BLOCK)
+        drive = np.empty(BLOCK)
         across, along = np.full(BLOCK, math.sqrt(0.5)), np.full(BLOCK, math.sqrt(0.5))
         for i in range(BLOCK):
             source = min(first + i, theta.size - 1)
-            angle[i], speed[i] = theta[source], velocity[source]
-        for _ in range(periods):
+            angle[i], speed[i], drive[i] = theta[source], velocity[source], p[source]
+        for period in range(periods):
             for step in range(steps):
-                f1, f2, f3 = force[2 * step], force[2 * step + 1], force[2 * step + 2]
+                c1, c2, c3 = wave[2 * step], wave[2 * step + 1], wave[2 * step + 2]
                 for i in range(BLOCK):
+                    f1, f2, f3 = 1 + drive[i] * c1, 1 + drive[i] * c2, 1 + drive[i] * c3
                     x, v, y, w = angle[i], speed[i], across[i], along[i]
                     a1 = -gamma * v - f1 * math.sin(x)
                     b1 = -gamma * w - f1 * math.cos(x) * y
@@ -77,6 +84,9 @@ def _grow(  # noqa: PLR0913, PLR0917 (compiled: arrays and numbers alone)
                 ln[i] += math.log(size)
                 across[i] /= size
                 along[i] /= size
+            place = period - periods + kept
+            for i in range(min(BLOCK, theta.size - first) if place >= 0 else 0):
+                points[first + i, place, 0], points[first + i, place, 1] = angle[i], speed[i]
         for i in range(min(BLOCK, theta.size - first)):
             theta[first + i], velocity[first + i] = angle[i], speed[i]
             growth[first + i] = ln[i]
@@ -103,8 +113,9 @@ class NumbaGrowth:
 
     def _run(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats, Floats]:
         theta, velocity, growth = theta.copy(), velocity.copy(), np.empty(theta.size)
-        case = (self.case.gamma, self.case.p, self.case.omega)
-        _grow(case, theta, velocity, growth, self.steps, periods)
+        case, drive = self.case, np.full(theta.size, self.case.p)
+        none = np.empty((theta.size, 0, 2))
+        grow(case.gamma, case.omega, drive, theta, velocity, growth, none, self.steps, periods)
         return theta, velocity, growth
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:

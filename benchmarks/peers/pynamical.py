@@ -70,6 +70,57 @@ def _ends(theta: Floats, velocity: Floats, parameters: Floats, until: float, ste
     return out
 
 
+@numba.njit(parallel=True)
+def _of_cells(cells: Floats, start: Floats, step: float, dropped: int, kept: int) -> Floats:
+    out = np.empty(cells.shape[0])
+    for i in numba.prange(cells.shape[0]):
+        parameters = cells[i].copy()
+        period = 2.0 * math.pi / parameters[2]
+        end = evolve_system(
+            start, parameters, dropped * period, _slope, step, 1e-6, 1e-3, rk4_step_wrapped
+        )
+        until = kept * period
+        found = maximum_lyapunov_exponent(
+            end, parameters, until, _slope, _jacobian, None, step, 1e-6, 1e-3, rk4_step_wrapped
+        )
+        out[i] = found[0, 0]
+    return out
+
+
+def exponents_of_cells(
+    case: Case, cells: list[Floats], start: Floats, steps: int, periods: tuple[int, int]
+) -> Floats:
+    """Return an exponent for each pair of p and omega, shape (N,), after dropped periods.
+
+    Steps are as long as `steps` a period of the case's own drive.
+    """
+    p, omega = cells
+    table = np.stack([np.full(p.size, case.gamma), p, omega], axis=1)
+    return _of_cells(table, start, case.period / steps, *periods)
+
+
+def diagram(
+    case: Case, p: Floats, start: tuple[float, float], steps: int, periods: tuple[int, int]
+) -> Floats:
+    """Return stroboscopic points, shape (N, kept, 2): its class in a loop over p, as it has it."""
+    system = ContinuousDynamicalSystem(
+        equations_of_motion=_slope, system_dimension=2, parameters=[case.gamma, case.p, case.omega]
+    )
+    system.integrator("rk4", time_step=case.period / steps)
+    dropped, kept = periods
+    each = [
+        system.stroboscopic_map(
+            list(start),
+            kept,
+            case.period,
+            parameters=[case.gamma, one, case.omega],
+            transient_time=dropped * case.period,
+        )[:, 1:]
+        for one in p
+    ]
+    return np.array(each)
+
+
 class Pynamical:
     """The fixed-step method for one case."""
 

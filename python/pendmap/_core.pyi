@@ -24,6 +24,7 @@ __all__ = [
     "parameter_map",
     "parameter_names",
     "period",
+    "replay",
     "simd",
     "simd_available",
     "simulate",
@@ -189,3 +190,12 @@ def fit_rows(
     tolerance: float,
     windows: Sequence[_Window],
 ) -> list[tuple[list[int], _Floats, _Floats, _Floats]]: ...
+def replay(
+    run: dict[str, Any],
+    theta: _Floats,
+    velocity: _Floats,
+    times: _Floats,
+    tolerance: float,
+    threads: int,
+    progress: _Progress | None = None,
+) -> _Floats: ...

@@ -13,6 +13,7 @@
 //! - [`alone`]: one window by itself
 //! - [`stages`]: from short windows to long ones
 //! - [`profile`]: intervals from the profile of the likelihood
+//! - [`replay`]: the pendulum of a record from many starts at once
 //!
 //! Multiple shooting: Bock (1983), Progress in Scientific Computing 2, 95; without conditions of
 //! continuity between windows, so that each window stands for itself. Time is counted in `1 / w_ref`
@@ -27,6 +28,7 @@ pub mod normal;
 pub mod problem;
 pub mod profile;
 pub mod record;
+pub mod replay;
 pub mod rod_sensor;
 pub mod stages;
 pub mod way;

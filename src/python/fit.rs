@@ -14,8 +14,10 @@ use crate::error::Error;
 use crate::fit::descent::Point;
 use crate::fit::normal::linearised;
 use crate::fit::profile::intervals;
+use crate::fit::replay::replay as replayed;
 use crate::fit::window::Window;
 use crate::fit::{Counts, Free, Problem, Record, RodSensor, Settings, Slot, fit};
+use crate::integrate::State;
 use crate::model::Recorded;
 use crate::model::recorded::{Quantity, Samples};
 
@@ -225,6 +227,36 @@ pub fn fit_rows<'py>(
         list.append((places, rows, residuals, weights))?;
     }
     Ok(list)
+}
+
+/// What a record's sensor of the angle would have read at `times` from each start, all at the first of
+/// these: a row for each.
+#[pyfunction]
+#[pyo3(signature = (run, theta, velocity, times, tolerance, threads, progress=None))]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
+pub fn replay<'py>(
+    py: Python<'py>,
+    run: Run<'py>,
+    theta: Floats<'py>,
+    velocity: Floats<'py>,
+    times: Floats<'py>,
+    tolerance: f64,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let record = run.record()?;
+    let (theta, velocity) = (theta.as_slice()?, velocity.as_slice()?);
+    if theta.len() != velocity.len() {
+        let given = (theta.len(), velocity.len());
+        return Err(Error::Lengths { given, names: ("theta", "velocity") }.into());
+    }
+    let starts: Vec<State> = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
+    let times = times.as_slice()?.to_vec();
+    let all = watched(py, progress.as_ref(), |control| {
+        replayed(&record, &starts, &times, tolerance, threads, control)
+    })?;
+    let flat: Vec<f64> = all.into_iter().flatten().collect();
+    flat.into_pyarray(py).reshape([starts.len(), times.len()])
 }
 
 fn point<'py>(py: Python<'py>, problem: &Problem, at: &Point) -> PyResult<Bound<'py, PyDict>> {

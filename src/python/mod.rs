@@ -132,5 +132,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(fit::fit_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(fit::replay, module)?)?;
     Ok(())
 }

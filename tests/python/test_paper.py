@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import pendmap
-from pendmap import paper_figures, virtual_rig
+from pendmap import figures, paper_figures, paper_motions, virtual_rig
+from pendmap.cli.paper_command import command
 from pendmap.figures import tumbling
 
 if TYPE_CHECKING:
@@ -24,14 +26,13 @@ if TYPE_CHECKING:
 def test_a_figure_has_several_names(name: str) -> None:
     assert paper_figures.wanted(name) == ["4"]
     assert paper_figures.wanted("table 1") == paper_figures.wanted("table1") == ["table1"]
-    assert paper_figures.wanted("all") == ["1", "2", "3", "4", "5", "6", "7", "table1"]
+    assert paper_figures.wanted("all") == [*"123456789", "table1"]
 
 
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("8", "not there yet"),
-        ("figure 9", "not there yet"),
+        ("0", "'0' is not one"),
         ("10", "'10' is not one"),
         ("x", "'x'"),
     ],
@@ -42,7 +43,7 @@ def test_what_is_not_there_is_refused_in_one_line(
     run = pendmap_command("paper", name)
     assert run.returncode == 2
     assert says in run.stderr
-    assert "allowed are 1, 2, 3, 4, 5, 6, 7, table1 and all" in run.stderr
+    assert "allowed are 1, 2, 3, 4, 5, 6, 7, 8, 9, table1 and all" in run.stderr
     assert run.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
@@ -56,11 +57,14 @@ def test_one_figure(pendmap_command: Run, tmp_path: Path) -> None:
     assert json.loads(run.stdout) == {"files": ["a.svg"]}
 
 
-def test_all_that_are_there(pendmap_command: Run, tmp_path: Path) -> None:
-    run = pendmap_command("paper", "all", "--out", "out", "--json")
-    assert run.returncode == 0, run.stderr
-    files = json.loads(run.stdout)["files"]
-    names = [*(f"figure_{k}.png" for k in range(1, 8)), "table_1.csv"]
+def test_all_that_are_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper_motions, "SECONDS", 60.0)  # 2500 s take the rig minutes
+    monkeypatch.setattr(paper_motions, "TUMBLED", 30.0)
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner().invoke(command, ["all", "--out", "out", "--json"])
+    assert run.exit_code == 0, run.output
+    files = json.loads(run.output)["files"]
+    names = [*(f"figure_{k}.png" for k in range(1, 10)), "table_1.csv"]
     assert files == [f"out/{name}" for name in names]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(names)
     assert all((tmp_path / name).stat().st_size > 300 for name in files)
@@ -88,7 +92,7 @@ def test_options_that_do_not_go_together(pendmap_command: Run, tmp_path: Path) -
     run = pendmap_command("paper", "3", "--plot", "a.png", "--out", "there")
     assert run.returncode == 2
     assert "--plot and --out: allowed is one of them" in run.stderr
-    run = pendmap_command("paper", "8", "--out", "there")
+    run = pendmap_command("paper", "10", "--out", "there")
     assert run.returncode == 2
     assert not list(tmp_path.iterdir())
     run = pendmap_command("paper", "3", "--out", "nowhere/there")
@@ -136,3 +140,47 @@ def test_figure_2_has_a_column_for_each_point(tmp_path: Path) -> None:
     with pytest.raises(pendmap.InputError, match="no room"):
         tumbling.figure(runs, size=(2.0, 2.0), dpi=100, title=None)
     assert paper_figures.draw("2", tmp_path / "2.png").stat().st_size > 50_000
+
+
+@pytest.fixture(scope="module")
+def model() -> pendmap.Rig:
+    return paper_figures.report(0).methods["combined_repaired"].rig
+
+
+def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
+    model: pendmap.Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two oscillations of period 2 and two rotations, reached by rig and model, alike."""
+    monkeypatch.setattr(paper_motions, "SECONDS", 250.0)
+    runs = paper_motions.steady_states(model)
+    kinds = [one.steady.measured.kind for one in runs if one.steady is not None]
+    assert kinds == ["oscillation period 2"] * 2 + ["rotation 1:1"] * 2
+    for one in runs:
+        assert one.steady is not None
+        assert one.steady.reached[0].share == 1.0
+        assert abs(one.steady.overestimate) < 0.01
+        assert one.steady.rms < 0.02
+    figures.draw_motions(runs, tmp_path / "8.svg", steady=True, title="Steady", subtitle="rig")
+    drawn = (tmp_path / "8.svg").read_text()
+    assert drawn.count("rotation 1:1") == 2
+    assert "identified model" in drawn
+
+
+def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path: Path) -> None:
+    """The rig's run is one that the identified model could have made; no path lies on another."""
+    runs = paper_motions.tumbling(model)
+    for one in runs:
+        assert [each.name for each in one.statistics] == [
+            "wells visited",
+            "escapes from a well",
+            "angle covered",
+            "time to settle",
+            "greatest velocity",
+        ]
+        assert min(each.chance for each in one.statistics) > 0.01
+        assert one.statistics[1].measured > 20
+        assert 10 < one.statistics[3].measured < 200
+    figures.draw_motions(runs, tmp_path / "9.svg", steady=False, title="Tumbling", subtitle="rig")
+    drawn = (tmp_path / "9.svg").read_text()
+    assert drawn.count("record (95 % of the ensemble)") == 2
+    assert drawn.count("a member") >= 4

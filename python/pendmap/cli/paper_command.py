@@ -51,13 +51,13 @@ def command(  # noqa: PLR0913 (an option each)
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Draw a figure of Horton, Wiercigroch & Xu (2008): 1 to 7, table1, or all of these.
+    """Draw a figure of Horton, Wiercigroch & Xu (2008): 1 to 9, table1, or all of these.
 
     1 shows critical curves and the strange attractors, 2 tumbling chaos at these points, 3 the
     pendulum, its symbols and its equation. The others are made on a virtual rig like the paper's:
     4 a decay with its half cycles, 5 the decrements, 6 the decay by each model, 7 and table1 the
-    errors of each.
-    Writes figure_1.png to figure_7.png and table_1.csv, those that are asked for.
+    errors of each, 8 steady states after 2500 s (it takes some minutes), 9 transient tumbling.
+    Writes figure_1.png to figure_9.png and table_1.csv, those that are asked for.
     """
     from pendmap import paper_figures
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pendmap.discrepancy import Discrepancy
-    from pendmap.identification import Comparison, IdentificationReport
+    from pendmap.identification import Comparison, ForcedComparison, IdentificationReport
     from pendmap.records import Experiment
 
 __all__ = [
@@ -45,6 +45,7 @@ __all__ = [
     "draw_comparison",
     "draw_discrepancy",
     "draw_identification",
+    "draw_motions",
     "draw_pendulum",
     "draw_record",
     "draw_runs",
@@ -468,4 +469,36 @@ def draw_tumbling(
     style.check_size(size, resolution)
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
         style.write(tumbling.figure(runs, size=size, dpi=resolution, title=title), part)
+    return Path(path)
+
+
+def draw_motions(  # noqa: PLR0913 (what, where, and how)
+    runs: Sequence[ForcedComparison],
+    path: str | os.PathLike[str],
+    *,
+    steady: bool,
+    title: str,
+    subtitle: str,
+    dpi: float | None = None,
+) -> Path:
+    """Draw forced runs beside a model: the paper's figures 8 (steady states) and 9 (tumbling).
+
+    Parameters
+    ----------
+    runs : sequence of ForcedComparison
+        Of :func:`pendmap.identification.compare`.
+    steady : bool
+        Whether their steady states are drawn, a phase plane each; else a row for each: histories
+        and phase planes of the record and of a member of the ensemble, and the statistics.
+    title, subtitle : str
+        What stands above.
+    path, dpi
+        As for :func:`draw_pendulum`, whose result and errors are those here.
+    """
+    from pendmap.figures import motions  # noqa: PLC0415 (likewise)
+
+    resolution = style.resolution(dpi)
+    draw = motions.steady_figure if steady else motions.tumbling_figure
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(draw(runs, dpi=resolution, title=title, subtitle=subtitle), part)
     return Path(path)

@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.figures import blocks, sides, style
+from pendmap.figures import blocks, forced, sides, style
 from pendmap.figures import sheet as sheets
 from pendmap.figures.decays import MOST, draw_residuals
 from pendmap.figures.errors import draw_panels
-from pendmap.identification.compare import MODEL
+from pendmap.identification.compare import MODEL, RunComparison
+from pendmap.identification.forced import ForcedComparison
 from pendmap.identification.joint import as_angles
 from pendmap.model.units import Units
 from pendmap.pictures import names
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pendmap.figures.blocks import Box
-    from pendmap.identification import Comparison, RunComparison
+    from pendmap.identification import Comparison
+
+    Compared = RunComparison | ForcedComparison
 
 __all__ = ["ALL", "CHOSEN", "figure"]
 
@@ -57,14 +60,15 @@ def figure(comparison: Comparison, *, dpi: float = 200.0) -> Figure:
     Where there are more than :data:`ALL` runs, all of them stand in one panel, and
     :data:`CHOSEN` have rows.
     """
-    every = comparison.runs
+    every = comparison.every
     many = len(every) > ALL
     ranked = sorted(every, key=lambda one: (not one.run.hold_out, -ratio(one)))
     rows = ranked[:CHOSEN] if many else every
     high = ALONE if len(rows) == 1 else ROW
     top = high * len(rows) + (OVERVIEW if many else 0.0)
     size = (WIDTH, top + LEGEND + 0.7)
-    said = counted(len(every), "free decay")
+    kinds = ((len(comparison.runs), "free decay"), (len(comparison.forced), "forced run"))
+    said = ", ".join(counted(count, kind) for count, kind in kinds if count)
     if many:
         said += f"; below, {len(rows)} of them: held out first, then those missed most"
     made = sheets.headed(size, dpi, "Model against record", said, left=0.1)
@@ -79,12 +83,12 @@ def figure(comparison: Comparison, *, dpi: float = 200.0) -> Figure:
     return made
 
 
-def ratio(one: RunComparison) -> float:
+def ratio(one: Compared) -> float:
     """Return the rms of what a model misses, over the record's noise."""
     return one.rms / one.sigma if one.sigma > 0 else math.inf
 
 
-def _legend(figure: Figure, rows: Sequence[RunComparison], top: float) -> None:
+def _legend(figure: Figure, rows: Sequence[Compared], top: float) -> None:
     style_of = look(MODEL)
     handles: list[Artist] = [
         Line2D([], [], color=MEASURED, marker=".", ls="", ms=5),
@@ -92,14 +96,13 @@ def _legend(figure: Figure, rows: Sequence[RunComparison], top: float) -> None:
         Line2D([], [], color=MEASURED, lw=0.8, ls="--"),
     ]
     texts = ["record", style_of.label, "standard deviation of its noise"]
-    if any(one.errors and np.any(one.peaks.turned.stderr_amplitude > 0) for one in rows):
+    decays = [one for one in rows if isinstance(one, RunComparison)]
+    if any(one.errors and np.any(one.peaks.turned.stderr_amplitude > 0) for one in decays):
         handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
     blocks.named(figure, blocks.Box(0.0, top - 1.0, WIDTH, 1.0), "", handles, texts)
 
 
-def _overview(
-    figure: Figure, box: Box, runs: Sequence[RunComparison], letters: Iterator[str]
-) -> None:
+def _overview(figure: Figure, box: Box, runs: Sequence[Compared], letters: Iterator[str]) -> None:
     """Draw how far the model is from each run, in units of its noise."""
     axes = blocks.named(figure, box, "").panel(figure)
     ratios = np.array([min(ratio(one), 1e12) for one in runs])
@@ -128,14 +131,19 @@ def _names(axes: Axes, texts: Sequence[str]) -> None:
     axes.set_xticks(range(0, len(texts), every), list(texts[::every]))
 
 
-def _row(figure: Figure, box: Box, one: RunComparison, letters: Iterator[str]) -> None:
+def _row(figure: Figure, box: Box, one: Compared, letters: Iterator[str]) -> None:
     run = one.run
     held = ", held out" if run.hold_out else ""
     heading = (
         f"{run.name}{held}: rms {1e3 * one.rms:.3g} mrad, {ratio(one):.3g} times the noise of "
         f"{1e3 * one.sigma:.3g} mrad"
     )
+    if isinstance(one, ForcedComparison):
+        heading += f", in {counted(one.windows, 'window')}"
     cells = blocks.named(figure, box, heading).columns(4, GAP)
+    if isinstance(one, ForcedComparison):
+        _forced(figure, cells, one, letters)
+        return
     left, right = (cell.panel(figure) for cell in cells[:2])
     _over_record(left, one)
     left.set_title(next(letters) + "record and model")
@@ -153,6 +161,27 @@ def _row(figure: Figure, box: Box, one: RunComparison, letters: Iterator[str]) -
     titles = (next(letters) + "error of each period", next(letters) + "error of each peak")
     periods, peaks = (cell.panel(figure) for cell in cells[2:])
     draw_panels(periods, peaks, {MODEL: one.errors}, one.peaks, titles)
+
+
+def _forced(
+    figure: Figure, cells: Sequence[Box], one: ForcedComparison, letters: Iterator[str]
+) -> None:
+    """Draw a forced run: the record, its phase plane, the model's, the statistics."""
+    history, phase, other = (cell.panel(figure) for cell in cells[:3])
+    forced.draw_history(history, one.time, one.measured, MEASURED)
+    history.set_title(next(letters) + "record")
+    fastest = max(float(np.abs(v).max()) for v in (one.velocity, one.example[1]))
+    forced.draw_phase(phase, (one.measured, one.velocity), MEASURED, fastest)
+    phase.set_title(next(letters) + "record")
+    if one.steady is None or one.steady.measured.at_rest:
+        forced.draw_phase(other, one.example, look(MODEL).colour, fastest)
+        other.set_title(next(letters) + "a member of the ensemble")
+    else:
+        forced.draw_cycles(other, one)
+        other.set_title(next(letters) + one.steady.measured.kind)
+    last = cells[3].less(left=-0.45, bottom=-0.38).panel(figure)
+    forced.draw_statistics(last, one)
+    last.set_title(next(letters) + "record (95 % of the ensemble)")
 
 
 def _over_record(axes: Axes, one: RunComparison) -> None:

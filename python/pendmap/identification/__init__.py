@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pendmap.identification.compare import Comparison, RunComparison, compare
+from pendmap.identification.forced import Ensemble, ForcedComparison
 from pendmap.identification.methods import METHODS, Method, identify
 from pendmap.identification.model_file import identified_model
 from pendmap.identification.peaks import Peaks, find_peaks
@@ -14,7 +15,9 @@ from pendmap.identification.table1 import PeakErrors, Row, Table1, table1
 __all__ = [
     "METHODS",
     "Comparison",
+    "Ensemble",
     "Estimate",
+    "ForcedComparison",
     "Identification",
     "IdentificationReport",
     "Method",

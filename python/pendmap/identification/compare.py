@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
+from pendmap.identification.forced import Ensemble, ForcedComparison, compare_forced
 from pendmap.identification.from_start import OFFSET
 from pendmap.identification.joint import as_fit_run, reading_of_run
 from pendmap.identification.peaks import Peaks, find_peaks
@@ -19,6 +20,8 @@ from pendmap.records.experiment import Experiment
 from pendmap.words import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -91,31 +94,54 @@ class Comparison(Readable):
         The records.
     runs : tuple of RunComparison
         One for each free decay.
+    forced : tuple of ForcedComparison
+        One for each forced run.
     """
 
     model: Rig
     experiment: Experiment
     runs: tuple[RunComparison, ...]
+    forced: tuple[ForcedComparison, ...] = ()
 
     def __repr__(self) -> str:
-        worst = max(run.rms / run.sigma for run in self.runs)
+        every = self.every
+        worst = max(one.rms / one.sigma for one in every)
         each = f"rms up to {worst:.3g} times the noise"
-        runs = counted(len(self.runs), "run")
+        runs = counted(len(every), "run")
         return f"<Comparison {self.experiment.path.name}: {runs}, {each}; {self.model.title}>"
 
+    @property
+    def every(self) -> tuple[RunComparison | ForcedComparison, ...]:
+        """All runs that were compared, free decays first."""
+        return (*self.runs, *self.forced)
+
     def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
-        """Return the table and the lines that ``pendmap compare`` prints."""
+        """Return the tables and the lines that ``pendmap compare`` prints."""
         from pendmap.identification import compared  # noqa: PLC0415 (it is of comparisons)
 
-        return [compared.runs_table(self)], list(compared.as_text(self))
+        return compared.tables(self), list(compared.as_text(self))
 
 
-def compare(model: Rig, experiment: Experiment) -> Comparison:
-    """Compare a model with every free decay of an experiment.
+def compare(
+    model: Rig,
+    experiment: Experiment,
+    *,
+    ensemble: Ensemble | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Comparison:
+    """Compare a model with every run of an experiment.
 
-    Nothing of the model is adapted. Where a record begins is not known better than its noise, so
-    that angle and velocity of the first free sample are adapted for the residual; periods and
+    Nothing of the model is adapted. Where a free decay begins is not known better than its noise,
+    so that angle and velocity of the first free sample are adapted for the residual; periods and
     peaks are those of a motion from the first peak as it was measured.
+
+    A forced run may be chaotic, and two chaotic paths part however good the model is. It is
+    compared with an ensemble of simulated records over a neighbourhood of its start, by the wells
+    visited, escapes between them, the angle covered, the time to settle and the greatest velocity;
+    where it ends on a steady state also with the cycle that the model ends on, at the same phase of
+    the drive. Its residual is taken in windows of up to three swings, each from the state that
+    brings the model nearest.
 
     Parameters
     ----------
@@ -123,21 +149,43 @@ def compare(model: Rig, experiment: Experiment) -> Comparison:
         In SI; :func:`pendmap.load_model` reads it.
     experiment : Experiment
         As of :func:`pendmap.read_experiment`.
+    ensemble : Ensemble, optional
+        How many starts a forced run has, and how far apart.
+    threads : int, optional
+        Number of threads; by default one a processor.
+    progress : callable, optional
+        Called now and then with the members done and in all of a forced run.
 
     Raises
     ------
     InputError
-        If no run is a free decay of samples, or nothing moves.
+        If no run has samples, or nothing moves.
+    KeyboardInterrupt
+        After Ctrl-C.
     """
     checks.of_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
     checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
-    free = [run for run in experiment.runs if run.kind == "free" and not run.peaks_only]
-    if not free:
-        raise InputError(
-            f"{experiment.path}: no run is a free decay of samples: allowed is one or more"
-        )
-    experiment.refuse_still(free)
-    return Comparison(model, experiment, tuple(_compared(model, run) for run in free if run.moves))
+    if ensemble is not None:
+        checks.of_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
+    if threads is not None:
+        checks.whole("threads", threads, 1, checks.MOST_THREADS)
+    checks.call("progress", progress)
+    sampled = [run for run in experiment.runs if not run.peaks_only]
+    if not sampled:
+        raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
+    experiment.refuse_still(sampled)
+    moving = [run for run in sampled if run.moves]
+    many = ensemble or Ensemble()
+    return Comparison(
+        model,
+        experiment,
+        tuple(_compared(model, run) for run in moving if run.kind == "free"),
+        tuple(
+            compare_forced(model, run, many, threads=threads, progress=progress)
+            for run in moving
+            if run.kind == "forced"
+        ),
+    )
 
 
 def _compared(model: Rig, run: Run) -> RunComparison:

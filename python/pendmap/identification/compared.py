@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.identification import forced_said
 from pendmap.identification.left_out import left_out
 from pendmap.records.summary import doubts_said, findings_said
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
     from pendmap.identification.compare import Comparison, RunComparison
 
-__all__ = ["as_json", "as_text", "runs_table"]
+__all__ = ["as_json", "as_text", "tables"]
 
 FITS: Final = 1.1
 """Rms over noise up to which a model is said to describe a record: the noise is known to a few
@@ -24,7 +25,10 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     """Return the JSON object of ``pendmap compare``."""
     return {
         "experiment": str(comparison.experiment.path),
-        "runs": [_run(run) for run in comparison.runs],
+        "runs": [
+            *(_run(run) for run in comparison.runs),
+            *(forced_said.as_json(run) for run in comparison.forced),
+        ],
         "findings": [found.text for found in comparison.experiment.findings],
     }
 
@@ -33,6 +37,7 @@ def _run(one: RunComparison) -> dict[str, Any]:
     errors = one.errors
     return {
         "name": one.run.name,
+        "kind": one.run.kind,
         "hold_out": one.run.hold_out,
         "samples": int(one.run.trusted.sum()),
         "noise": one.sigma,
@@ -65,8 +70,13 @@ def _pairs(places: Any, errors: Any) -> list[dict[str, float | None]]:  # noqa: 
     ]
 
 
-def runs_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
-    """Return heads and rows of the table of runs."""
+def tables(comparison: Comparison) -> list[tuple[list[str], list[list[str]]]]:
+    """Return heads and rows of the tables of free decays and of forced runs."""
+    both = [_decays(comparison), forced_said.table(comparison.forced)]
+    return [table for table in both if table[1]]
+
+
+def _decays(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     rows = []
     for one in comparison.runs:
         errors = one.errors
@@ -93,7 +103,7 @@ def as_text(comparison: Comparison) -> Iterator[str]:
 
     Doubts about a unit come first.
     """
-    runs = [one.run for one in comparison.runs]
+    runs = [one.run for one in comparison.every]
     yield from doubts_said(comparison.experiment, *runs)
     for one in comparison.runs:
         for row in one.table.rows:
@@ -108,6 +118,8 @@ def as_text(comparison: Comparison) -> Iterator[str]:
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "
                 "something is missing in the model"
             )
+    for forced in comparison.forced:
+        yield from forced_said.lines(forced, FITS)
     said = left_out(comparison.experiment, runs)
     if said:
         yield said

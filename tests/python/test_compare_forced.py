@@ -1,0 +1,238 @@
+"""``pendmap compare`` on forced runs: ensembles and steady states, on rigs whose truth is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import pendmap
+from driven_decays import motion
+from pendmap import InputError, Rig, virtual_rig
+from pendmap.identification import Ensemble, compare
+from pendmap.identification.forced import Statistic
+from pendmap.identification.neighbourhood import Simulated, Start
+from pendmap.identification.runs import FitRun
+from pendmap.identification.steady import Cycle
+from pendmap.records import Experiment, Run, read_experiment
+from pendmap.virtual_rig import RunPlan
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run as Command
+
+RIG = Rig(w0=6.2, c_over_m=0.3, Tr=0.08)
+DRIVE = {"p": 0.6, "Omega": 12.0, "phi": 0.4}
+
+
+def made(folder: Path, *plans: RunPlan, effects: tuple[str, ...] = ("none",)) -> Experiment:
+    request = virtual_rig.Request(
+        preset="forced",
+        effects=effects,
+        w0=RIG.w0,
+        c_over_m=RIG.c_over_m,
+        friction=RIG.Tr,
+        noise=0.1,
+        rate=50.0,
+        plans=plans,
+    )
+    where = virtual_rig.places(folder / "lab", replace=True)
+    virtual_rig.write(virtual_rig.make(request), where)
+    return read_experiment(where.experiment)
+
+
+def forced(theta: float, velocity: float, seconds: float, **drive: float) -> RunPlan:
+    given = {"p": 0.6, "frequency": 12.0, "phase": 0.4} | drive
+    return RunPlan("forced", theta, velocity, seconds, **given)
+
+
+@pytest.mark.parametrize("effects", [(), (("encoder_offset", {"d": 0.02}),)])
+def test_members_are_trajectories_of_the_model(
+    effects: tuple[tuple[str, dict[str, float]], ...],
+) -> None:
+    """As ``simulate`` has them from the same start, read by the sensor."""
+    own = tuple(pendmap.Effect(name, values) for name, values in effects)
+    rig = dataclasses.replace(RIG, effects=own)
+    driven = dataclasses.replace(rig, p=0.6, Omega=12.0, phi=0.4)
+    run = pendmap.simulate(driven, 1.0, -2.0, 6.0, samples=32)
+    time = run["time"].values
+    model = Simulated(FitRun(time, np.zeros_like(time), 1e-3, drive=DRIVE), rig)
+    found = model.readings(np.array([1.0, 1.0]), np.array([-2.0, 0.0]), time)
+    offset = 0.02 if effects else 0.0
+    np.testing.assert_allclose(found[0] - offset, run["theta"].values, atol=2e-7)
+    assert np.abs(found[1] - found[0]).max() > 0.1
+
+
+def test_the_start_is_known_as_well_as_the_noise_lets_it(tmp_path: Path) -> None:
+    experiment = made(tmp_path, forced(1.0, 2.0, 20.0))
+    start = compare(RIG, experiment, ensemble=Ensemble(members=20)).forced[0].start
+    assert abs(start.theta - 1.0) < 4 * start.stderr[0] < 0.004
+    assert abs(start.velocity - 2.0) < 4 * start.stderr[1] < 0.02
+    theta, velocity = start.drawn(20_000, 0.01, 6.2, seed=3)
+    assert (theta[0], velocity[0]) == (start.theta, start.velocity)
+    assert theta.std() == pytest.approx(math.hypot(0.01, start.stderr[0]), rel=0.03)
+    assert velocity.std() == pytest.approx(math.hypot(0.062, start.stderr[1]), rel=0.03)
+    assert np.ptp(Start(0.0, 1.0, 2.0, np.zeros((2, 2))).drawn(9, 0.0, 6.2, seed=3)[0]) == 0
+
+
+def test_the_true_model_gives_what_the_rig_does_and_another_one_does_not(tmp_path: Path) -> None:
+    """Runs that tumble; the chance of a true model's statistic is even between 0 and 1."""
+    plans = [forced(0.4 * k, 3.0, 40.0, p=1.5, frequency=11.0) for k in range(6)]
+    experiment = made(tmp_path, *plans)
+    true = compare(RIG, experiment, ensemble=Ensemble(members=200))
+    chances = [s.chance for one in true.forced for s in one.statistics if s.name != "wells visited"]
+    assert min(chances) > 0.002
+    assert sum(chance < 0.05 for chance in chances) <= 4
+    assert all(one.steady is None for one in true.forced)
+    assert max(one.rms / one.sigma for one in true.forced) < 1.1
+    assert min(one.statistics[1].measured for one in true.forced) > 10
+    slower = dataclasses.replace(RIG, w0=4.2)
+    other = compare(slower, experiment, ensemble=Ensemble(members=200))
+    assert all("greatest velocity" in {s.name for s in one.unlike} for one in other.forced)
+    assert min(one.rms / one.sigma for one in other.forced) > 3
+
+
+@pytest.mark.parametrize(
+    ("start", "kind"), [((0.9, 0.0), "oscillation period 2"), ((0.2, 14.5), "rotation 1:1")]
+)
+def test_a_steady_state_is_the_models_orbit(
+    start: tuple[float, float], kind: str, tmp_path: Path
+) -> None:
+    """Newton's method finds the same orbit; more damping makes a smaller oscillation."""
+    experiment = made(tmp_path, forced(*start, 90.0))
+    one = compare(RIG, experiment, ensemble=Ensemble(members=30, spread=0.002)).forced[0]
+    found = one.steady
+    assert found is not None
+    assert found.measured.kind == kind
+    assert [(r.cycle.kind, r.share) for r in found.reached] == [(kind, 1.0)]
+    assert found.rms < 3e-3
+    assert found.rms_velocity < 0.05
+    assert abs(found.overestimate) < 3e-3
+    n, w = found.measured.n, found.measured.w
+    driven = dataclasses.replace(RIG, **DRIVE)  # type: ignore[arg-type]
+    box = pendmap.Grid(pendmap.Axis(-math.pi, math.pi, 120), pendmap.Axis(-18, 18, 120))
+    orbits = pendmap.orbit(driven, n, w, box)
+    stable = orbits.isel(orbit=np.flatnonzero(orbits["stable"].values))
+    assert found.model is not None
+    ours = [(found.model.theta[0] + math.pi) % math.tau - math.pi, found.model.velocity[0]]
+    points = zip(stable["point_theta"].values, stable["point_velocity"].values, strict=True)
+    nearest = min(points, key=lambda point: math.dist(ours, point))
+    assert ours[0] == pytest.approx(nearest[0], abs=3e-4)
+    # Friction turns round with a kink, of which twelve harmonics know little.
+    assert ours[1] == pytest.approx(nearest[1], abs=3e-3)
+    if kind.startswith("oscillation"):
+        damped = dataclasses.replace(RIG, c_over_m=1.2)
+        less = compare(damped, experiment, ensemble=Ensemble(members=30, spread=0.002)).forced[0]
+        assert less.steady is not None
+        assert less.steady.overestimate < -0.01
+
+
+def test_another_end_is_said(tmp_path: Path) -> None:
+    experiment = made(tmp_path, forced(0.2, 14.5, 60.0))
+    stiff = dataclasses.replace(RIG, c_over_m=6.0)  # no rotation lasts
+    comparison = compare(stiff, experiment, ensemble=Ensemble(members=20))
+    found = comparison.forced[0].steady
+    assert found is not None
+    assert found.model is None
+    assert math.isnan(found.rms)
+    said = str(comparison)
+    assert "settles on rotation 1:1; the model on" in said
+    assert "not on the measured one" in said
+    assert "something is missing in the model" in said
+
+
+def test_an_unknown_phase_is_found_and_a_recorded_pivot_drives(tmp_path: Path) -> None:
+    time = np.arange(0, 20, 0.02)
+
+    def pivot(t: float) -> tuple[float, float]:
+        return 0.6 * math.cos(12.0 * t + 0.4), 0.0
+
+    theta = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.3, pivot=pivot)
+    theta += np.random.default_rng(0).normal(0, 1e-3, time.size)
+    rig = dataclasses.replace(RIG, Tr=0.0)
+    trusted = np.ones(time.size, dtype=bool)
+    run = Run("run", "run.csv", "forced", time, theta, trusted, drive=DRIVE)
+    unknown = dataclasses.replace(run, drive={**DRIVE, "phi": None})
+    up = 9.81 * np.array([pivot(t)[0] for t in time])
+    recorded = dataclasses.replace(run, drive=None, pivot={"vertical": up}, pivot_unit="m/s2")
+    few = Ensemble(members=40)
+    found = compare(rig, Experiment(tmp_path, (run, unknown, recorded)), ensemble=few).forced
+    for one in found:
+        assert one.rms == pytest.approx(1e-3, rel=0.1)
+        assert min(s.chance for s in one.statistics) > 0.01
+    for one, other in zip(found[0].statistics, found[1].statistics, strict=True):
+        assert one.measured == other.measured
+        if one.name in {"angle covered", "greatest velocity"}:
+            assert one.median == pytest.approx(other.median, rel=2e-3)
+    assert found[2].steady is None
+    assert math.isinf(found[2].statistics[3].measured)  # driven without a period: no rest
+
+
+def test_chances_are_ranks() -> None:
+    values = np.arange(99.0)
+    assert Statistic("", "", 49.0, values).chance == 1.0
+    assert Statistic("", "", 97.5, values).chance == pytest.approx(2 * 2 / 100)
+    assert Statistic("", "", math.inf, values).chance == pytest.approx(2 / 100)
+    assert Statistic("", "", math.inf, np.full(9, math.inf)).chance == 1.0
+    assert Statistic("", "", 0.0, values).ci95 == (2.0, 96.0)
+
+
+def test_cycles_are_moved_by_periods_and_turns() -> None:
+    x = np.arange(128) / 128
+    one = Cycle.of(2, 0, 1.0, np.sin(math.tau * x) + 0.1 * np.sin(2 * math.tau * x))
+    np.testing.assert_allclose(
+        one.velocity, math.pi * (np.cos(math.tau * x) + 0.2 * np.cos(2 * math.tau * x)), atol=1e-9
+    )
+    other = one.moved(1)
+    apart, moved = dataclasses.replace(other, theta=other.theta + math.tau).nearest(one)
+    assert apart < 1e-9
+    np.testing.assert_allclose(moved.theta, one.theta, atol=1e-9)
+    turning = Cycle.of(1, 1, 1.0, math.tau * x + 0.2 * np.sin(math.tau * x))
+    assert turning.amplitude == pytest.approx(0.2, rel=1e-3)
+    assert turning.kind == "rotation 1:1"
+    assert math.isinf(turning.nearest(one)[0])
+    rest = Cycle.of(1, 0, 1.0, math.pi + 0.001 * np.sin(math.tau * x))
+    assert rest.kind == "inverted rest"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"members": 5}, "members is 5: allowed is a whole number from 20"),
+        ({"spread": -1.0}, "spread is -1: allowed is 0 to 1 rad"),
+        ({"spread": math.nan}, "spread"),
+        ({"seed": -1}, "seed is -1"),
+    ],
+)
+def test_odd_ensembles_are_refused(given: dict[str, float], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        Ensemble(**given)  # type: ignore[arg-type]
+
+
+def test_the_command_compares_both_kinds_of_run(tmp_path: Path, pendmap_command: Command) -> None:
+    made(tmp_path, RunPlan("free", 1.5, 0.0, 10.0), forced(0.9, 0.0, 15.0))
+    (tmp_path / "m.toml").write_text("[pendulum]\nw0 = 6.2\nc_over_m = 0.3\nTr = 0.08\n")
+    words = ("compare", "m.toml", "lab", "--members", 50)
+    run = pendmap_command(*words, "--plot", "c.png")
+    assert run.returncode == 0, run.stderr
+    for text in ("escapes from a well", "95 % of its ensemble", "peaks, rms", "Written: c.png"):
+        assert text in run.stdout
+    assert (tmp_path / "c.png").stat().st_size > 50_000
+    first, second = json.loads(pendmap_command(*words, "--json").stdout)["runs"]
+    assert (first["kind"], second["kind"]) == ("free", "forced")
+    assert second["members"] == 50
+    what = {row["what"]: row for row in second["statistics"]}
+    assert what["wells visited"]["measured"] == 1
+    assert what["time to settle"]["measured"] is None
+    assert 0 < what["greatest velocity"]["chance"] <= 1
+    assert second["drive"] == {"p": 0.6, "Omega": 12.0, "phi": 0.4}
+    again = json.loads(pendmap_command(*words, "--json", "--threads", 1).stdout)["runs"][1]
+    assert again == second
+    run = pendmap_command("compare", "m.toml", "lab", "--members", 3)
+    assert run.returncode == 2
+    assert "members" in run.stderr
