@@ -12,12 +12,13 @@ import xarray as xr
 from pendmap import _core, checks, survival
 from pendmap.errors import InputError
 from pendmap.grid import starts as checked
+from pendmap.lifetimes_said import summary
 from pendmap.maps import basins_of
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
+from pendmap.saddle import growth_on_saddle
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
-from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,16 +36,6 @@ _FASTEST: Final = 3.0
 """The window of starts, as of ``basins``."""
 
 _MOST_STARTS: Final = 10_000_000
-_FOLLOWED: Final = 400
-"""Trajectories whose deviations are followed, and ..."""
-_LONGEST: Final = 400
-"""... for so many periods at the most."""
-_LEAST_FOLLOWED: Final = 20
-_SETTLING: Final = 4.0
-"""A trajectory comes nearer to an attractor by this power of e before it counts as captured."""
-_LEAST_SETTLING, _MOST_SETTLING = 10, 500
-_ALIGNED: Final = 5
-"""Periods in which a deviation turns into the direction of growth."""
 _SURE: Final = 3.0
 """Standard errors by which the exponent must exceed the rate of escape."""
 _DRAWN: Final = 4000
@@ -160,7 +151,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         elif from_period < bound:
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
-    saddle = _saddle(found, fitted, pendulum, threads)
+    saddle = growth_on_saddle(found, fitted, pendulum, threads)
     dataset = xr.Dataset(
         {
             **{
@@ -200,7 +191,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(dataset, found), *of_motion(model.effects, "these lifetimes are")]
+    lines = [*summary(dataset, found), *of_motion(model.effects, "these lifetimes are")]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
 
@@ -250,61 +241,6 @@ def _curves(
     }
 
 
-def _settling(found: xr.Dataset, period: float) -> NDArray[np.int64]:
-    """Periods that each start needs at its end to come near what captures it."""
-    rate = -Units.of(found.attrs).bare(found["exponent"].values, RATE) * period
-    rate = np.where(np.isfinite(rate) & (rate > 0), rate, _SETTLING / _LEAST_SETTLING)
-    periods = np.clip(np.ceil(_SETTLING / rate), _LEAST_SETTLING, _MOST_SETTLING)
-    label = found["label"].values.astype(np.int64)
-    own = np.concatenate([[0], periods]).astype(np.int64)
-    return np.asarray(own[np.maximum(label, 0)])
-
-
-def _saddle(
-    found: xr.Dataset,
-    fitted: survival.Tail | None,
-    pendulum: Pendulum,
-    threads: int | None,
-) -> tuple[float, float, int]:
-    """The exponent per period while trajectories live, its standard error, and of how many.
-
-    From ``_ALIGNED`` periods on until the settling begins that ends in capture.
-    """
-    none = math.nan, math.nan, 0
-    if fitted is None:
-        return none
-    units = Units.of(found.attrs)
-    settle, label = found["settle_periods"].values, found["label"].values
-    end = np.where(settle >= 0, settle, found.attrs["max_periods"])
-    end = end - _settling(found, pendulum.period)
-    chaos = np.array([str(kind).endswith("chaos") for kind in found["kind"].values], dtype=bool)
-    never = (label < 0) | np.concatenate([[False], chaos])[np.maximum(label, 0)]
-    # The natural measure of the saddle is where those are that live for long.
-    least = _ALIGNED + max(math.ceil(fitted.mean / 2), 10)
-    chosen = np.flatnonzero((end >= min(least, _LONGEST // 2)) & ~never)[:_FOLLOWED]
-    if chosen.size < _LEAST_FOLLOWED:
-        return none
-    end = np.minimum(end[chosen], _LONGEST)
-    speeds = units.bare(found["start_velocity"].values[chosen], VELOCITY)
-    growth = _core.growth(
-        pendulum.parameters,
-        found["start_theta"].values[chosen].copy(),
-        np.ascontiguousarray(speeds),
-        int(end.max()),
-        1,
-        int(found.attrs["steps_per_period"]),
-        threads or 0,
-    )
-    each = np.arange(growth.shape[1])
-    mine = (each >= _ALIGNED) & (each < end[:, None])
-    length = mine.sum(axis=1)
-    gain = np.where(mine, growth, 0.0).sum(axis=1)
-    mean = gain.sum() / length.sum()
-    spread = ((gain - mean * length) ** 2).sum()
-    stderr = math.sqrt(spread * chosen.size / (chosen.size - 1)) / length.sum()
-    return float(mean), float(stderr), int(chosen.size)
-
-
 def _attributes(
     found: xr.Dataset,
     fitted: survival.Tail | None,
@@ -348,90 +284,3 @@ def _attributes(
         "entropy": growth - rate if chaotic else math.nan,
         "saddle_dimension": dimension,
     }
-
-
-def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
-    a, units = dataset.attrs, Units.of(dataset.attrs)
-    lines: list[str] = []
-    exponent = f"{a['exponent']:.4f} +- {a['exponent_stderr']:.4f} {units.per_time}"
-    if a["persistent"]:
-        name = str(found["attractor"].values[0])
-        lines.append(
-            f"Persistent: {name}, exponent {exponent}; nothing captured any of the trajectories "
-            f"watched within {a['chaos_bound']} periods."
-        )
-    elif found.attrs["plane"] == "conservative":
-        lines.append("Without damping (gamma = 0) nothing is ever captured: no lifetime.")
-    elif a["transient_chaos"]:
-        lines += _of_tail(dataset, exponent)
-    else:
-        lines.append(_why_not(dataset, exponent))
-    if a["chaotic_share"] and not a["persistent"]:
-        lines.append(
-            f"{100 * a['chaotic_share']:.3g} % of the starts end on a chaotic attractor, and are "
-            "left out: there chaos persists."
-        )
-    if a["censored"] and found.attrs["plane"] == "basins":
-        lines.append(
-            f"{counted(a['censored'], 'start')} of {a['starts']} were alive at the bound of "
-            f"{counted(a['max_periods'], 'period')}."
-        )
-    if a["captured"]:
-        shares = [
-            f"{name} {100 * float(share):.2f} %"
-            for name, share in zip(found["attractor"].values, found["fraction"].values, strict=True)
-        ]
-        lines.append(f"Ended on {', '.join(shares)}.")
-    lines.append(
-        f"{counted(a['starts'], 'start')}, {counted(a['steps_per_period'], 'step')} a period, "
-        f"error reached {a['reached_error']:.1e}, {a['seconds']:.2f} s on "
-        f"{counted(a['threads'], 'thread')} ({a['simd']})."
-    )
-    return lines
-
-
-def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
-    a, units = dataset.attrs, Units.of(dataset.attrs)
-    mean, error = a["mean_periods"], a["stderr"]
-    places = max(0, 1 - math.floor(math.log10(error)))
-    clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
-    said = (
-        f"Transient chaos lives for {mean:.{places}f} +- {error:.{places}f} periods on average "
-        f"({clock}): the tail of {counted(a['tail_captured'], 'capture')} after period "
-        f"{a['from_period']}."
-    )
-    lines = [said]
-    tests = min(a["tail_weibull"], a["tail_steady"])
-    if tests < survival.LEVEL:
-        lines.append(
-            f"THE TAIL FROM PERIOD {a['from_period']} IS NOT EXPONENTIAL (chance {tests:.1g}): "
-            "its mean depends on where it begins."
-        )
-    line = (
-        f"On the chaotic saddle: exponent {exponent}, {a['exponent_per_period']:.4f} per period; "
-        f"rate of escape {a['escape_rate']:.5f}, entropy {a['entropy']:.4f} per period"
-    )
-    if math.isfinite(a["saddle_dimension"]):
-        line += f"; dimension {a['saddle_dimension']:.3f}"
-    return [*lines, line + "."]
-
-
-def _why_not(dataset: xr.Dataset, exponent: str) -> str:
-    a = dataset.attrs
-    if not a["captured"]:
-        return (
-            "No start was captured, and nothing says that chaos persists: undecided within "
-            f"{counted(a['max_periods'], 'period')}; --max-periods raises this bound."
-        )
-    longest = int(dataset["capture_period"].max())
-    head = f"No transient chaos: all settling ends within {counted(longest, 'period')}"
-    if not math.isfinite(a["tail_mean_periods"]):
-        return f"{head}, without an exponential tail."
-    head += f", with a tail of {a['tail_mean_periods']:.3g} periods"
-    if not math.isfinite(a["exponent_per_period"]):
-        return f"{head}, in which no start lives on to wander."
-    return (
-        f"{head}, in which deviations grow no faster than starts leave (exponent {exponent}, "
-        f"{a['exponent_per_period']:.3g} per period; rate {a['escape_rate']:.3g}): those at the "
-        "edge of a basin."
-    )
