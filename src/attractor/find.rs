@@ -4,11 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::capture::{self, Fate, Traps};
 use super::catalogue::{Attractor, arrange};
-use super::chaos::{self, ChaoticSet, Region};
+use super::chaos::{ChaoticSet, Region};
 use super::effort::Effort;
-use super::kind::Kind;
 use super::rest;
-use super::returns::{escape_speed, near_returns, nearest_return, tracks};
+use super::returns::{escape_speed, near_returns};
 use super::trap::{self, Band, Ellipse, ellipses};
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, Strobe};
@@ -18,12 +17,9 @@ use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
 
 /// Newton's method may not wander further than this from where the trajectory was.
-const REACH: f64 = 0.3;
-/// Damping must shrink a motion by this power of e, were it not driven, before what is left can be
-/// called chaos.
-const LEAST_DECAY: f64 = 20.0;
+pub(super) const REACH: f64 = 0.3;
 /// Points nearer than this are of one orbit.
-const SAME: f64 = 1e-6;
+pub(super) const SAME: f64 = 1e-6;
 
 /// How a start of a search ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,11 +43,11 @@ pub struct Catalogue {
     pub regions: Vec<(usize, Region)>,
     /// Longest time to capture that the searches saw, in periods.
     pub longest_settle: u32,
-    effort: Effort,
-    orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
-    rotations: Vec<(Rotation, Option<Band>)>,
-    rests: Vec<f64>,
-    sets: Vec<ChaoticSet>,
+    pub(super) effort: Effort,
+    pub(super) orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
+    pub(super) rotations: Vec<(Rotation, Option<Band>)>,
+    pub(super) rests: Vec<f64>,
+    pub(super) sets: Vec<ChaoticSet>,
 }
 
 impl Catalogue {
@@ -157,7 +153,7 @@ impl Catalogue {
     }
 
     /// The map that orbits close under.
-    fn map(&self, strobe: &Strobe) -> PoincareMap {
+    pub(super) fn map(&self, strobe: &Strobe) -> PoincareMap {
         if self.effort.precise {
             PoincareMap::new(&strobe.pendulum)
         } else {
@@ -254,49 +250,8 @@ impl Catalogue {
         traps
     }
 
-    /// Decides what the trajectories that nothing captured are.
-    fn watch(&mut self, strobe: &Strobe, alive: &[State], bound: u32, cancel: &AtomicBool) {
-        let stride = alive.len().div_ceil(self.effort.watched);
-        let sample: Vec<State> = alive.iter().step_by(stride).copied().collect();
-        let length = self.effort.watch * bound;
-        // Nearly conservative motion takes longer than this to show where it ends.
-        let watched = strobe.pendulum.period() * f64::from(bound + length);
-        if strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
-            return;
-        }
-        let Some(outcomes) = capture::outcomes(strobe, &self.traps, length, &sample, cancel) else {
-            return;
-        };
-        let lost: Vec<bool> = outcomes.iter().map(|o| !matches!(o.fate, Fate::Open)).collect();
-        if lost.iter().all(|l| *l) {
-            return;
-        }
-        let new: Vec<ChaoticSet> =
-            chaos::sets(strobe, &sample, &lost, length as usize, &self.effort, cancel)
-                .into_iter()
-                .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
-                .filter(|new| self.stays(strobe, new, length, cancel))
-                .collect();
-        if !new.is_empty() {
-            self.sets.extend(new);
-            self.rebuild(&strobe.pendulum);
-        }
-    }
-
-    /// Whether a set of few trajectories is more than a transient that happens to last.
-    fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
-        let proved = self.effort.proved;
-        if set.members >= proved || set.band.is_some() {
-            return true;
-        }
-        let stride = set.points.len().div_ceil(proved).max(1);
-        let points: Vec<State> = set.points.iter().step_by(stride).copied().collect();
-        capture::outcomes(strobe, &self.traps, length, &points, cancel)
-            .is_some_and(|outcomes| outcomes.iter().all(|o| matches!(o.fate, Fate::Open)))
-    }
-
     /// Attractors, traps and regions anew from orbits, rotations and sets.
-    fn rebuild(&mut self, pendulum: &Pendulum) {
+    pub(super) fn rebuild(&mut self, pendulum: &Pendulum) {
         let mut all: Vec<Attractor> =
             self.orbits.iter().map(|(o, _)| Attractor::periodic(pendulum, o)).collect();
         all.extend(self.rotations.iter().map(|(r, _)| Attractor::running(r)));
@@ -329,56 +284,6 @@ impl Catalogue {
     /// Whether this orbit is one of those found.
     fn knows(&self, orbit: &PeriodicOrbit) -> bool {
         self.orbits.iter().any(|(o, _)| o.contains(orbit.points[0], SAME))
-    }
-
-    /// The index of the one chaotic attractor, if there is no other attractor at all.
-    #[must_use]
-    pub fn only_chaos(&self) -> Option<usize> {
-        match self.attractors.as_slice() {
-            [one] if one.kind.is_chaotic() => Some(0),
-            _ => None,
-        }
-    }
-
-    /// Whether some attractor can be told only by where its trajectories stay.
-    #[must_use]
-    pub fn has_chaos(&self) -> bool {
-        self.attractors.iter().any(|a| a.kind.is_chaotic())
-    }
-
-    /// The attractors that open trajectories belong to, where Newton's method from a near return leads to
-    /// a known orbit, or the region of a known set holds the last points.
-    #[must_use]
-    pub fn place(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
-        let map = self.map(strobe);
-        let longest = self.effort.longest_cycle;
-        let place = |track: &Vec<State>| {
-            let nearest = nearest_return(track, longest);
-            let orbit = nearest.and_then(|(_, start, n)| newton::find(&map, start, n, REACH));
-            let known = orbit.and_then(|orbit| {
-                let own = |a: &Attractor| {
-                    a.n.is_some() && a.points.iter().any(|p| orbit.contains(*p, SAME))
-                };
-                self.attractors.iter().position(own)
-            });
-            known.or_else(|| self.region_of(&track[1..]))
-        };
-        tracks(strobe, states, longest).iter().map(place).collect()
-    }
-
-    /// The attractor without trap in whose region a trajectory's last points lie.
-    #[must_use]
-    pub fn region_of(&self, points: &[State]) -> Option<usize> {
-        let regions: Vec<(usize, &Region)> = self.regions.iter().map(|(i, r)| (*i, r)).collect();
-        chaos::member_of(&regions, points)
-    }
-}
-
-impl ChaoticSet {
-    fn same_as(&self, other: &Self) -> bool {
-        self.kind == other.kind
-            && self.sense == other.sense
-            && (self.kind == Kind::QuasiperiodicRotation || self.region.meets(&other.region))
     }
 }
 

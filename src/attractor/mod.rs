@@ -1,6 +1,6 @@
 //! Attractors: how they are found, told apart, named and recognised.
 //!
-//! - [`find`]: the search, from starts to a catalogue
+//! - [`find`]: the search, from starts to a catalogue; what it leaves is watched, and told where it belongs
 //! - [`effort`]: how much that spends
 //! - [`kind`]: what a motion looks like
 //! - [`catalogue`]: keys, names, twins
@@ -14,9 +14,11 @@ pub mod chaos;
 pub mod effort;
 pub mod find;
 pub mod kind;
+mod place;
 mod rest;
 mod returns;
 pub mod trap;
+mod watch;
 
 pub use catalogue::Attractor;
 pub use effort::Effort;

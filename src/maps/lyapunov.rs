@@ -33,6 +33,7 @@ const COURSE: [usize; 2] = [100, 4_000];
 const TAKEN: u32 = 64;
 /// Last points of a trajectory that say in which region it lives.
 const LAST_POINTS: usize = 16;
+
 /// What to compute, and how well.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {

@@ -9,6 +9,7 @@ use crate::model::Pendulum;
 
 /// Cells along each side at which the longest step is found.
 const MEASURED: usize = 9;
+
 /// The length of a step times the root of the greatest pull, by cell.
 #[derive(Clone, Debug)]
 pub struct Resolution {

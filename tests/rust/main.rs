@@ -6,7 +6,7 @@
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`effects`]: the library, each effect in every respect
 //! - [`formulas`]: effects that users write; [`rewritten`]: the library's as such
-//! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_counts`]: parameters from records
+//! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_counts`]: parameters from records; [`replay`]: ensembles
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
 //!   they change
@@ -46,6 +46,7 @@ mod order;
 mod planes;
 mod properties;
 mod recorded;
+mod replay;
 mod rewritten;
 mod sensitivity;
 mod sine;
