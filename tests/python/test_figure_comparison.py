@@ -12,10 +12,11 @@ from matplotlib.text import Text
 
 from decays import decay, record
 from drawn import written
-from pendmap import Rig
-from pendmap.figures import comparison, style
-from pendmap.identification import Comparison, compare
-from pendmap.records import Experiment, Run
+from pendmap import Rig, virtual_rig
+from pendmap.figures import comparison, motions, style
+from pendmap.identification import Comparison, Ensemble, compare
+from pendmap.records import Experiment, Run, read_experiment
+from pendmap.virtual_rig import RunPlan
 from test_figure_overlap import overlap, shown
 
 MODEL = Rig(w0=6.2, c_over_m=0.0496, Tr=0.08)
@@ -65,3 +66,37 @@ def test_a_run_without_peaks_says_so() -> None:
         figure = comparison.figure(compared(1, seconds=0.4), dpi=50.0)
     assert "Fewer than three peaks" in written(figure)
     assert len(figure.axes) == 2
+
+
+@pytest.mark.parametrize("seconds", [20.0, 70.0])
+def test_forced_runs_have_rows_in_which_nothing_overlaps(seconds: float, tmp_path: Path) -> None:
+    """One that tumbles, one that settles within 70 s; the sheet and the paper's two figures."""
+    plans = (
+        RunPlan("forced", 1.0, 3.0, seconds, p=1.5, frequency=11.0),
+        RunPlan("forced", 0.9, 0.0, seconds, p=0.6, frequency=12.0, phase=0.4),
+    )
+    request = virtual_rig.Request(
+        preset="forced", effects=("none",), w0=6.2, c_over_m=0.3, friction=0.08, plans=plans
+    )
+    where = virtual_rig.places(tmp_path / "lab", replace=False)
+    virtual_rig.write(virtual_rig.make(request), where)
+    model = Rig(w0=6.2, c_over_m=0.3, Tr=0.08)
+    found = compare(model, read_experiment(where.experiment), ensemble=Ensemble(members=60))
+    assert [one.steady is not None for one in found.forced] == [False, seconds > 60]
+    with rc_context(style.RC):
+        sheets = [
+            comparison.figure(found, dpi=100.0),
+            motions.steady_figure(found.forced, dpi=100.0, title="Steady", subtitle="rig"),
+            motions.tumbling_figure(found.forced, dpi=100.0, title="Tumbling", subtitle="rig"),
+        ]
+        for figure in sheets:
+            figure.canvas.draw()
+            texts = [text for text in figure.findobj(Text) if shown(text)]
+            boxes = [text.get_window_extent() for text in texts]
+            for one, other in itertools.combinations(range(len(texts)), 2):
+                said = texts[one].get_text(), texts[other].get_text()
+                assert not overlap(boxes[one], boxes[other]), said
+            assert max(box.x1 for box in boxes) < figure.bbox.x1 + 1
+    drawn = written(sheets[0])
+    assert "escapes from a well" in drawn
+    assert ("oscillation period 2" in drawn) == (seconds > 60)

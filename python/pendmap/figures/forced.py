@@ -101,12 +101,14 @@ def draw_statistics(axes: Axes, one: ForcedComparison) -> None:
         base = count - 1 - k
         _row(axes, each, base)
         own, low, high = (written(each, value, 3) for value in (each.measured, *each.ci95))
-        unit = f" {each.unit}" if each.unit else ""
+        unit = f" {each.unit}" if each.unit and math.isfinite(each.ci95[0]) else ""
         said = f"{each.name} {own} ({low if low == high else f'{low} to {high}'}){unit}"
         at = base + _TALL + 0.07
         axes.text(0.0, at, said, fontsize=style.RC["xtick.labelsize"], va="bottom")
     axes.set_xlim(-0.02, 1.02)
     axes.set_ylim(-0.02, count + 0.02)
+    axes.set_xticks([])
+    axes.set_yticks([])
     axes.set_axis_off()
 
 
