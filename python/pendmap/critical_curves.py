@@ -16,6 +16,7 @@ from pendmap.model import without_dimensions
 from pendmap.model.units import RATE
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
+from pendmap.varied import title_without
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -140,7 +141,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     dataset = xr.Dataset(variables, coords=coords)
     dataset.attrs = {
         "kind": "tongues",
-        "title": model.title,
+        "title": title_without(model, "p", "omega", "phase"),
         **model.attributes,
         "plane": plane,
         "p_max": p_max,
@@ -206,7 +207,12 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     lines = [f"{counted(count, 'critical amplitude')} up to p = {a['p_max']:g} at {where}."]
     index, p = dataset["index"].values, dataset["p"].values
     first = [k for k in range(count) if k == 0 or index[k] != index[k - 1]]
-    if first:
+    never = omega[dataset["stable_at_first"].values == 0]
+    if never.size:
+        said = ", ".join(f"{value:.6g}" for value in never[:3])
+        more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
+        lines.append(f"Rest is unstable from p = 0 on at omega = {said}{more}.")
+    elif first:
         least = min(first, key=lambda k: p[k])
         lines.append(
             f"Rest loses its stability soonest at p = {p[least]:.9g}, "

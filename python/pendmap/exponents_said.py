@@ -27,7 +27,7 @@ def summary(dataset: xr.Dataset) -> list[str]:
             f"{a['trajectories']} trajectories of "
             f"{counted(a['periods'], 'period')} each, {a['dropped_periods']} more dropped before."
         )
-        if value > 0:
+        if value > 0 and a["end"] == "chaotic":
             lines.append(
                 f"A deviation doubles in {math.log(2) / a['per_period']:.3g} periods on average."
             )

@@ -34,6 +34,8 @@ _PHASES, _FINE = 32, 4096
 _RANGE = (0.2, 4.0, 191)
 """Frequencies of the curve in the figure, where none are given."""
 
+_ROUNDING = 1e-13
+"""A threshold below this is that of a motion that loses nothing."""
 _LINEAR = 1e-9
 
 
@@ -164,7 +166,10 @@ def _threshold(lost: float, work: Floats) -> float:
     before, top, after = dense[k - 1], dense[k], dense[(k + 1) % _FINE]
     bend = before - 2 * top + after
     greatest = top - (after - before) ** 2 / (8 * bend) if bend else top
-    return -lost / float(greatest) if greatest > 0 else math.nan
+    if greatest <= 0:
+        return math.nan
+    found = -lost / float(greatest)
+    return found if found > _ROUNDING else 0.0
 
 
 def _summary(pendulum: Pendulum, own: Floats) -> list[str]:
@@ -179,7 +184,9 @@ def _summary(pendulum: Pendulum, own: Floats) -> list[str]:
                 if math.isfinite(value)
                 else f"The torque keeps up the rotation {name}: that branch has no threshold."
             )
-    if np.isfinite(own).any() and pendulum.p:
+    if not np.nanmax(own, initial=0.0):
+        return [*lines, "Without damping nothing attracts, and there are no basins."]
+    if np.isfinite(own).any() and pendulum.p and np.nanmin(own) > 0:
         ratio = abs(pendulum.p) / float(np.nanmin(own))
         side = "above" if ratio > 1 else "below"
         lines.append(f"The pendulum's own p = {pendulum.p:g} lies {side}: {ratio:.3g} of it.")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pendmap.model import Effect, Pendulum, Rig
 
-__all__ = ["Varied", "title", "varied"]
+__all__ = ["Varied", "title", "title_without", "varied"]
 
 _UNITS = {"c_over_m": "1/s", "Omega": "rad/s", "Tr": "rad/s2", "phi": "rad", "phase": "rad"}
 
@@ -62,6 +62,17 @@ class Varied:
         return {"units": self.unit or "1", "long_name": self.name}
 
 
+_SYMBOLS = {
+    "gamma": ("\N{GREEK SMALL LETTER GAMMA}", "c/m"),
+    "p": ("p",),
+    "omega": ("\N{GREEK SMALL LETTER OMEGA}", "\N{GREEK CAPITAL LETTER OMEGA}"),
+    "phase": ("\N{GREEK SMALL LETTER PHI}",),
+    "torque": ("torque",),
+    "theta_r": ("\N{GREEK SMALL LETTER THETA}r", "Tr"),
+}
+"""What titles call parameters, without dimensions and in SI."""
+
+
 def varied(
     model: Pendulum | Rig, ranges: Mapping[str, Sequence[float]], count: int
 ) -> tuple[Varied, ...]:
@@ -97,7 +108,17 @@ def varied(
 def title(model: Pendulum | Rig, *axes: Varied) -> str:
     """Return the model in one line, and what varies in it."""
     spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
-    return f"{' and '.join(spans)}; otherwise {model.title}"
+    known = _core.parameter_names(without_dimensions(model)[0].parameters)
+    rest = title_without(model, *(known[a.index] for a in axes))
+    return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
+
+
+def title_without(model: Pendulum | Rig, *names: str) -> str:
+    """Return the model in one line without some of its parameters, by their names in eq. 1.2."""
+    own, bracket, effects = model.title.partition(" (")
+    symbols = {symbol for name in names for symbol in _SYMBOLS.get(name, ())}
+    kept = [part for part in own.split(", ") if part.partition(" = ")[0] not in symbols]
+    return ", ".join(kept) + bracket + effects
 
 
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:

@@ -95,6 +95,10 @@ impl Attractor {
         if pendulum.is_dissipative() {
             return self.multipliers.iter().all(|m| m.norm() < 1.0);
         }
+        if pendulum.is_autonomous() && self.kind == Kind::Rest {
+            // The bottom of a potential, whose period may be the one that is looked at.
+            return true;
+        }
         self.multipliers.iter().all(|m| m.im != 0.0)
     }
 

@@ -128,7 +128,8 @@ impl Search {
         hints.into_iter().filter(promises).collect()
     }
 
-    /// Shares of the starts; an attractor that only a hint led to has none.
+    /// Shares of the starts; an attractor that only a hint led to has none, nor has what friction holds
+    /// for ever where no start ends there.
     fn told(&self, strobe: &Strobe, catalogue: &Catalogue, endings: &[Ending]) -> Cell {
         let open: Vec<State> = endings
             .iter()
@@ -159,8 +160,6 @@ impl Search {
             .attractors
             .iter()
             .zip(&counts)
-            // Sets at rest are known beforehand: those that no start reaches are left out.
-            .filter(|(attractor, count)| **count > 0 || !attractor.is_held())
             .map(|(attractor, count)| {
                 let mut attractor = attractor.clone();
                 attractor.points.truncate(attractor.n.unwrap_or(self.kept));

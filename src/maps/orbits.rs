@@ -5,7 +5,7 @@
 //! first (`approach.rs`). Next to an orbit near its birth it is begun again, repelled by
 //! all that is known: branches that are about to meet lie nearer to one another than any cell.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::Matrix2;
 use rayon::prelude::*;
@@ -35,6 +35,9 @@ const REACH_CELLS: f64 = 8.0;
 const LEAST_REACH: f64 = 0.3;
 /// Points nearer than this are of one orbit.
 const SAME: f64 = 1e-6;
+/// Angles at which the pull on an undriven pendulum is looked at, and halvings between two of them.
+const LOOKS: usize = 2000;
+const BISECTIONS: usize = 60;
 /// Only where the derivative of the displacement shrinks a direction below this are orbits looked for
 /// beside another ...
 const WEAK: f64 = 0.3;
@@ -93,7 +96,11 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     let rubs = pendulum.has_friction();
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
-    let begin = beginnings(pendulum, request, reach, control)?;
+    let begin = if pendulum.is_autonomous() {
+        rests(pendulum)
+    } else {
+        beginnings(pendulum, request, reach, control)?
+    };
     let pool = pool(request.threads)?;
     let mut all: Vec<PeriodicOrbit> = Vec::new();
     let mut begun = 0;
@@ -121,7 +128,8 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
             }
         }
         known = all.iter().flat_map(|orbit| orbit.points.iter().copied()).collect();
-        next = all[before..].iter().flat_map(|orbit| beside(orbit, request.n)).collect();
+        let new = if pendulum.is_autonomous() { &[] } else { &all[before..] };
+        next = new.iter().flat_map(|orbit| beside(orbit, request.n)).collect();
     }
     let inside = |p: &State| {
         let turned = [-TAU, 0.0, TAU].map(|turn| p[0] + turn);
@@ -133,6 +141,25 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         asked && orbit.points.iter().any(inside) && !orbit.points.iter().any(held)
     });
     Ok(Orbits { closed: all, begun, ..none })
+}
+
+/// Where nothing accelerates an undriven pendulum at rest: all else that closes within a time that is
+/// given closes by chance.
+fn rests(pendulum: &Pendulum) -> Vec<State> {
+    let pull = |theta: f64| pendulum.acceleration(0.0, theta, 0.0);
+    let angle = |k: usize| PI * (2.0 * (k as f64 + 0.5) / LOOKS as f64 - 1.0);
+    let between = |k: usize| {
+        let (mut low, mut high) = (angle(k), angle(k + 1));
+        if (pull(low) > 0.0) == (pull(high) > 0.0) {
+            return None;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if (pull(middle) > 0.0) == (pull(low) > 0.0) { low = middle } else { high = middle }
+        }
+        Some([0.5 * (low + high), 0.0])
+    };
+    (0..LOOKS).filter_map(between).collect()
 }
 
 /// Where Newton's method begins at first.

@@ -141,7 +141,8 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
             Some((least, _)) if size >= least => {}
             _ => best = Some((size, point)),
         }
-        let step = (Matrix2::identity() - image.derivative).lu().solve(&gap)?;
+        // None where all that is near closes too, as about rest without damping and drive.
+        let Some(step) = (Matrix2::identity() - image.derivative).lu().solve(&gap) else { break };
         let step = repelled(step, point, known);
         let length = step.norm();
         let damped = if length > 0.5 { 0.5 / length } else { 1.0 };

@@ -164,13 +164,43 @@ def test_an_unknown_phase_is_found_and_a_recorded_pivot_drives(tmp_path: Path) -
     found = compare(rig, Experiment(tmp_path, (run, unknown, recorded)), ensemble=few).forced
     for one in found:
         assert one.rms == pytest.approx(1e-3, rel=0.1)
+        assert (one.phase is None) == (one is not found[1])
         assert min(s.chance for s in one.statistics) > 0.01
     for one, other in zip(found[0].statistics, found[1].statistics, strict=True):
         assert one.measured == other.measured
         if one.name in {"angle covered", "greatest velocity"}:
             assert one.median == pytest.approx(other.median, rel=2e-3)
+    assert found[1].phase is not None
+    assert found[1].phase.value == pytest.approx(0.4, abs=1e-3)
     assert found[2].steady is None
     assert math.isinf(found[2].statistics[3].measured)  # driven without a period: no rest
+
+
+def test_what_cannot_be_compared_is_left_out_with_its_reason(tmp_path: Path) -> None:
+    time = np.arange(0, 12, 0.02)
+    theta = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.3, friction=0.08)
+    theta += np.random.default_rng(0).normal(0, 1e-3, time.size)
+    trusted = np.ones(time.size, dtype=bool)
+    free = Run("free", "a.csv", "free", time, theta, trusted)
+    lost = dataclasses.replace(free, name="lost", kind="forced")
+    still = dataclasses.replace(free, name="still", trusted=~trusted)
+    short = dataclasses.replace(
+        lost, name="short", time=time[:9], theta=theta[:9], trusted=trusted[:9], drive=DRIVE
+    )
+    found = compare(RIG, Experiment(tmp_path, (free, lost, still, short)))
+    assert [one.run.name for one in found.every] == ["free"]
+    why = dict(found.left_out)
+    assert why["lost"] == "what drives it is not known"
+    assert why["still"] == "nothing moves in it"
+    assert "too short: 9 samples over 0.16 s" in why["short"]
+    assert "lost: not compared: what drives it is not known" in str(found)
+    with pytest.raises(InputError, match="no run can be compared: lost: what drives"):
+        compare(RIG, Experiment(tmp_path, (lost,)))
+    # A drive of the model's own is none of a free decay.
+    driven = compare(dataclasses.replace(RIG, p=0.8, Omega=12.0), Experiment(tmp_path, (free,)))
+    assert driven.runs[0].errors is not None
+    assert found.runs[0].errors is not None
+    assert driven.runs[0].errors.peak_rms == found.runs[0].errors.peak_rms < 1
 
 
 def test_chances_are_ranks() -> None:

@@ -177,3 +177,19 @@ def test_measured_records(name: str, rate: float, count: float, noise: float) ->
     assert run.count_rad == pytest.approx(count, rel=1e-3)
     assert 0.5 < pendmap.noise_floor(run).sigma / noise < 1.5
     assert run.trusted.mean() > 0.9
+
+
+def test_a_forced_record_that_flickers_by_a_count_at_rest_is_looked_at(
+    pendmap_command: Run, tmp_path: Path
+) -> None:
+    """It has noise, but no speeds to tell it by."""
+    readings = 0.001534 * np.random.default_rng(0).integers(0, 2, 2000)
+    (tmp_path / "run_00.csv").write_text(text((np.arange(2000) / 100, readings)), encoding="utf-8")
+    (tmp_path / "experiment.toml").write_text(
+        '[rig]\nw0 = 6.0\n[[run]]\nfile = "run_00.csv"\nkind = "forced"\n'
+        "drive = { p = 0.5, Omega = 12.0, phi = 0.0 }\n",
+        encoding="utf-8",
+    )
+    run = pendmap_command("look", tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert "noise" in run.stdout

@@ -131,3 +131,10 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
     names = {p.name for p in tmp_path.iterdir()}
     assert names == {"melnikov.nc", "melnikov.png", "melnikov.rrd"}
+
+
+def test_without_damping_any_drive_tangles_and_there_are_no_basins() -> None:
+    found = pendmap.melnikov(Pendulum(gamma=0.0, p=1.0))
+    assert found.attrs["p_melnikov"] == 0
+    assert "from p = 0 on" in found.attrs["summary"]
+    assert "there are no basins" in found.attrs["summary"]

@@ -193,3 +193,9 @@ def test_a_box_is_kept(tmp_path: Path) -> None:
     assert pendmap.orbit(DRIVEN, 1, 0, box).sizes["orbit"] == 1
     back = pendmap.load(pendmap.save(wide, tmp_path / "orbits.zarr"))
     assert back.equals(wide)
+
+
+def test_without_drive_and_damping_hanging_rest_is_the_stable_one() -> None:
+    found = pendmap.orbit(Pendulum(gamma=0.0, p=0.0))
+    assert [str(name) for name in found["orbit"].values] == ["rest", "inverted rest"]
+    assert found["stable"].values.tolist() == [1, 0]

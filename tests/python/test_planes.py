@@ -229,3 +229,16 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
         assert refused.returncode == 2, words
         assert wanted in refused.stderr
         assert refused.stderr.count("\n") <= 4
+
+
+def test_friction_holds_rest_in_every_cell() -> None:
+    """Whether one of few starts comes to rest is chance; that it is there is not."""
+    plane = {"gamma": (0.05, 0.4, 6), "p": (0.2, 2.0, 6)}
+    found = pendmap.parameter_map(Pendulum(theta_r=0.02), plane)
+    kinds = [str(kind) for kind in found["kind"].values]
+    entry = found["entry_kind"].values
+    for name in ("rest", "inverted rest"):
+        cells = found["entry_cell"].values[entry == kinds.index(name)]
+        assert np.array_equal(np.unique(cells), np.arange(36))
+    assert "p = 1" not in found.attrs["title"]
+    assert "otherwise \N{GREEK SMALL LETTER OMEGA} = 2" in found.attrs["title"]

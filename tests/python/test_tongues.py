@@ -215,3 +215,11 @@ def test_a_file_holds_all_of_it(whole: xr.Dataset, tmp_path: Path) -> None:
     back = pendmap.load(pendmap.save(whole, tmp_path / "tongues.nc"))
     assert back.equals(whole)
     assert figures.draw(back, tmp_path / "tongues.svg").stat().st_size > 0
+
+
+def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
+    found = pendmap.tongues(Pendulum(gamma=0.0), [1.9, 2.0, 2.1], p_max=1.0)
+    assert found["stable_at_first"].values.tolist() == [1, 0, 1]
+    assert "unstable from p = 0 on at omega = 2." in found.attrs["summary"]
+    assert "soonest" not in found.attrs["summary"]
+    assert found.attrs["title"] == "\N{GREEK SMALL LETTER GAMMA} = 0"

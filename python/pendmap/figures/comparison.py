@@ -90,8 +90,9 @@ def ratio(one: Compared) -> float:
 
 def _legend(figure: Figure, rows: Sequence[Compared], top: float) -> None:
     style_of = look(MODEL)
+    driven = any(isinstance(one, ForcedComparison) for one in rows)
     handles: list[Artist] = [
-        Line2D([], [], color=MEASURED, marker=".", ls="", ms=5),
+        Line2D([], [], color=MEASURED, marker=".", ls="-" if driven else "", lw=0.7, ms=5),
         Line2D([], [], color=style_of.colour, lw=1.6),
         Line2D([], [], color=MEASURED, lw=0.8, ls="--"),
     ]
@@ -99,6 +100,9 @@ def _legend(figure: Figure, rows: Sequence[Compared], top: float) -> None:
     decays = [one for one in rows if isinstance(one, RunComparison)]
     if any(one.errors and np.any(one.peaks.turned.stderr_amplitude > 0) for one in decays):
         handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
+    if driven:
+        shades, named = forced.legend()
+        handles, texts = [*handles, *shades], [*texts, *named]
     blocks.named(figure, blocks.Box(0.0, top - 1.0, WIDTH, 1.0), "", handles, texts)
 
 

@@ -16,6 +16,7 @@ from pendmap.model.units import Units
 from pendmap.pictures import exponents as drawn
 from pendmap.pictures import layers as layering
 from pendmap.pictures import names
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,7 +92,7 @@ def _legend(dataset: xr.Dataset, shown: list[str]) -> tuple[list[Any], list[str]
         texts.append(drawn.value(dataset))
     if dataset.attrs["transient_periods"] > 0 and shown != ["distribution"]:
         handles.append(Patch(color=_TRANSIENT, lw=0))
-        texts.append(f"transient, {dataset.attrs['transient_periods']} periods")
+        texts.append(f"transient, {counted(int(dataset.attrs['transient_periods']), 'period')}")
     if dataset.sizes["window"] and "average" in shown:
         handles.append(Patch(color=_BAND, lw=0))
         texts.append(f"\N{PLUS-MINUS SIGN}{_SIGMAS} standard errors of the mean")

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from matplotlib.patches import Patch
 
 from pendmap.figures import style
 from pendmap.identification.compare import MODEL
@@ -15,6 +16,7 @@ from pendmap.pictures import names, plane
 from pendmap.pictures.methods import MEASURED, look
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["draw_cycles", "draw_history", "draw_phase", "draw_statistics"]
+__all__ = ["draw_cycles", "draw_history", "draw_phase", "draw_statistics", "legend"]
 
 _SI: Final = Units(si=True)
 _WELLS: Final = 14
@@ -40,6 +42,13 @@ _PAD: Final = 0.08
 _BINS: Final = 24
 _TALL: Final = 0.45
 """Height of a histogram, over its row's."""
+
+
+def legend() -> tuple[list[Artist], list[str]]:
+    """Return what the shades in these panels mean."""
+    later = Patch(facecolor=_SPREAD, hatch="////", lw=0)
+    handles: list[Artist] = [Patch(color=_BAND, lw=0), Patch(color=_SPREAD, lw=0), later]
+    return handles, ["every other well", "ensemble", "not settled by the end"]
 
 
 def draw_history(axes: Axes, time: Floats, reading: Floats, colour: str) -> None:
@@ -95,8 +104,12 @@ def _closed(theta: Floats, w: int) -> Floats:
 
 
 def draw_statistics(axes: Axes, one: ForcedComparison) -> None:
-    """Draw each statistic in a row: the ensemble's histogram, and the record's value as a mark."""
+    """Draw each statistic in a row: the ensemble's histogram, and the record's value as a mark.
+
+    What has not come by the record's end stands hatched at the right.
+    """
     count = len(one.statistics)
+    room = axes.get_window_extent().width / axes.figure.dpi
     for k, each in enumerate(one.statistics):
         base = count - 1 - k
         _row(axes, each, base)
@@ -104,7 +117,9 @@ def draw_statistics(axes: Axes, one: ForcedComparison) -> None:
         unit = f" {each.unit}" if each.unit and math.isfinite(each.ci95[0]) else ""
         said = f"{each.name} {own} ({low if low == high else f'{low} to {high}'}){unit}"
         at = base + _TALL + 0.07
-        axes.text(0.0, at, said, fontsize=style.RC["xtick.labelsize"], va="bottom")
+        font = style.RC["xtick.labelsize"]
+        font *= min(1.0, room / style.inches(said, font))
+        axes.text(0.0, at, said, fontsize=font, va="bottom")
     axes.set_xlim(-0.02, 1.02)
     axes.set_ylim(-0.02, count + 0.02)
     axes.set_xticks([])

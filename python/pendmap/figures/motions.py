@@ -16,6 +16,7 @@ from pendmap.words import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
     from pendmap.identification import ForcedComparison
@@ -105,9 +106,13 @@ def tumbling_figure(
 
 def _legend(figure: Figure, top: float, marker: str, width: float) -> None:
     line = "" if marker else "-"
-    handles = [
+    handles: list[Artist] = [
         Line2D([], [], color=MEASURED, marker=marker, ls=line, lw=1.6, ms=4, mfc="none"),
         Line2D([], [], color=look(MODEL).colour, lw=1.6),
     ]
+    texts = ["virtual rig", "identified model"]
+    if not marker:
+        shades, named = forced.legend()
+        handles, texts = [*handles, *shades], [*texts, *named]
     box = blocks.Box(0.0, top - 1.0, width, 1.0)
-    blocks.named(figure, box, "", handles, ["virtual rig", "identified model"])
+    blocks.named(figure, box, "", handles, texts)

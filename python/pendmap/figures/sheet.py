@@ -117,7 +117,7 @@ class Sheet:
                 if stacked
                 else (column - right) / min(shares)
             )
-        words = [style.inches(title, 12, bold=True), style.inches(subtitle, RC["font.size"])]
+        words = [style.inches(title, 12, bold=True), _longest(_halves(subtitle))]
         least_width = max(aside + across * max(narrow), left + max([*words, _widest(texts)]) + 0.1)
         base = 7.0 if stacked else 5.2 if len(panels) == 1 else WIDTH
         width = max(size[0], least_width) if size else aside + across * base
@@ -225,18 +225,15 @@ def headed(
 ) -> Figure:
     """Return an empty figure of ``size`` inches with its title and subtitle.
 
-    A subtitle that is too long for one line becomes two, at its semicolon, and then smaller; a
+    A subtitle that is too long for one line becomes two, at a semicolon, and then smaller; a
     title becomes smaller.
     """
     width, height = size
     figure = Figure(figsize=size, dpi=dpi)
     FigureCanvasAgg(figure)
     room = width - left - 0.1
-    lines = (
-        [subtitle] if style.inches(subtitle, RC["font.size"]) <= room else subtitle.split(";   ")
-    )
-    longest = max(style.inches(line, RC["font.size"]) for line in lines)
-    font = RC["font.size"] * min(1.0, room / max(longest, 1e-3))
+    lines = [subtitle] if style.inches(subtitle, RC["font.size"]) <= room else _halves(subtitle)
+    font = RC["font.size"] * min(1.0, room / max(_longest(lines), 1e-3))
     left /= width
     bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
     figure.text(left, 1 - 0.27 / height, title, fontsize=bold, weight="bold", va="center")
@@ -244,6 +241,18 @@ def headed(
         down = 0.50 + LINE * (k - 0.2 * (len(lines) - 1))
         figure.text(left, 1 - down / height, line, color=QUIET, va="center", fontsize=font)
     return figure
+
+
+def _halves(text: str) -> list[str]:
+    """Return a text on two lines as equal as can be, broken at one of its semicolons."""
+    parts = text.split(";   ")
+    both = [[";   ".join(parts[:k]), ";   ".join(parts[k:])] for k in range(1, len(parts))]
+    return min(both, key=_longest, default=[text])
+
+
+def _longest(lines: Sequence[str]) -> float:
+    """Return the inches of the longest line."""
+    return max(style.inches(line, RC["font.size"]) for line in lines)
 
 
 def place(figure: Figure, x: float, y: float, width: float, height: float) -> Axes:

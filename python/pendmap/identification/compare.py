@@ -8,11 +8,17 @@ from typing import TYPE_CHECKING
 from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
-from pendmap.identification.forced import Ensemble, ForcedComparison, compare_forced
+from pendmap.identification.forced import (
+    Ensemble,
+    ForcedComparison,
+    compare_forced,
+    too_short,
+)
 from pendmap.identification.from_start import OFFSET
 from pendmap.identification.joint import as_fit_run, reading_of_run
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.result import Estimate, Identification
+from pendmap.identification.runs import rig_of
 from pendmap.identification.table1 import PeakErrors, Table1, table_of_run
 from pendmap.model import Rig
 from pendmap.notebook import Readable
@@ -96,12 +102,15 @@ class Comparison(Readable):
         One for each free decay.
     forced : tuple of ForcedComparison
         One for each forced run.
+    left_out : tuple of (str, str)
+        Name of each other run, and why it is not compared.
     """
 
     model: Rig
     experiment: Experiment
     runs: tuple[RunComparison, ...]
     forced: tuple[ForcedComparison, ...] = ()
+    left_out: tuple[tuple[str, str], ...] = ()
 
     def __repr__(self) -> str:
         every = self.every
@@ -159,7 +168,8 @@ def compare(
     Raises
     ------
     InputError
-        If no run has samples, or nothing moves.
+        If no run has samples in which something moves, and a drive that is known where it is
+        forced.
     KeyboardInterrupt
         After Ctrl-C.
     """
@@ -174,23 +184,44 @@ def compare(
     if not sampled:
         raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
     experiment.refuse_still(sampled)
-    moving = [run for run in sampled if run.moves]
+    reasons = [(run, why_not(model, run)) for run in experiment.runs]
+    out = tuple((run.name, why) for run, why in reasons if why)
+    kept = [run for run, why in reasons if not why]
+    if not kept:
+        said = "; ".join(f"{name}: {why}" for name, why in out)
+        raise InputError(f"{experiment.path}: no run can be compared: {said}")
     many = ensemble or Ensemble()
     return Comparison(
         model,
         experiment,
-        tuple(_compared(model, run) for run in moving if run.kind == "free"),
+        tuple(_compared(model, run) for run in kept if run.kind == "free"),
         tuple(
             compare_forced(model, run, many, threads=threads, progress=progress)
-            for run in moving
+            for run in kept
             if run.kind == "forced"
         ),
+        out,
     )
+
+
+def why_not(model: Rig, run: Run) -> str:
+    """Return why a run cannot be compared with a model; empty where it can."""
+    if run.peaks_only:
+        return "it holds peaks alone"
+    if not run.moves:
+        return "nothing moves in it"
+    if run.kind != "forced":
+        return ""
+    if run.drive is None and run.pivot is None:
+        return "what drives it is not known"
+    return too_short(model, run)
 
 
 def _compared(model: Rig, run: Run) -> RunComparison:
     reading = reading_of_run(run)
-    fit: TrajectoryFit = fit_runs([as_fit_run(run, reading)], model, free=())
+    given = as_fit_run(run, reading)
+    model = rig_of(given, model)  # whatever drives it elsewhere
+    fit: TrajectoryFit = fit_runs([given], model, free=())
     first = fit.windows[0]
     peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
     return RunComparison(

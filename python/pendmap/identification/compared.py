@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.identification import forced_said
-from pendmap.identification.left_out import left_out
 from pendmap.records.summary import doubts_said, findings_said
 
 if TYPE_CHECKING:
@@ -29,6 +28,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
             *(_run(run) for run in comparison.runs),
             *(forced_said.as_json(run) for run in comparison.forced),
         ],
+        "left_out": [{"name": name, "why": why} for name, why in comparison.left_out],
         "findings": [found.text for found in comparison.experiment.findings],
     }
 
@@ -120,7 +120,6 @@ def as_text(comparison: Comparison) -> Iterator[str]:
             )
     for forced in comparison.forced:
         yield from forced_said.lines(forced, FITS)
-    said = left_out(comparison.experiment, runs)
-    if said:
-        yield said
+    for name, why in comparison.left_out:
+        yield f"{name}: not compared: {why}"
     yield from findings_said(comparison.experiment, *runs)

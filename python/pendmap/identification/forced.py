@@ -16,6 +16,7 @@ from pendmap.identification.joint import as_angles, as_fit_run, reading_of_run
 from pendmap.identification.neighbourhood import Simulated, Start, start_of
 from pendmap.itinerary import Itineraries, Ruler
 from pendmap.records.intervals import intervals_of
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,18 +25,24 @@ if TYPE_CHECKING:
 
     from pendmap.identification.fitting import TrajectoryFit
     from pendmap.identification.reading import Reading
+    from pendmap.identification.result import Estimate
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Ensemble", "ForcedComparison", "Statistic", "compare_forced"]
+__all__ = ["Ensemble", "ForcedComparison", "Statistic", "compare_forced", "too_short"]
 
 _AT_ONCE: Final = 4_000_000
 """Samples that are held at once."""
 _FOLLOWED: Final = 100
 """Members that are followed on to where they settle."""
+_FEWEST: Final = 32
+"""Samples without which neither the noise nor a start is known."""
+_UNLIKELY: Final = 0.01
+"""Chance below which a statistic is said to be unlike the model: of the five of a run that a true
+model gives, one is in at most one run of twenty."""
 _EVEN: Final = (2.5, 97.5)
 """Percent: the ends of the middle 95 %."""
 
@@ -126,6 +133,8 @@ class ForcedComparison:
         How many these are.
     start : Start
         Where the run begins.
+    phase : Estimate or None
+        Phase of a drive that was not known, rad, as it was found.
     time, measured : ndarray, shape (N,)
         The record at equal times, s and rad.
     velocity : ndarray, shape (N,)
@@ -147,6 +156,7 @@ class ForcedComparison:
     rms: float
     windows: int
     start: Start
+    phase: Estimate | None
     time: Floats
     measured: Floats
     velocity: Floats
@@ -166,8 +176,8 @@ class ForcedComparison:
 
     @property
     def unlike(self) -> tuple[Statistic, ...]:
-        """The statistics that the model gives with a chance of less than 5 %."""
-        return tuple(one for one in self.statistics if one.chance < 0.05)  # noqa: PLR2004
+        """The statistics that the model gives with a chance of less than 1 %."""
+        return tuple(one for one in self.statistics if one.chance < _UNLIKELY)
 
 
 def compare_forced(
@@ -204,8 +214,11 @@ def compare_forced(
         If the record cannot be followed.
     """
     worth = reading_of_run(run)
-    fit: TrajectoryFit = fit_runs([as_fit_run(run, worth)], model, free=())
-    given = _with_phase(as_fit_run(run, worth), fit)
+    fit: TrajectoryFit = fit_runs([as_fit_run(run, worth)], model, free=(), profiled=())
+    given = as_fit_run(run, worth)
+    found_phase = [each for name, each in fit.estimates.items() if name.startswith("phi")]
+    if given.drive is not None and found_phase:
+        given = dataclasses.replace(given, drive={**given.drive, "phi": found_phase[0].value})
     start = start_of(fit, given)
     time, measured = _evenly(run, worth, given, start.time)
     period = None if given.drive is None else math.tau / float(given.drive["Omega"] or math.nan)
@@ -230,6 +243,7 @@ def compare_forced(
         rms=fit.rms,
         windows=len(fit.windows),
         start=start,
+        phase=found_phase[0] if found_phase else None,
         time=time,
         measured=measured,
         velocity=ruler.velocity(measured),
@@ -241,12 +255,17 @@ def compare_forced(
     )
 
 
-def _with_phase(run: FitRun, fit: TrajectoryFit) -> FitRun:
-    """Return the run with the phase of its drive that was found, where it was not known."""
-    found = [fit.estimates[name].value for name in fit.names if name.partition("[")[0] == "phi"]
-    if run.drive is None or not found:
-        return run
-    return dataclasses.replace(run, drive={**run.drive, "phi": found[0]})
+def too_short(model: Rig, run: Run) -> str:
+    """Return how a record is too short to be compared; empty where it is not."""
+    samples = int(run.trusted.sum())
+    seconds = float(np.ptp(run.time[run.trusted]))
+    swing = math.tau / model.w0
+    if samples >= _FEWEST and seconds >= swing:
+        return ""
+    return (
+        f"it is too short: {counted(samples, 'sample')} over {seconds:.3g} s; {_FEWEST} over "
+        f"{swing:.3g} s, one swing, are needed"
+    )
 
 
 def _evenly(run: Run, worth: Reading, given: FitRun, begin: float) -> tuple[Floats, Floats]:

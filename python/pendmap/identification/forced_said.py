@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from pendmap.words import counted
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
@@ -28,6 +30,9 @@ def as_json(one: ForcedComparison) -> dict[str, Any]:
         "start": {"theta": start.theta, "velocity": start.velocity},
         "start_stderr": dict(zip(("theta", "velocity"), start.stderr, strict=True)),
         "drive": None if run.drive is None else dict(run.drive),
+        "phi": None
+        if one.phase is None
+        else {"value": one.phase.value, "stderr": one.phase.stderr},
         "members": one.ensemble.members,
         "members_lost": one.lost,
         "spread": one.ensemble.spread,
@@ -93,7 +98,7 @@ def written(of: Statistic, value: float, digits: int = 4) -> str:
     """Return a value of a statistic as it is read."""
     if not math.isfinite(value):
         return "not yet"
-    return f"{value:.0f}" if not of.unit else f"{value:.{digits}g}"
+    return f"{value:.0f}" if not of.unit or abs(value) >= 10**digits else f"{value:.{digits}g}"
 
 
 def lines(one: ForcedComparison, fits: float) -> Iterator[str]:
@@ -102,16 +107,19 @@ def lines(one: ForcedComparison, fits: float) -> Iterator[str]:
     ratio = one.rms / one.sigma if one.sigma else math.inf
     missing = ": something is missing in the model" if ratio > fits else ""
     yield (
-        f"{name}: in {one.windows} windows of up to three swings the residual is {one.rms:.3g} "
+        f"{name}: in {counted(one.windows, 'window')} of up to three swings the residual is "
+        f"{one.rms:.3g} "
         f"rad, {ratio:.3g} times the noise{missing}"
     )
+    if one.phase is not None:
+        yield f"{name}: the drive's phase is not stated: {one.phase.value:.4g} rad was found"
     if one.steady is not None:
         yield from _of_steady(name, one.steady)
     for each in one.unlike:
+        unit = f" {each.unit}" if each.unit and math.isfinite(each.measured) else ""
         yield (
-            f"{name}: {each.name} of {written(each, each.measured)}"
-            f"{' ' + each.unit if each.unit else ''} is not what the model does (chance "
-            f"{each.chance:.2g})"
+            f"{name}: {each.name}: {written(each, each.measured)}{unit} is not what the model does "
+            f"(chance {each.chance:.2g})"
         )
     if one.lost:
         yield f"{name}: {one.lost} of {one.ensemble.members} members left the range of numbers"

@@ -209,6 +209,8 @@ def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
     said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
     if noise.limited_by_count:
         return f"{said}, that of counting: the record shows no more"
+    if not noise.by_speed:
+        return said
     slow, fast = noise.by_speed[0], noise.by_speed[-1]
     if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
         what = "speed" if unit == "rad" else "acceleration"
