@@ -186,7 +186,7 @@ def test_a_forced_record_that_flickers_by_a_count_at_rest_is_looked_at(
     readings = 0.001534 * np.random.default_rng(0).integers(0, 2, 2000)
     (tmp_path / "run_00.csv").write_text(text((np.arange(2000) / 100, readings)), encoding="utf-8")
     (tmp_path / "experiment.toml").write_text(
-        '[rig]\nw0 = 6.0\n[[run]]\nfile = "run_00.csv"\nkind = "forced"\n'
+        '[rig]\nencoder_counts = 4096\n[[run]]\nfile = "run_00.csv"\nkind = "forced"\n'
         "drive = { p = 0.5, Omega = 12.0, phi = 0.0 }\n",
         encoding="utf-8",
     )
