@@ -110,7 +110,7 @@ def test_some_methods_and_an_effect(decay_file: Path, pendmap_command: Run) -> N
         (("identify", "forced"), "no run is free"),
         (("compare", "absent.toml", "decay.csv"), "absent.toml: No such file"),
         (("compare", "bare.toml", "decay.csv"), "bare.toml: has no dimensions"),
-        (("compare", "model.toml", "forced"), "no run is a free decay"),
+        (("compare", "model.toml", "idle"), "run_00: what drives it is not known"),
         (("compare", "bare.toml", "decay.csv"), "in SI: in [pendulum] w0 in rad/s, c_over_m ="),
         (("compare", "model.png", "decay.csv", "--plot", "model.png"), "'model.png': is an input"),
         (("identify", "forced", "--out", "forced/experiment.toml"), "is an input, which would"),
@@ -131,13 +131,13 @@ def test_refused_on_one_line(
     (tmp_path / "model.png").write_text("[pendulum]\nw0 = 6.2\n", encoding="utf-8")
     for name in ("decay.toml", "decay.png"):
         (tmp_path / name).write_bytes(decay_file.read_bytes())
-    forced = tmp_path / "forced"
-    forced.mkdir()
-    (forced / "run_00.csv").write_bytes(decay_file.read_bytes())
-    (forced / "experiment.toml").write_text(
-        '[[run]]\nfile = "run_00.csv"\nkind = "forced"\ndrive = { p = 0.2, Omega = 12.0 }\n',
-        encoding="utf-8",
-    )
+    for name, drive in (("forced", "drive = { p = 0.2, Omega = 12.0 }\n"), ("idle", "")):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "run_00.csv").write_bytes(decay_file.read_bytes())
+        (folder / "experiment.toml").write_text(
+            f'[[run]]\nfile = "run_00.csv"\nkind = "forced"\n{drive}', encoding="utf-8"
+        )
     before = {path: path.is_file() and path.read_bytes() for path in tmp_path.rglob("*")}
     run = pendmap_command(*words)
     assert run.returncode == 2
