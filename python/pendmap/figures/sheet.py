@@ -233,7 +233,8 @@ def headed(
     FigureCanvasAgg(figure)
     room = width - left - 0.1
     lines = [subtitle] if style.inches(subtitle, RC["font.size"]) <= room else _halves(subtitle)
-    font = RC["font.size"] * min(1.0, room / max(_longest(lines), 1e-3))
+    # Small letters are set a little wider than in proportion.
+    font = RC["font.size"] * min(1.0, 0.96 * room / max(_longest(lines), 1e-3))
     left /= width
     bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
     figure.text(left, 1 - 0.27 / height, title, fontsize=bold, weight="bold", va="center")
