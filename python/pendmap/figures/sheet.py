@@ -30,6 +30,7 @@ FLAT = 0.55  # height over width under which panels stand below one another
 LEAST = 0.5  # inches a panel needs
 FEWEST, BOLD = 12, 0.081  # characters of a note's line at least, inches of a bold one
 LINE = RC["font.size"] * 1.5 / 72
+_SMALLEST = 0.8  # of a subtitle's letters before it takes a third line
 
 
 @dataclass(frozen=True)
@@ -225,16 +226,17 @@ def headed(
 ) -> Figure:
     """Return an empty figure of ``size`` inches with its title and subtitle.
 
-    A subtitle that is too long for one line becomes two, at a semicolon, and then smaller; a
-    title becomes smaller.
+    A subtitle that is too long for one line becomes two, at a semicolon, where these need not be
+    much smaller, and else has a line for each part; a title becomes smaller.
     """
     width, height = size
     figure = Figure(figsize=size, dpi=dpi)
     FigureCanvasAgg(figure)
     room = width - left - 0.1
     lines = [subtitle] if style.inches(subtitle, RC["font.size"]) <= room else _halves(subtitle)
-    # Small letters are set a little wider than in proportion.
-    font = RC["font.size"] * min(1.0, 0.96 * room / max(_longest(lines), 1e-3))
+    if _SMALLEST * _longest(lines) > room:
+        lines = subtitle.split(";   ")
+    font = RC["font.size"] * min(1.0, room / max(_longest(lines), 1e-3))
     left /= width
     bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
     figure.text(left, 1 - 0.27 / height, title, fontsize=bold, weight="bold", va="center")
