@@ -30,7 +30,7 @@ FLAT = 0.55  # height over width under which panels stand below one another
 LEAST = 0.5  # inches a panel needs
 FEWEST, BOLD = 12, 0.081  # characters of a note's line at least, inches of a bold one
 LINE = RC["font.size"] * 1.5 / 72
-_SMALLEST = 0.8  # of a subtitle's letters before it takes a third line
+_SMALLEST = 0.9  # of a subtitle's letters before it takes a third line
 
 
 @dataclass(frozen=True)
