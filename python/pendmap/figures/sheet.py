@@ -236,7 +236,9 @@ def headed(
     lines = [subtitle] if style.inches(subtitle, RC["font.size"]) <= room else _halves(subtitle)
     if _SMALLEST * _longest(lines) > room:
         lines = subtitle.split(";   ")
-    font = RC["font.size"] * min(1.0, room / max(_longest(lines), 1e-3))
+    shrunk = room / max(_longest(lines), 1e-3)
+    # Letters of few pixels are set wider than in proportion.
+    font = RC["font.size"] * (1.0 if shrunk >= 1 else 0.9 * shrunk)
     left /= width
     bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
     figure.text(left, 1 - 0.27 / height, title, fontsize=bold, weight="bold", va="center")
