@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from pendmap import _core, asymptotic, checks
+from pendmap import _core, asymptotic, checks, critical_refinement
 from pendmap import grid as grids
+from pendmap.critical_plane import PLANES, in_picture
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE
@@ -26,13 +27,16 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum, Rig
 
-__all__ = ["NEAR", "OMEGA", "PLANES", "P_MAX", "tongues"]
+__all__ = ["MOST_P", "NEAR", "OMEGA", "P_MAX", "tongues"]
+
+_Pair: TypeAlias = "tuple[dict[str, Any], dict[str, Any]]"
+"""What was found at one frequency, and without damping."""
 
 OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
 """Frequencies and largest amplitude where none are given."""
 
-PLANES = ("omega-p", "e-alpha2")
-"""Planes in which critical curves are drawn: eq. 1.2's, and eq. 1.4's ``(alpha^2, e)``."""
+MOST_P = 100.0
+"""Largest amplitude that may be asked for."""
 
 NEAR = 0.05
 """An asymptotic curve that is off by less than this part is near the exact one."""
@@ -44,6 +48,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     p_max: float = P_MAX,
     *,
     plane: str = "omega-p",
+    refine: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
@@ -72,6 +77,9 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         Largest amplitude, up to 100.
     plane : str
         In which plane a figure shows them: ``omega-p``, or ``e-alpha2``, that of eq. 1.4.
+    refine : bool
+        Whether to add frequencies where curves begin, end, turn or bend between two of those asked
+        for, so that a figure shows them as they are.
     threads : int, optional
         Number of threads; by default one a processor. The result does not depend on it.
     progress : callable, optional
@@ -82,11 +90,11 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     xarray.Dataset
         Over ``critical``, a critical amplitude each: ``index`` of its frequency, ``p``,
         ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above). Over
-        ``omega``: ``stable_at_first`` (below the first), ``fold`` (nan where none) and the point
-        ``fold_theta``, ``fold_velocity`` of the oscillation there. The same without damping:
-        ``undamped_index``, ``undamped_p``, ``undamped_multiplier`` over ``undamped``. Over
-        ``curve`` and ``omega``: ``asymptotic`` and ``asymptotic_error``, relative to the exact
-        curve nearest by (:mod:`pendmap.asymptotic`).
+        ``omega``: ``asked`` (0 where the frequency was added), ``stable_at_first`` (below the
+        first), ``fold`` (nan where none) and the point ``fold_theta``, ``fold_velocity`` of the
+        oscillation there. The same without damping: ``undamped_index``, ``undamped_p``,
+        ``undamped_multiplier`` over ``undamped``. Over ``curve`` and ``omega``: ``asymptotic`` and
+        ``asymptotic_error``, relative to the exact curve nearest by (:mod:`pendmap.asymptotic`).
 
     Raises
     ------
@@ -106,21 +114,32 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     began = time.perf_counter()
 
-    def of(one: Pendulum, *, folds: bool) -> list[dict[str, Any]]:
-        return _core.tongues(one.parameters, frequencies.tolist(), p_max, folds, workers, progress)
+    free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
+    def solve(at: NDArray[np.float64]) -> list[_Pair]:
+        def of(one: Pendulum, *, folds: bool) -> list[dict[str, Any]]:
+            return _core.tongues(one.parameters, at.tolist(), p_max, folds, workers, progress)
+
+        found = of(pendulum, folds=True)
+        return list(zip(found, of(free, folds=False) if free else found, strict=True))
+
+    asked = frequencies
     try:
-        found, undamped = of(pendulum, folds=True), None
-        if pendulum.gamma:
-            undamped = of(dataclasses.replace(pendulum, gamma=0.0), folds=False)
+        if refine and asked.size > 1:
+            views = [in_picture(asked, p_max, one) for one in PLANES]
+            frequencies, pairs = critical_refinement.denser(asked, solve, _curves, views)
+        else:
+            pairs = solve(asked)
     except ValueError as error:
         raise InputError(str(error)) from None
+    found, undamped = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
     folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
     of_p = {"units": "1", "long_name": "amplitude of the drive over gravity"}
     variables: dict[str, Any] = {
         **_columns(found, "critical", ""),
-        **_columns(undamped or found, "undamped", "undamped_"),
+        **_columns(undamped, "undamped", "undamped_"),
+        "asked": ("omega", np.isin(frequencies, asked).astype(np.int8)),
         "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
         "fold": ("omega", fold, of_p | {"comment": "of the oscillation born at the first loss"}),
         "fold_theta": ("omega", theta, {"units": "rad"}),
@@ -155,6 +174,17 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = [*_summary(dataset), *of_motion(model.effects, "curves are")]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
+
+
+def _curves(pair: _Pair) -> critical_refinement.Curves:
+    """Return the amplitudes by kind: of each multiplier, damped and not, and of the fold."""
+    kinds = [
+        np.array([p for p, m in zip(one["p"], one["multiplier"], strict=True) if m == multiplier])
+        for one in pair
+        for multiplier in (1, -1)
+    ]
+    fold = pair[0]["fold"]
+    return [*kinds, np.array([fold[0]] if fold else [])]
 
 
 def _usual(plane: str) -> NDArray[np.float64]:
@@ -201,13 +231,17 @@ def _asymptotic(
 
 def _summary(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
-    omega = dataset["omega"].values
+    omega, asked = dataset["omega"].values, dataset["asked"].values.astype(bool)
     count = dataset.sizes["critical"]
-    where = f"{counted(omega.size, 'value')} of omega from {omega[0]:g} to {omega[-1]:g}"
-    lines = [f"{counted(count, 'critical amplitude')} up to p = {a['p_max']:g} at {where}."]
+    of_asked = int(asked[dataset["index"].values].sum())
+    where = f"{counted(int(asked.sum()), 'value')} of omega from {omega[0]:g} to {omega[-1]:g}"
+    lines = [f"{counted(of_asked, 'critical amplitude')} up to p = {a['p_max']:g} at {where}."]
+    if added := int((~asked).sum()):
+        lines[0] += f" {added} more values of omega where curves turn, end or bend."
     index, p = dataset["index"].values, dataset["p"].values
     first = [k for k in range(count) if k == 0 or index[k] != index[k - 1]]
-    never = omega[dataset["stable_at_first"].values == 0]
+    first = [k for k in first if asked[index[k]]]
+    never = omega[(dataset["stable_at_first"].values == 0) & asked]
     if never.size:
         said = ", ".join(f"{value:.6g}" for value in never[:3])
         more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
@@ -219,15 +253,15 @@ def _summary(dataset: xr.Dataset) -> list[str]:
             f"omega = {omega[index[least]]:.6g} (multiplier {dataset['multiplier'].values[least]})."
         )
     fold = dataset["fold"].values
-    if np.isfinite(fold).any():
-        at = omega[np.isfinite(fold)]
+    if (born := np.isfinite(fold) & asked).any():
+        at = omega[born]
         lines.append(
             f"At {counted(at.size, 'value')} of omega from {at.min():.4g} to {at.max():.4g} the "
             "oscillation is born toward smaller p: it exists from its fold on."
         )
     for name in dataset["curve"].values:
         error = dataset["asymptotic_error"].sel(curve=name).values
-        near = omega[error < NEAR]
+        near = omega[(error < NEAR) & asked]
         if near.size:
             lines.append(
                 f"{str(name).capitalize()}: within {100 * NEAR:g} % of the exact curve at "

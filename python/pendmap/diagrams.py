@@ -24,12 +24,17 @@ from pendmap.words import counted
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from numpy.typing import NDArray
+
     from pendmap.grid import Grid
     from pendmap.model import Pendulum, Rig
     from pendmap.model.units import Units
     from pendmap.varied import Varied
 
 __all__ = ["bifurcation"]
+
+_SAME = 1e-4
+"""Points of orbits that are so near, in rad and in units of velocity, are one."""
 
 _LISTED = 12
 
@@ -205,14 +210,45 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
-    """Say where the two sweeps are on attractors that differ in kind."""
+    """Say where the sweeps are on attractors of two kinds, or on two of one kind."""
+    up, down = dataset["up"].values, dataset["down"].values
     kind = np.append(dataset["entry_kind"].values, -1)
-    differ = kind[dataset["up"].values] != kind[dataset["down"].values]
-    if not differ.any():
-        return ["Up and down are on the same kinds of attractor everywhere."]
-    values = dataset[name].values
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], differ.astype(int), [0]])))
+    differ = kind[up] != kind[down]
+    lines = ["Up and down are on the same kinds of attractor everywhere."]
+    if differ.any():
+        lines = [
+            f"Up and down differ at {name} = {_spans(dataset[name].values, differ)}: hysteresis."
+        ]
+    others = ~differ & (up != down)
+    if others.any():
+        images = all(_mirrored(dataset, up[k], down[k]) for k in np.flatnonzero(others))
+        which = "mirror images of one another" if images else "different attractors of one kind"
+        lines.append(f"They are on {which} at {name} = {_spans(dataset[name].values, others)}.")
+    return lines
+
+
+def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
+    """Return the widest ranges of values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
     spans = sorted(zip(edges[::2], edges[1::2] - 1, strict=True), key=lambda s: s[0] - s[1])[:3]
-    said = ", ".join(f"{values[i]:.4g} to {values[j]:.4g}" for i, j in sorted(spans))
-    more = " and less" if len(edges) > 2 * len(spans) else ""
-    return [f"Up and down differ at {name} = {said}{more}: hysteresis."]
+    said = ", ".join(
+        f"{values[i]:.4g} to {values[j]:.4g}" if j > i else f"{values[i]:.4g}"
+        for i, j in sorted(spans)
+    )
+    return said + (" and less" if len(edges) > 2 * len(spans) else "")
+
+
+def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:
+    """Whether two attractors are mirror images: orbits by a point, chaos by its sense."""
+    n, w = dataset["entry_n"].values, dataset["entry_w"].values
+    if n[one] != n[other] or w[one] != -w[other]:
+        return False
+    if n[one] == 0:
+        return bool(w[one] != 0)
+    # The points stand in the order of their attractors.
+    owner = dataset["point_entry"].values
+    first, there = (slice(*np.searchsorted(owner, (k, k + 1))) for k in (one, other))
+    theta, velocity = dataset["point_theta"].values, dataset["point_velocity"].values
+    apart = np.abs(np.exp(1j * theta[there]) - np.exp(-1j * theta[first][0]))
+    apart += np.abs(velocity[there] + velocity[first][0])
+    return bool(apart.min() < _SAME)

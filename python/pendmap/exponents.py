@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 
 __all__ = ["lyapunov"]
 
+_CLEAR = 3.0
+"""Without damping an exponent below so many times that of deviations growing as tau is that of
+regular motion, and the spread of trajectories no error of it."""
+
 _MOST_PRECISION = 0.5
 """A standard error of half the exponent says its sign, and little else."""
 
@@ -87,7 +91,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         start's own trajectory. Of chaos ``running_exponent`` and ``running_stderr`` over
         ``averaged``, the periods that each trajectory has been averaged for, and
         ``finite_time_exponent`` over ``trajectory`` and ``window``. The attractor with its points,
-        as of :func:`pendmap.basins`. Attributes ``exponent``, ``stderr``, ``per_period``, ``end``
+        as of :func:`pendmap.basins`. Attributes ``exponent``, ``stderr`` (0 where the exponent is
+        exact, nan for regular motion without damping), ``regular`` (what such
+        motion has over the same time), ``per_period``, ``end``
         (``captured``, ``chaotic``, ``undamped``, ``undecided`` or ``failed``),
         ``transient_periods``, ``second_exponent`` and
         ``kaplan_yorke_dimension`` (of the stroboscopic map's attractor, ``1 + lambda_1 /
@@ -132,6 +138,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(str(error)) from None
     found = raw["attractor"]
     exponent, stderr = _value(raw)
+    regular = _regular(raw, pendulum.period)
+    if exponent < _CLEAR * regular:
+        stderr = math.nan
     if found is not None and raw["end"] == "chaotic":
         found = found | {"exponent": exponent, "exponent_stderr": stderr}
     attractors = [] if found is None else [found | {"twin": None}]
@@ -153,6 +162,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         "velocity0": velocity,
         "exponent": units.given(exponent, RATE),
         "stderr": units.given(stderr, RATE),
+        "regular": units.given(regular, RATE),
         "per_period": exponent * pendulum.period,
         "per_period_stderr": stderr * pendulum.period,
         **_second(raw, exponent, pendulum, units),
@@ -190,6 +200,14 @@ def _value(raw: dict[str, Any]) -> tuple[float, float]:
         own = raw["attractor"]
         return float(own["exponent"]), float(own["exponent_stderr"])
     return math.nan, math.nan
+
+
+def _regular(raw: dict[str, Any], period: float) -> float:
+    """The exponent of regular motion over the same periods: deviations grow as tau; else nan."""
+    if raw["end"] != "undamped":
+        return math.nan
+    averaged = raw["growth"].shape[1] * raw["window"]
+    return math.log1p(averaged / raw["dropped"]) / (averaged * period)
 
 
 def _second(

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
 __all__ = ["summary"]
 
 
+_BY_ROUNDING = math.log(1e10)
+"""A deviation of rounding that grows by so much is seen in the result."""
+
+
 def summary(dataset: xr.Dataset) -> list[str]:
     """Return the lines about an exponent."""
     a, units = dataset.attrs, Units.of(dataset.attrs)
@@ -21,12 +25,21 @@ def summary(dataset: xr.Dataset) -> list[str]:
     lines = [*_ended(dataset, name)]
     value, per = a["exponent"], units.per_time
     if math.isfinite(value) and a["end"] in {"chaotic", "undamped"}:
+        known = math.isfinite(a["stderr"])
+        each, whole = (
+            f" +- {a[key]:.2g}" if known else "" for key in ("stderr", "per_period_stderr")
+        )
         lines.append(
-            f"Largest Lyapunov exponent {value:.6g} +- {a['stderr']:.2g} {per}, "
-            f"{a['per_period']:.6g} +- {a['per_period_stderr']:.2g} per period: mean over "
+            f"Largest Lyapunov exponent {value:.6g}{each} {per}, "
+            f"{a['per_period']:.6g}{whole} per period: mean over "
             f"{a['trajectories']} trajectories of "
             f"{counted(a['periods'], 'period')} each, {a['dropped_periods']} more dropped before."
         )
+        if not known:
+            lines.append(
+                f"Deviations that grow as tau, those of regular motion, give {a['regular']:.2g} "
+                f"{per} over so long: it cannot be told from 0."
+            )
         if value > 0 and a["end"] == "chaotic":
             lines.append(
                 f"A deviation doubles in {math.log(2) / a['per_period']:.3g} periods on average."
@@ -40,7 +53,8 @@ def summary(dataset: xr.Dataset) -> list[str]:
             f"Largest Lyapunov exponent {value:.9g} {per}, {a['per_period']:.9g} per period: "
             f"{exact}."
         )
-    lines += _other(a, units)
+    if not (math.isfinite(value) and math.isnan(a["stderr"])):
+        lines += _other(a, units)
     lines.append(
         f"{counted(a['steps_per_period'], 'step')} a period, error reached "
         f"{a['reached_error']:.1e}, {a['seconds']:.2f} s on {counted(a['threads'], 'thread')} "
@@ -62,6 +76,12 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
     start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"
     if a["end"] == "captured":
         said = f"{start}: {name}, reached after {counted(a['transient_periods'], 'period')}."
+        grown = float(dataset["growth"].values[: a["transient_periods"] + 1].max())
+        if grown > _BY_ROUNDING:
+            said += (
+                f" On the way deviations grow by 1e{grown / math.log(10):.0f}: rounding decides "
+                "when it is reached, and which one where others coexist."
+            )
         if a["exponent"] == -math.inf:
             said += " Its exponent is minus infinity: both multipliers are 0."
         elif math.isnan(a["exponent"]):
@@ -72,7 +92,7 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
             "chaotic": f": {name}; none of the trajectories watched was captured by anything"
             f" within {a['chaos_bound']} periods, none of these here at their ends.",
             "undamped": ". Without damping there are no attractors: this is the exponent of the"
-            " motion near this start. That of regular motion falls to 0 as ln(tau)/tau.",
+            " motion near this start.",
             "undecided": f": undecided within {counted(a['max_periods'], 'period')}; no exponent"
             " is given, since a chaotic transient has a positive one too. --max-periods raises"
             " this bound.",

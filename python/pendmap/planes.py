@@ -11,7 +11,7 @@ import xarray as xr
 
 from pendmap import _core, checks
 from pendmap.cell_search import STARTS, CellSearch
-from pendmap.critical_curves import tongues
+from pendmap.critical_curves import MOST_P, tongues
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, VELOCITY
@@ -207,13 +207,18 @@ def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
         given = " and ".join(axis.name for axis in axes)
         raise InputError(f"curves over {given}: allowed are p and omega")
     omega, p = by_name["omega"], by_name["p"]
-    frequency = np.linspace(omega.bare[0], omega.bare[-1], _FREQUENCIES)
     if omega.values.size == 1 or p.bare[-1] <= 0:
         raise InputError("curves: allowed with ranges of omega and of p above 0")
-    found = tongues(model, frequency, float(p.bare[-1]))
+    # A cell reaches half a spacing beyond its middle: the curves go to the edges of the picture.
+    half = np.diff(omega.bare)[0] / 2
+    low, high = omega.bare[0] - half, omega.bare[-1] + half
+    above = p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0)
+    p_max = max(float(p.bare[-1]), min(float(above), MOST_P))
+    frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
+    found = tongues(model, frequency, p_max, refine=True)
     scale = omega.values[-1] / omega.bare[-1]
     return {
-        "curve_omega": ("curve_frequency", scale * frequency, omega.attributes),
+        "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
         "curve_fold": ("curve_frequency", found["fold"].values, p.attributes),
         "curve_index": ("curve_point", found["index"].values),
         "curve_p": ("curve_point", found["p"].values, p.attributes),

@@ -114,11 +114,12 @@ def title(model: Pendulum | Rig, *axes: Varied) -> str:
 
 
 def title_without(model: Pendulum | Rig, *names: str) -> str:
-    """Return the model in one line without some of its parameters, by their names in eq. 1.2."""
-    own, bracket, effects = model.title.partition(" (")
+    """Return the model in one line without some of its parameters, by the core's names."""
+    whole = [effect.title(model.units) for effect in model.effects]
+    own = model.title.removesuffix(", ".join(whole)).removesuffix(", ")
     symbols = {symbol for name in names for symbol in _SYMBOLS.get(name, ())}
     kept = [part for part in own.split(", ") if part.partition(" = ")[0] not in symbols]
-    return ", ".join(kept) + bracket + effects
+    return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
 
 
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:

@@ -1,6 +1,7 @@
 //! The pendulum of a record from many starts at once: what it would have read.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
@@ -9,23 +10,21 @@ use crate::error::Error;
 use crate::integrate::State;
 use crate::integrate::course::{Course, greatest_rate};
 use crate::integrate::sample::sample;
-use crate::maps::control::{Control, pool};
 use crate::model::Observation;
 
 /// What the sensor of the angle reads at `times`, rad and not wrapped, of the pendulum of `record` under
 /// its drive and its pivot's motion, from each of `starts` at the first of these times; with an error
-/// of `tolerance` a step. Not numbers after a motion left their range.
+/// of `tolerance` a step; `done` is called after each. Not numbers after a motion left their range.
 ///
 /// # Errors
-/// [`Error::Range`] for times that fall, [`Error::Threads`] as of [`pool`], [`Error::Interrupted`] if
-/// `control` was cancelled.
+/// [`Error::Range`] for times that fall, [`Error::Interrupted`] if `cancel` was set.
 pub fn replay(
     record: &Record,
     starts: &[State],
     times: &[f64],
     tolerance: f64,
-    threads: usize,
-    control: &Control,
+    cancel: &AtomicBool,
+    done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Vec<f64>>, Error> {
     let falls = times.windows(2).find(|pair| pair[1].is_nan() || pair[1] < pair[0]);
     if let Some(pair) = falls {
@@ -36,17 +35,19 @@ pub fn replay(
     let rate = greatest_rate(pendulum);
     let observation = Observation::lift(pendulum, |_, value| value);
     let begin = times.first().copied().unwrap_or(0.0);
-    control.begin(starts.len());
+    let goes_on = || !cancel.load(Ordering::Relaxed);
     let one = |start: &State| {
         let mut course = Course::with_rate(pendulum, rate, true, tolerance, |_, value| value);
         if let Some(recorded) = &record.recorded {
             course = course.driven_by(Arc::clone(recorded));
         }
-        let run = sample(&course, begin, *start, times, |_, _| control.check().is_ok());
-        control.check()?;
-        control.add(1);
+        let run = sample(&course, begin, *start, times, |_, _| goes_on());
+        if !goes_on() {
+            return Err(Error::Interrupted);
+        }
+        done();
         let reading = |[theta, velocity]: &State| observation.read(*theta, *velocity);
         Ok(run.states.iter().map(reading).collect())
     };
-    pool(threads)?.install(|| starts.par_iter().map(one).collect())
+    starts.par_iter().map(one).collect()
 }

@@ -94,3 +94,40 @@ impl Bundle {
         Ok(rows?.into_iter().flatten().collect())
     }
 }
+
+/// One trajectory with its tangent, period by period from its start.
+#[derive(Clone, Debug)]
+pub struct Course {
+    bundle: Bundle,
+    /// Logarithm of the growth of its tangent in each period.
+    pub growth: Vec<f64>,
+    /// Where it is after each period, the start first; angles in [-pi, pi].
+    pub states: Vec<State>,
+}
+
+impl Course {
+    /// From this start.
+    #[must_use]
+    pub fn new(start: State) -> Self {
+        Self { bundle: Bundle::new(&[start]), growth: Vec::new(), states: vec![start] }
+    }
+
+    /// Goes on until `periods` are over from the start.
+    ///
+    /// # Errors
+    /// As of [`Bundle::grow`].
+    pub fn extend(
+        &mut self,
+        strobe: &Strobe,
+        periods: usize,
+        pool: &rayon::ThreadPool,
+        control: &Control,
+    ) -> Result<(), Error> {
+        while self.growth.len() < periods {
+            let rows = self.bundle.grow(strobe, 1, 1, pool, control)?;
+            self.growth.extend(rows.into_iter().flatten());
+            self.states.extend(self.bundle.states());
+        }
+        Ok(())
+    }
+}

@@ -7,9 +7,9 @@
 use super::basins::{MAX_PERIODS, SEARCH_BOUND, SEARCH_SAMPLE};
 use super::control::{Control, pool};
 use super::ensemble::{Ensemble, NEAR, ROUND, Run};
-use super::growth::Bundle;
+use super::growth::Course;
 use super::starts::{Axis, Starts};
-use crate::attractor::capture::{Fate, Outcome, outcomes};
+use crate::attractor::capture::{Fate, outcomes};
 use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
 use crate::integrate::{State, accuracy};
@@ -27,8 +27,12 @@ const DROPPED: f64 = 100.0;
 const APART: f64 = 12.0;
 /// Periods dropped at the most.
 const MOST_DROPPED: f64 = 5_000.0;
-/// Periods of the start's own growth after it has been captured, and at the most.
-const COURSE: [usize; 2] = [100, 4_000];
+/// Periods of the start's own growth after it has been captured, and of what nothing captures.
+const COURSE: [usize; 2] = [100, 1_000];
+/// Periods between two looks at whether a trap has taken the start.
+const STRETCH: usize = 64;
+/// Periods in which a trap takes what is in it: two hits.
+const AT_ONCE: u32 = 2;
 /// Periods within which a trap takes what lies in it.
 const TAKEN: u32 = 64;
 /// Last points of a trajectory that say in which region it lives.
@@ -130,17 +134,18 @@ pub fn lyapunov(
     };
     let Request { precision, seed, .. } = *request;
     let run = Run { strobe: &strobe, precision, seed, pool: &pool, control };
+    let mut course = Course::new(start);
     if pendulum.is_dissipative() {
-        run.reach(&seeds, request.max_periods, &mut result)?;
+        run.reach(&seeds, &mut course, request.max_periods, &mut result)?;
     } else {
         let most = request.max_periods.unwrap_or(MOST_UNDAMPED);
         let states = run.members(&[start]);
         result.ensemble = Some(run.ensemble(&states, DROPPED as u32, most)?.0);
     }
-    let length = result.transient.map_or(COURSE[1] / 4, |t| t as usize + COURSE[0]);
-    let mut own = Bundle::new(&[start]);
-    let rows = own.grow(&strobe, length.min(COURSE[1]), 1, &pool, control)?;
-    result.course = rows.into_iter().next().unwrap_or_default();
+    let length = result.transient.map_or(COURSE[1], |t| t as usize + COURSE[0]);
+    course.extend(&strobe, length, &pool, control)?;
+    result.course = course.growth;
+    result.course.truncate(length);
     Ok(result)
 }
 
@@ -149,22 +154,24 @@ impl Run<'_> {
     fn reach(
         &self,
         seeds: &[State],
+        course: &mut Course,
         max_periods: Option<u32>,
         result: &mut Exponent,
     ) -> Result<(), Error> {
         let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH);
         catalogue.search(self.strobe, seeds, SEARCH_BOUND, self.control.flag());
         self.control.check()?;
-        let mut outcome = self.capture(&catalogue, seeds[0], result.bound)?;
-        let mut home = self.region(&catalogue, &outcome)?;
-        if outcome.fate == Fate::Open && home.is_none() {
+        let (mut fate, mut periods) = self.follow(course, &catalogue, result.bound)?;
+        let mut home = self.region(course, &catalogue, fate)?;
+        if fate == Fate::Open && home.is_none() {
             // Something that the search has not met: it begins anew where the start has come to.
-            catalogue.search(self.strobe, &[outcome.state], SEARCH_BOUND, self.control.flag());
+            let here: Vec<State> = course.states.last().copied().into_iter().collect();
+            catalogue.search(self.strobe, &here, SEARCH_BOUND, self.control.flag());
             self.control.check()?;
-            outcome = self.capture(&catalogue, seeds[0], result.bound)?;
-            home = self.region(&catalogue, &outcome)?;
+            (fate, periods) = self.follow(course, &catalogue, result.bound)?;
+            home = self.region(course, &catalogue, fate)?;
         }
-        if let (Fate::Open, Some(index)) = (outcome.fate, home) {
+        if let (Fate::Open, Some(index)) = (fate, home) {
             let chaos = catalogue.attractors[index].clone();
             let per_period = chaos.exponent * self.strobe.pendulum.period();
             let apart = (APART - NEAR.ln()) / per_period;
@@ -180,13 +187,13 @@ impl Run<'_> {
                 return Ok(());
             }
             // A long transient: the start itself will be captured, sooner or later.
-            outcome = self.capture(&catalogue, seeds[0], result.bound.max(MOST))?;
+            (fate, periods) = self.follow(course, &catalogue, result.bound.max(MOST))?;
         }
-        match outcome.fate {
+        match fate {
             Fate::Captured(index) => {
                 result.end = End::Captured;
                 result.attractor = Some(catalogue.attractors[index].clone());
-                result.transient = Some(outcome.periods);
+                result.transient = Some(periods);
             }
             Fate::Open => result.end = End::Undecided,
             Fate::Failed => result.end = End::Failed,
@@ -194,17 +201,46 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn capture(&self, catalogue: &Catalogue, start: State, bound: u32) -> Result<Outcome, Error> {
-        let found = outcomes(self.strobe, &catalogue.traps, bound, &[start], self.control.flag());
-        found.and_then(|all| all.into_iter().next()).ok_or(Error::Interrupted)
+    /// Follows the start's own course until a trap takes it, or `bound` periods are over: its fate, and
+    /// after how many periods.
+    ///
+    /// Of a chaotic transient another rounding has another end: the growth that is shown and the
+    /// capture are of one course.
+    fn follow(
+        &self,
+        course: &mut Course,
+        catalogue: &Catalogue,
+        bound: u32,
+    ) -> Result<(Fate, u32), Error> {
+        let (bound, flag) = (bound as usize, self.control.flag());
+        let mut looked = 0;
+        while looked < bound {
+            let to = (looked + STRETCH).min(bound);
+            course.extend(self.strobe, to, self.pool, self.control)?;
+            let states = &course.states[looked..to];
+            let found = outcomes(self.strobe, &catalogue.traps, AT_ONCE, states, flag);
+            for (k, end) in found.ok_or(Error::Interrupted)?.iter().enumerate() {
+                if end.fate != Fate::Open {
+                    return Ok((end.fate, (looked + k) as u32 + end.periods));
+                }
+            }
+            looked = to;
+        }
+        Ok((Fate::Open, bound as u32))
     }
 
-    /// The chaotic attractor in whose region an open trajectory goes on.
-    fn region(&self, catalogue: &Catalogue, outcome: &Outcome) -> Result<Option<usize>, Error> {
-        if outcome.fate != Fate::Open || !catalogue.has_chaos() {
+    /// The chaotic attractor in whose region an open course goes on.
+    fn region(
+        &self,
+        course: &Course,
+        catalogue: &Catalogue,
+        fate: Fate,
+    ) -> Result<Option<usize>, Error> {
+        let Some([theta, velocity]) = course.states.last().copied() else { return Ok(None) };
+        if fate != Fate::Open || !catalogue.has_chaos() {
             return Ok(None);
         }
-        let (mut theta, mut velocity) = ([outcome.state[0]], [outcome.state[1]]);
+        let (mut theta, mut velocity) = ([theta], [velocity]);
         let mut points = Vec::with_capacity(LAST_POINTS);
         for _ in 0..LAST_POINTS {
             self.strobe.advance(&mut theta, &mut velocity, &mut [0.0], 1)?;

@@ -18,6 +18,7 @@ use crate::fit::replay::replay as replayed;
 use crate::fit::window::Window;
 use crate::fit::{Counts, Free, Problem, Record, RodSensor, Settings, Slot, fit};
 use crate::integrate::State;
+use crate::maps::control::pool;
 use crate::model::Recorded;
 use crate::model::recorded::{Quantity, Samples};
 
@@ -253,7 +254,10 @@ pub fn replay<'py>(
     let starts: Vec<State> = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
     let times = times.as_slice()?.to_vec();
     let all = watched(py, progress.as_ref(), |control| {
-        replayed(&record, &starts, &times, tolerance, threads, control)
+        control.begin(starts.len());
+        let done = || control.add(1);
+        pool(threads)?
+            .install(|| replayed(&record, &starts, &times, tolerance, control.flag(), &done))
     })?;
     let flat: Vec<f64> = all.into_iter().flatten().collect();
     flat.into_pyarray(py).reshape([starts.len(), times.len()])

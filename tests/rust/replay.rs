@@ -2,10 +2,11 @@
 
 use std::f64::consts::PI;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pendmap::error::Error;
 use pendmap::fit::replay::replay;
-use pendmap::maps::control::Control;
+use pendmap::maps::control::pool;
 use pendmap::model::recorded::{Quantity, Samples};
 use pendmap::model::{Kind, Recorded};
 
@@ -18,16 +19,24 @@ fn members_read_what_one_trajectory_would() {
     let forced = with(driven(0.05, 1.2, 2.0).with_friction(0.02).expect("in range"), &[offset]);
     let starts = spread(9, PI, 3.0);
     let template = record(forced.clone(), None, starts[0], 30.0);
-    let all = replay(&template, &starts, &template.times, 1e-12, 2, &Control::default());
-    let all = all.expect("an ensemble");
+    let count = AtomicUsize::new(0);
+    let done = || {
+        count.fetch_add(1, Ordering::Relaxed);
+    };
+    let never = AtomicBool::new(false);
+    let on = |threads: usize| {
+        let ran = || replay(&template, &starts, &template.times, 1e-12, &never, &done);
+        pool(threads).expect("workers").install(ran).expect("an ensemble")
+    };
+    let all = on(2);
+    assert_eq!(count.load(Ordering::Relaxed), starts.len());
     for (start, reading) in starts.iter().zip(&all) {
         let alone = record(forced.clone(), None, *start, 30.0).readings;
         for (a, b) in reading.iter().zip(&alone) {
             assert!((a - b).abs() < 1e-6, "{start:?}: {a} {b}");
         }
     }
-    let single = replay(&template, &starts, &template.times, 1e-12, 1, &Control::default());
-    assert_eq!(single.expect("an ensemble"), all);
+    assert_eq!(on(1), all);
 }
 
 #[test]
@@ -41,7 +50,7 @@ fn a_recorded_pivot_drives_like_the_drive_that_it_is() {
     let shaken = record(undriven(0.1, 0.0), Some(Arc::new(pivot)), starts[0], 30.0);
     let forced = record(driven(0.1, p, omega), None, starts[0], 30.0);
     let [a, b] = [shaken, forced].map(|one| {
-        replay(&one, &starts, &one.times, 1e-12, 0, &Control::default()).expect("an ensemble")
+        replay(&one, &starts, &one.times, 1e-12, &AtomicBool::new(false), &|| ()).expect("all")
     });
     for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");
@@ -52,7 +61,8 @@ fn a_recorded_pivot_drives_like_the_drive_that_it_is() {
 fn it_begins_at_its_first_time_and_refuses_times_that_fall() {
     // Half a period of the drive later the drive has turned round: only the phase tells.
     let one = record(driven(0.1, 1.0, 2.0), None, [1.0, 0.0], 9.0);
-    let ran = |times: &[f64]| replay(&one, &[[1.0, 0.0]], times, 1e-12, 1, &Control::default());
+    let never = AtomicBool::new(false);
+    let ran = |times: &[f64]| replay(&one, &[[1.0, 0.0]], times, 1e-12, &never, &|| ());
     let [now, later] = [0.0, 0.5 * PI].map(|begin| {
         let times: Vec<f64> = (0..20).map(|k| begin + 0.3 * f64::from(k)).collect();
         ran(&times).expect("a member").remove(0)
@@ -63,8 +73,7 @@ fn it_begins_at_its_first_time_and_refuses_times_that_fall() {
     assert!((again[1] - now[19]).abs() < 1e-8);
     assert!(matches!(ran(&[1.0, 0.5]), Err(Error::Range { name: "time", .. })));
     assert!(ran(&[]).expect("nothing").remove(0).is_empty());
-    let stopped = Control::default();
-    stopped.cancel();
-    let found = replay(&one, &[[1.0, 0.0]], &[0.0, 5.0], 1e-12, 1, &stopped);
+    let stopped = AtomicBool::new(true);
+    let found = replay(&one, &[[1.0, 0.0]], &[0.0, 5.0], 1e-12, &stopped, &|| ());
     assert!(matches!(found, Err(Error::Interrupted)));
 }

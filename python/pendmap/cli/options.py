@@ -143,6 +143,11 @@ class Outputs:
         return outputs
 
     @property
+    def draws(self) -> bool:
+        """Whether anything is drawn, or kept to be drawn from."""
+        return bool(self.out or self.plot or self.rerun or self.view)
+
+    @property
     def shows_progress(self) -> bool:
         """Whether stderr is a terminal and nobody asked for silence."""
         return sys.stderr.isatty() and not self.quiet

@@ -37,7 +37,8 @@ __all__ = ["command"]
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Find where hanging rest loses its stability: critical curves of eq. 1.3, exact.
 
-    Also without damping; folds of the oscillation born there; curves by perturbation beside.
+    Also without damping; folds of the oscillation born there; curves by perturbation beside. For
+    files, frequencies are added where curves turn, end or bend; --json lists those asked for.
 
     Writes tongues.nc, tongues.png and tongues.rrd if no output is named. --json alone writes no
     file.
@@ -50,7 +51,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     from pendmap.critical_curves import tongues
 
     with progress_bar("tongues", shown=outputs.shows_progress) as progress:
-        dataset = tongues(model, omegas, progress=progress, **given)
+        dataset = tongues(model, omegas, refine=outputs.draws, progress=progress, **given)
     show(dataset, outputs, fields)
 
 
@@ -68,16 +69,17 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         for prefix in ("", "undamped_")
     )
     stable = dataset["stable_above"].values
+    asked = dataset["asked"].values.astype(bool)
     for k, curve in enumerate(curves):
         mine = dataset["index"].values == k
         curve["stable_above"] = [bool(s) for s in stable[mine]]
         curve["fold"] = float(dataset["fold"].values[k])
     return {
         "units": a["units"],
-        "curves": curves,
-        "undamped": undamped,
+        "curves": [curve for curve, mine in zip(curves, asked, strict=True) if mine],
+        "undamped": [curve for curve, mine in zip(undamped, asked, strict=True) if mine],
         "asymptotic": {
-            str(name): dataset["asymptotic"].values[k].tolist()
+            str(name): dataset["asymptotic"].values[k][asked].tolist()
             for k, name in enumerate(dataset["curve"].values)
         },
         **{name: a[name] for name in ("p_max", "seconds", "threads")},

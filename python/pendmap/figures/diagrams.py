@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from pendmap import palette
 from pendmap.errors import InputError
@@ -58,6 +59,9 @@ def figure(
     if len(every) > len(listed):
         texts.append(f"{len(every) - len(listed)} more")
         handles.append(Line2D([], [], marker="s", linestyle="none", color=palette.UNNAMED))
+    if any((dataset[sweep].values < 0).any() for sweep in ("up", "down")):
+        texts.append("sweep on none")
+        handles.append(Patch(facecolor="white", edgecolor=style.QUIET, linewidth=0.6))
     width, height = size or _SIZE
     columns = max(1, int((width - _LEFT) / _COLUMN))
     rows = math.ceil(len(texts) / columns)

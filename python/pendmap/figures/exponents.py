@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pendmap.errors import InputError
 from pendmap.figures import style
@@ -30,6 +31,7 @@ __all__ = ["figure"]
 _LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
 _RATIO, _HEIGHT, _WIDTHS = 0.8, 4.3, {1: 6.0, 2: 8.8, 3: 12.4}
 _BINS = 60
+_TWO_DECADES = 100
 _SIGMAS = 2
 
 
@@ -94,8 +96,12 @@ def _legend(dataset: xr.Dataset, shown: list[str]) -> tuple[list[Any], list[str]
         handles.append(Patch(color=_TRANSIENT, lw=0))
         texts.append(f"transient, {counted(int(dataset.attrs['transient_periods']), 'period')}")
     if dataset.sizes["window"] and "average" in shown:
-        handles.append(Patch(color=_BAND, lw=0))
-        texts.append(f"\N{PLUS-MINUS SIGN}{_SIGMAS} standard errors of the mean")
+        if math.isfinite(dataset.attrs["stderr"]):
+            handles.append(Patch(color=_BAND, lw=0))
+            texts.append(f"\N{PLUS-MINUS SIGN}{_SIGMAS} standard errors of the mean")
+        if dataset.attrs["end"] == "undamped":
+            handles.append(Line2D([], [], color=style.INK, lw=1.0, ls=":"))
+            texts.append("regular motion: deviations grow as \N{GREEK SMALL LETTER TAU}")
     return handles, texts
 
 
@@ -107,7 +113,7 @@ def _growth(axes: Axes, dataset: xr.Dataset, _: Units) -> None:
     axes.axhline(0.0, color=style.QUIET, lw=0.6, zorder=1)
     axes.plot(periods, growth, color=_LINE, lw=1.1)
     rate = float(dataset.attrs["per_period"])
-    if math.isfinite(rate):
+    if math.isfinite(rate) and math.isfinite(dataset.attrs["stderr"]):
         begin = min(transient, periods.size - 1)
         # Beside a line of so many decades the constant matters little: it meets the end.
         last = growth[-1] if transient else rate * periods[-1]
@@ -123,13 +129,21 @@ def _growth(axes: Axes, dataset: xr.Dataset, _: Units) -> None:
 def _average(axes: Axes, dataset: xr.Dataset, units: Units) -> None:
     periods = dataset["averaged"].values
     mean, error = dataset["running_exponent"].values, dataset["running_stderr"].values
-    axes.fill_between(
-        periods, mean - _SIGMAS * error, mean + _SIGMAS * error, color=_BAND, lw=0, zorder=1
-    )
+    a = dataset.attrs
+    if math.isfinite(a["stderr"]):
+        low, high = mean - _SIGMAS * error, mean + _SIGMAS * error
+        axes.fill_between(periods, low, high, color=_BAND, lw=0, zorder=1)
+    if a["end"] == "undamped":
+        regular = np.log1p(periods / a["dropped_periods"]) / (periods * a["forcing_period"])
+        axes.plot(periods, regular, color=style.INK, lw=1.0, ls=":", zorder=4)
     axes.axhline(float(dataset.attrs["exponent"]), color=_MEAN, lw=1.6, ls=(0, (4, 2)), zorder=2)
     axes.plot(periods, mean, color=_LINE, lw=1.2, zorder=3)
     axes.set_xscale("log")
     axes.set_xlim(periods[0], periods[-1])
+    subs = (1.0, 2.0, 5.0) if periods[-1] < _TWO_DECADES * periods[0] else (1.0,)
+    axes.xaxis.set_major_locator(LogLocator(subs=subs))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("periods averaged, each")
     axes.margins(y=0.08)
     style.scale(axes, "y", axes.get_ylim(), _rate(units))

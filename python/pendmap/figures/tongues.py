@@ -8,7 +8,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.critical_curves import NEAR, PLANES
+from pendmap.critical_curves import NEAR
+from pendmap.critical_plane import PLANES, in_plane
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
@@ -48,7 +49,7 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
     if colormap is not None:
         raise InputError(f"colormap {colormap!r}: a figure of critical curves has no colour map")
     chart = drawn.chart(dataset, plane, NEAR)
-    handles, texts = _legend(chart, own=not marks)
+    handles, texts = _legend(chart, own=not marks, damped=float(dataset.attrs["gamma"]) > 0)
     sheet = Sheet(
         [Panel()],
         ratio=0.72,
@@ -74,12 +75,11 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
         axes.plot(near[:, 0], near[:, 1], linestyle=look, color=style.INK, linewidth=1.0)
         axes.plot(far[:, 0], far[:, 1], linestyle=look, color=style.INK, linewidth=0.5, alpha=0.45)
     axes.plot(chart.fold[:, 0], chart.fold[:, 1], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
-    if chart.beyond[0, 1] != chart.beyond[-1, 1]:
+    if _ends_in_view(chart):
         axes.plot(chart.beyond[:, 0], chart.beyond[:, 1], color="#c8c8c8", linewidth=3.0, zorder=1)
     if marks:
         for p, omega, name in marks:
-            turned = plane == PLANES[1]
-            at = (1 / omega**2, p / omega**2) if turned else (omega, p)
+            at = in_plane(omega, p, plane)
             axes.plot(*at, marker="o", color=style.INK, markersize=5)
             axes.annotate(name, at, xytext=(6, 4), textcoords="offset points")
     else:
@@ -94,7 +94,12 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
 _DRIVE = {"p", "omega", "phase", "Omega", "phi"}
 
 
-def _legend(chart: drawn.Chart, *, own: bool) -> tuple[list[Any], list[str]]:
+def _ends_in_view(chart: drawn.Chart) -> bool:
+    """Whether the largest amplitude computed is within the picture, not its upper edge."""
+    return bool((chart.beyond[:, 1] < 0.995 * chart.y[1]).any())
+
+
+def _legend(chart: drawn.Chart, *, own: bool, damped: bool) -> tuple[list[Any], list[str]]:
     entries: list[tuple[Any, str]] = [
         (Patch(facecolor=_STABLE, edgecolor=style.QUIET, linewidth=0.4), "rest is stable"),
         (
@@ -102,14 +107,16 @@ def _legend(chart: drawn.Chart, *, own: bool) -> tuple[list[Any], list[str]]:
             "exact, multiplier \N{MINUS SIGN}1 (period 2)",
         ),
         (Line2D([], [], color=drawn.COLOURS[1], linewidth=1.1), "exact, multiplier +1 (period 1)"),
-        (Line2D([], [], color=style.QUIET, linewidth=0.6), "exact, without damping"),
     ]
+    if damped:
+        bare = Line2D([], [], color=style.QUIET, linewidth=0.6)
+        entries.append((bare, "exact, without damping"))
     if (chart.fold == chart.fold).any(axis=0)[1]:
         fold = Line2D([], [], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
         entries.append((fold, "fold: the oscillation exists from here"))
     for look, name in zip(_LOOKS, chart.asymptotic, strict=True):
         entries.append((Line2D([], [], color=style.INK, linewidth=1.0, linestyle=look), name))
-    if chart.beyond[0, 1] != chart.beyond[-1, 1]:
+    if _ends_in_view(chart):
         edge = Line2D([], [], color="#c8c8c8", linewidth=3.0)
         entries.append((edge, "largest p computed"))
     if own:

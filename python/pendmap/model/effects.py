@@ -12,6 +12,8 @@ from pendmap import checks
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from pendmap.model.formula import Formula, FormulaKey
     from pendmap.model.units import Units
 
@@ -194,15 +196,22 @@ class Effect:
         """Whether it changes with the time in the laboratory; maps hold that still."""
         return bool(self.definition["mappable"] == "frozen")
 
-    def title(self, units: Units) -> str:
-        """Return name and parameters, short: with their units in SI, else with those of angles."""
-        entries = self.definition["parameters"]
+    def title(self, units: Units, without: Collection[str] = ()) -> str:
+        """Return name and parameters, short: with their units in SI, else with those of angles.
+
+        Parameters ``EFFECT.PARAMETER`` of ``without``, which vary, are left out.
+        """
+        entries = [
+            entry
+            for entry in self.definition["parameters"]
+            if f"{self.name}.{entry['name']}" not in without
+        ]
         shown = []
         for entry in entries:
             said = units.si or (entry["power_of_w0"] == 0 and entry["power_of_w0_less"] is None)
             unit = entry["unit"] if said and entry["unit"] != "1" else ""
             shown.append(f"{entry['name']} = {self.parameters[entry['name']]:.4g} {unit}".rstrip())
-        return f"{self.name} ({', '.join(shown)})"
+        return f"{self.name} ({', '.join(shown)})" if shown else self.name
 
     def given(self, units: Units) -> Effect:
         """Return an effect without dimensions in ``units``."""

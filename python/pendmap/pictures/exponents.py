@@ -40,8 +40,9 @@ def value(dataset: xr.Dataset) -> str:
     exponent, error = float(a["exponent"]), float(a["stderr"])
     if not math.isfinite(exponent):
         return ""
-    said = written(exponent, error).replace("-", "\N{MINUS SIGN}")
-    said += f" \N{PLUS-MINUS SIGN} {written(error, error)}" if error else ""
+    said = f"{exponent:.2g}" if math.isnan(error) else written(exponent, error)
+    said += f" \N{PLUS-MINUS SIGN} {written(error, error)}" if error > 0 else ""
+    said = said.replace("-", "\N{MINUS SIGN}")
     per = names.per_time(Units.of(a))
     return f"\N{GREEK SMALL LETTER LAMDA} = {said} {per}"
 

@@ -217,6 +217,6 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
         if key in attrs and key not in never and (key in always or float(attrs[key]) != 0.0)
     ]
     effects = json.loads(attrs.get("effects", "[]"))
-    acting = [Effect(entry["name"], entry["parameters"]).title(units) for entry in effects]
+    acting = [Effect(entry["name"], entry["parameters"]).title(units, without) for entry in effects]
     said = ",  ".join(text.replace("_", " ").replace("-", "\N{MINUS SIGN}") for text in acting)
     return ";   ".join([",  ".join(parts), *([said] if said else [])])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.critical_curves import PLANES
+from pendmap.critical_plane import in_plane, window
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,9 +42,6 @@ _TIP = 0.6
 _JUMP = 0.6
 """Lines are joined over a change of p, between two frequencies, of at most this part of the mean
 ``p`` and a little."""
-
-_HIGHEST = 2.6
-"""Largest e of a picture in the plane of eq. 1.4, if so much was computed."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +96,10 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
     """
     omega = dataset["omega"].values
     p_max = float(dataset.attrs["p_max"])
-    turned = plane == PLANES[1]
 
     def to(points: Floats) -> Floats:
         """From (omega, p) to the plane."""
-        if not turned:
-            return points
-        square = 1 / points[..., 0] ** 2
-        return np.stack([square, points[..., 1] * square], axis=-1)
+        return np.stack(in_plane(points[..., 0], points[..., 1], plane), axis=-1)
 
     damped = by_frequency(dataset, "", omega.size)
     bare = by_frequency(dataset, "undamped_", omega.size)
@@ -124,15 +117,11 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
         asymptotic[str(name)] = (np.where(close, whole, np.nan), np.where(parting, whole, np.nan))
     edge = to(np.stack([omega, np.full_like(omega, p_max)], axis=-1))
     own = to(np.array([float(dataset.attrs["own_omega"]), float(dataset.attrs["own_p"])]))
-    x = (float(omega[0]), float(omega[-1]))
-    y = (0.0, p_max)
-    if turned:
-        x = (0.0, 1 / x[0] ** 2)
-        y = (0.0, min(_HIGHEST, p_max * x[1]))
+    x, top = window(omega, p_max, plane)
     return Chart(
         _NAMES[plane],
         x,
-        y,
+        (0.0, top),
         lines,
         undamped,
         stable,

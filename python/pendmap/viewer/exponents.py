@@ -78,8 +78,10 @@ def _exponents(dataset: xr.Dataset) -> dict[str, list[Floats]]:
         return {"own": [_columns(*drawn.sliding(dataset))]}
     periods = np.log10(dataset["averaged"].values)
     mean, error = dataset["running_exponent"].values, dataset["running_stderr"].values
-    band = [_columns(periods, mean + way * _SIGMAS * error) for way in (-1, 1)]
-    return {"own": [_columns(periods, mean)], "band": band}
+    own = {"own": [_columns(periods, mean)]}
+    if math.isnan(dataset.attrs["stderr"]):
+        return own
+    return own | {"band": [_columns(periods, mean + way * _SIGMAS * error) for way in (-1, 1)]}
 
 
 def _density(dataset: xr.Dataset) -> Floats:
