@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -27,10 +28,12 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum, Rig
 
+    Floats = NDArray[np.float64]
+
 __all__ = ["MOST_P", "NEAR", "OMEGA", "P_MAX", "tongues"]
 
-_Pair: TypeAlias = "tuple[dict[str, Any], dict[str, Any]]"
-"""What was found at one frequency, and without damping."""
+_Row: TypeAlias = "dict[str, Any]"
+"""What was found at one frequency."""
 
 OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
 """Frequencies and largest amplitude where none are given."""
@@ -92,9 +95,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above). Over
         ``omega``: ``asked`` (0 where the frequency was added), ``stable_at_first`` (below the
         first), ``fold`` (nan where none) and the point ``fold_theta``, ``fold_velocity`` of the
-        oscillation there. The same without damping: ``undamped_index``, ``undamped_p``,
-        ``undamped_multiplier`` over ``undamped``. Over ``curve`` and ``omega``: ``asymptotic`` and
-        ``asymptotic_error``, relative to the exact curve nearest by (:mod:`pendmap.asymptotic`).
+        oscillation there, ``fold_sought`` (0 where the frequency was added and no fold ends). The
+        same without damping: ``undamped_index``, ``undamped_p``, ``undamped_multiplier`` over
+        ``undamped``. Over ``curve`` and ``omega``: ``asymptotic`` and ``asymptotic_error``,
+        relative to the exact curve nearest by (:mod:`pendmap.asymptotic`).
 
     Raises
     ------
@@ -116,23 +120,32 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
-    def solve(at: NDArray[np.float64]) -> list[_Pair]:
-        def of(one: Pendulum, *, folds: bool) -> list[dict[str, Any]]:
-            return _core.tongues(one.parameters, at.tolist(), p_max, folds, workers, progress)
+    def solve(at: Floats, one: Pendulum = pendulum, *, folds: bool = False) -> list[_Row]:
+        return _core.tongues(one.parameters, at.tolist(), p_max, folds, workers, progress)
 
-        found = of(pendulum, folds=True)
-        return list(zip(found, of(free, folds=False) if free else found, strict=True))
+    def both(at: Floats) -> list[tuple[_Row, _Row]]:
+        found = solve(at)
+        return list(zip(found, solve(at, free) if free else found, strict=True))
+
+    def curves(pair: tuple[_Row, _Row]) -> list[tuple[Floats, Floats]]:
+        # The end of what is looked for bounds the last strip.
+        return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in pair]
 
     asked = frequencies
+    looked = np.ones(asked.size, dtype=bool)
     try:
+        found = solve(asked, folds=True)
+        undamped = solve(asked, free) if free else found
         if refine and asked.size > 1:
             views = [in_picture(asked, p_max, one) for one in PLANES]
-            frequencies, pairs = critical_refinement.denser(asked, solve, _curves, views)
-        else:
-            pairs = solve(asked)
+            pairs = list(zip(found, undamped, strict=True))
+            frequencies, pairs = critical_refinement.denser(asked, pairs, both, curves, views)
+            found, undamped = ([pair[k] for pair in pairs] for k in (0, 1))
+            looked = _folds_to_their_ends(
+                frequencies, found, np.isin(frequencies, asked), partial(solve, folds=True)
+            )
     except ValueError as error:
         raise InputError(str(error)) from None
-    found, undamped = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
     folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
     of_p = {"units": "1", "long_name": "amplitude of the drive over gravity"}
@@ -141,6 +154,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         **_columns(undamped, "undamped", "undamped_"),
         "asked": ("omega", np.isin(frequencies, asked).astype(np.int8)),
         "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
+        "fold_sought": ("omega", looked.astype(np.int8)),
         "fold": ("omega", fold, of_p | {"comment": "of the oscillation born at the first loss"}),
         "fold_theta": ("omega", theta, {"units": "rad"}),
         "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
@@ -176,18 +190,31 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     return dataset
 
 
-def _curves(pair: _Pair) -> critical_refinement.Curves:
-    """Return the amplitudes by kind: of each multiplier, damped and not, and of the fold."""
-    kinds = [
-        np.array([p for p, m in zip(one["p"], one["multiplier"], strict=True) if m == multiplier])
-        for one in pair
-        for multiplier in (1, -1)
-    ]
-    fold = pair[0]["fold"]
-    return [*kinds, np.array([fold[0]] if fold else [])]
+def _folds_to_their_ends(
+    omega: Floats,
+    found: list[_Row],
+    looked: NDArray[np.bool_],
+    solve: Callable[[Floats], list[_Row]],
+) -> NDArray[np.bool_]:
+    """Find where folds begin and end among frequencies that were added; tell where was looked.
+
+    Between two frequencies looked at, of which one alone has a fold, the middle one is looked at
+    until the two are neighbours.
+    """
+    looked = looked.copy()
+    while True:
+        places = np.flatnonzero(looked)
+        folded = np.array([found[k]["fold"] is not None for k in places])
+        change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
+        middles = ((places[:-1] + places[1:]) // 2)[change]
+        if not middles.size:
+            return looked
+        for k, row in zip(middles, solve(omega[middles]), strict=True):
+            found[k] = row
+        looked[middles] = True
 
 
-def _usual(plane: str) -> NDArray[np.float64]:
+def _usual(plane: str) -> Floats:
     """Return frequencies that are evenly spread in the plane."""
     if plane == PLANES[0]:
         return np.linspace(*OMEGA)
@@ -209,10 +236,10 @@ def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, An
 
 def _asymptotic(
     found: list[dict[str, Any]],
-    omega: NDArray[np.float64],
+    omega: Floats,
     gamma: float,
     p_max: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Return each asymptotic curve, and how far it is from the exact one with its multiplier."""
     curves, errors = [], []
     for multiplier, formula in asymptotic.CURVES.values():

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +12,23 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-__all__ = ["Curves", "denser"]
+__all__ = ["denser"]
 
 Floats: TypeAlias = NDArray[np.float64]
 
-Curves: TypeAlias = "list[Floats]"
-"""Amplitudes at one frequency, ascending, one array for each kind of curve."""
-
-_BENT = 1e-3
+_BENT = 2e-3
 """A line may miss its curve by this part of the picture's height."""
 
-_STEP = 1 / 4000
-"""Bends are resolved down to this part of the picture's width."""
+_APART = 4e-3
+"""Where a curve turns back its two sides come so near, in parts of that height."""
 
+_STRIP = 1e-6
+"""A stable strip narrower than this is a line, and rounding decides whether its edges are found."""
+
+_STEP = 1 / 1000
 _NOSE = 1e-6
-"""Turns and ends are: at a turn the curve's height goes with the root of the distance."""
+"""Bends and turns are resolved down to these parts of the picture's width: at a turn the height
+goes with the root of the distance."""
 
 _GRADED = 4.5
 """An interval is at most this many times as long as its neighbours."""
@@ -36,20 +39,24 @@ _IN_VIEW = 1.05
 
 def denser(
     frequencies: Floats,
+    found: list[Any],
     solve: Callable[[Floats], list[Any]],
-    curves: Callable[[Any], Curves],
+    curves: Callable[[Any], list[tuple[Floats, Floats]]],
     views: Sequence[Callable[[Floats, Floats], tuple[Floats, Floats]]],
 ) -> tuple[Floats, list[Any]]:
-    """Return frequencies with others between them, and what was found at each.
+    """Return frequencies with others between them, and what is found at each.
 
     Parameters
     ----------
     frequencies : ndarray
         Ascending, two or more.
+    found : list
+        What was found at each of them; stays as it is.
     solve : callable
-        Returns what is found at each of some frequencies.
+        Returns what is found at each of some others.
     curves : callable
-        The amplitudes in what was found at one of them.
+        Takes what was found at one of them: amplitudes, ascending, and multipliers, for each model;
+        the last amplitude is the largest that was looked for.
     views : sequence of callable
         Take frequencies and amplitudes into a picture that is [0, 1] wide and high.
 
@@ -58,17 +65,18 @@ def denser(
     Intervals are halved in which a curve begins or ends, and beside a place where it bends, as long
     as that is in view. Which, does not depend on anything but the model and the frequencies.
     """
-    found = solve(frequencies)
+    found = list(found)
     for _ in range(_ROUNDS):
         rows = [curves(one) for one in found]
         wanted = np.zeros(frequencies.size - 1, dtype=bool)
         for view in views:
             x = view(frequencies, np.zeros_like(frequencies))[0]
-            heights = [
-                [view(np.full_like(values, w), values)[1] for values in row]
-                for w, row in zip(frequencies, rows, strict=True)
-            ]
-            wanted |= _wanted(x, heights)
+            for model in zip(*rows, strict=True):
+                columns = [
+                    _Column.of(view(np.full_like(p, w), p)[1], multiplier)
+                    for w, (p, multiplier) in zip(frequencies, model, strict=True)
+                ]
+                wanted |= _wanted(x, columns)
         halved = _graded(np.diff(frequencies), wanted)
         if not halved.size:
             break
@@ -80,38 +88,68 @@ def denser(
     return frequencies, found
 
 
-def _wanted(x: Floats, heights: Sequence[Sequence[Floats]]) -> NDArray[np.bool_]:
-    """Tell which intervals are to be halved."""
+@dataclass(frozen=True)
+class _Column:
+    """Critical points at one frequency, in parts of the picture's height."""
+
+    heights: Floats
+    multiplier: Floats
+    end: float
+    """The height of the largest amplitude that was looked for."""
+
+    @classmethod
+    def of(cls, heights: Floats, multiplier: Floats) -> Self:
+        """Leave out those on both sides of a stable strip that is only a line."""
+        kept: list[int] = []
+        for k, height in enumerate(heights[:-1]):
+            other = kept and multiplier[kept[-1]] == -multiplier[k]
+            if other and height - heights[kept[-1]] < _STRIP:
+                kept.pop()
+            else:
+                kept.append(k)
+        return cls(heights[kept], multiplier[kept], float(heights[-1]))
+
+
+def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
+    """Tell which intervals are to be halved for the curves of one model."""
     widths = np.abs(np.diff(x))
     wanted = np.zeros(widths.size, dtype=bool)
-    for kind in range(len(heights[0])):
-        mine = [row[kind] for row in heights]
-        for k, (a, b) in enumerate(pairwise(mine)):
-            if a.size != b.size and widths[k] > _NOSE:
-                wanted[k] |= bool((_unmatched(a, b) < _IN_VIEW).any())
-        for k in range(1, x.size - 1):
-            here, before, after = mine[k], mine[k - 1], mine[k + 1]
-            if not here.size == before.size == after.size:
-                continue
-            part = (x[k] - x[k - 1]) / (x[k + 1] - x[k - 1])
-            off = np.abs(before + part * (after - before) - here) > _BENT
-            if (off & (np.minimum(before, after) < _IN_VIEW)).any():
-                wanted[k - 1] |= bool(widths[k - 1] > _STEP)
-                wanted[k] |= bool(widths[k] > _STEP)
+    for k, (a, b) in enumerate(pairwise(columns)):
+        if a.heights.size != b.heights.size and widths[k] > _NOSE:
+            wanted[k] |= _seen_to_end(a, b)
+    for k in range(1, x.size - 1):
+        before, here, after = (one.heights for one in columns[k - 1 : k + 2])
+        if not here.size == before.size == after.size:
+            continue
+        part = (x[k] - x[k - 1]) / (x[k + 1] - x[k - 1])
+        off = np.abs(before + part * (after - before) - here) > _BENT
+        if (off & (np.minimum(before, after) < _IN_VIEW)).any():
+            wanted[k - 1] |= bool(widths[k - 1] > _STEP)
+            wanted[k] |= bool(widths[k] > _STEP)
     return wanted
 
 
-def _unmatched(a: Floats, b: Floats) -> Floats:
-    """Return those neighbours in the longer list that leave the rest nearest to the shorter one."""
-    short, long = sorted((a, b), key=len)
-    extra = long.size - short.size
+def _seen_to_end(a: _Column, b: _Column) -> bool:
+    """Whether curves that go no further in one of two columns are seen to end.
+
+    They are those neighbours in the longer one that leave the rest nearest to the shorter one. A
+    curve ends where it turns back, beside its other side, or at the largest amplitude.
+    """
+    short, long = sorted((a, b), key=lambda one: one.heights.size)
+    extra = long.heights.size - short.heights.size
 
     def left(k: int) -> float:
-        kept = np.delete(long, slice(k, k + extra))
-        return float(np.abs(kept - short).sum())
+        kept = np.delete(long.heights, slice(k, k + extra))
+        return float(np.abs(kept - short.heights).sum())
 
-    first = min(range(short.size + 1), key=left)
-    return long[first : first + extra]
+    first = min(range(short.heights.size + 1), key=left)
+    gone = slice(first, first + extra)
+    heights, multiplier = long.heights[gone], long.multiplier[gone]
+    ended = long.end - heights < _APART
+    turns = (np.diff(heights) < _APART) & (np.diff(multiplier) == 0)
+    ended[1:] |= turns
+    ended[:-1] |= turns
+    return bool((~ended & (heights < _IN_VIEW)).any())
 
 
 def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:

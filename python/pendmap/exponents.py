@@ -206,7 +206,7 @@ def _regular(raw: dict[str, Any], period: float) -> float:
     """The exponent of regular motion over the same periods: deviations grow as tau; else nan."""
     if raw["end"] != "undamped":
         return math.nan
-    averaged = raw["growth"].shape[1] * raw["window"]
+    averaged = float(raw["growth"].shape[1] * raw["window"])
     return math.log1p(averaged / raw["dropped"]) / (averaged * period)
 
 

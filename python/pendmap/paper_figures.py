@@ -61,7 +61,7 @@ _PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 
 
 _SQUARES: Final = (0.05, 1.6)
 _HIGHEST: Final = 2.6
-_COLUMNS: Final = 240
+_COLUMNS: Final = 120
 """Range of alpha^2, largest e, and frequencies of figure 1."""
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["entries", "parameter_map", "undecided"]
 
 _LISTED = 10
-_FREQUENCIES = 300
+_FREQUENCIES = 81
 
 
 def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -220,6 +220,7 @@ def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
     return {
         "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
         "curve_fold": ("curve_frequency", found["fold"].values, p.attributes),
+        "curve_fold_sought": ("curve_frequency", found["fold_sought"].values),
         "curve_index": ("curve_point", found["index"].values),
         "curve_p": ("curve_point", found["p"].values, p.attributes),
         "curve_multiplier": ("curve_point", found["multiplier"].values),

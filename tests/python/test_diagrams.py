@@ -68,6 +68,14 @@ def test_a_sweep_starts_where_it_is_told() -> None:
     assert kinds == ["rotation 1:1", "oscillation period 2"]
 
 
+def test_sweeps_on_mirror_images_are_told() -> None:
+    found = pendmap.bifurcation(Pendulum(), {"p": (1.0, 1.5, 26)})
+    at = np.flatnonzero(found["p"].values > 1.4)
+    on = [found[sweep].values[at] for sweep in ("up", "down")]
+    assert (found["entry_w"].values[on[0]] == -found["entry_w"].values[on[1]]).all()
+    assert "mirror images of one another at p = 1.36 to 1.5" in found.attrs["summary"]
+
+
 def test_in_si_it_is_the_same() -> None:
     bare = pendmap.bifurcation(Pendulum(), {"omega": (1.9, 2.1, 5)})
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)

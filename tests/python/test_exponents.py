@@ -33,7 +33,7 @@ def chaos() -> xr.Dataset:
 @pytest.fixture(scope="module")
 def settled() -> xr.Dataset:
     """A start that is chaotic for some time."""
-    return pendmap.lyapunov(Pendulum(gamma=0.1, p=1.8, omega=2.0), -1.9, 0.4)
+    return pendmap.lyapunov(Pendulum(gamma=0.1, p=1.8, omega=2.0), 0.6, 0.2)
 
 
 def test_chaos_against_the_reference(chaos: xr.Dataset, truths: dict[str, Any]) -> None:
@@ -70,7 +70,7 @@ def test_growth_along_the_start_is_the_tangents_of_scipy(settled: xr.Dataset) ->
     run = solve_ivp(
         slope,
         (0.0, periods * model.period),
-        (-1.9, 0.4, math.sqrt(0.5), math.sqrt(0.5)),
+        (0.6, 0.2, math.sqrt(0.5), math.sqrt(0.5)),
         method="DOP853",
         rtol=1e-12,
         atol=1e-12,
@@ -89,6 +89,29 @@ def test_transient_chaos_has_the_exponent_of_what_captures_it(settled: xr.Datase
     assert (a["stderr"], a["trajectories"]) == (0.0, 0)
     assert a["second_exponent"] == pytest.approx(-0.05, abs=1e-9)
     assert "reached after" in a["summary"]
+    assert "rounding decides" in a["summary"]
+
+
+def test_the_transient_is_that_of_the_course_beside_it(settled: xr.Dataset) -> None:
+    a, growth = settled.attrs, settled["growth"].values
+    at = a["transient_periods"]
+    assert growth.size == at + 101
+    # From the capture on deviations shrink at the attractor's own rate; before it they grow.
+    assert (growth[-1] - growth[at + 16]) / 84 == pytest.approx(a["per_period"], abs=0.05)
+    assert growth[at] > growth[: at // 2].max() > 10
+    near = pendmap.lyapunov(Pendulum(p=0.6), 0.3, 0.0)
+    assert "rounding" not in near.attrs["summary"]
+
+
+def test_regular_motion_without_damping_has_the_growth_of_tau_and_no_error() -> None:
+    # A free pendulum: neighbours part in proportion to time.
+    a = pendmap.lyapunov(Pendulum(gamma=0.0, p=0.0), 2.0).attrs
+    assert a["exponent"] == pytest.approx(a["regular"], rel=0.1)
+    assert math.isnan(a["stderr"])
+    assert "cannot be told from 0" in a["summary"]
+    chaotic = pendmap.lyapunov(Pendulum(gamma=0.0, p=1.0), 2.0).attrs
+    assert chaotic["exponent"] > 50 * chaotic["regular"]
+    assert 0 < chaotic["stderr"] < 0.01 * chaotic["exponent"]
 
 
 @pytest.mark.parametrize("name", ["fig2a", "fig2b", "fig2c"])

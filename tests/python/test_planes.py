@@ -242,3 +242,12 @@ def test_friction_holds_rest_in_every_cell() -> None:
         assert np.array_equal(np.unique(cells), np.arange(36))
     assert "p = 1" not in found.attrs["title"]
     assert "otherwise \N{GREEK SMALL LETTER OMEGA} = 2" in found.attrs["title"]
+
+
+def test_titles_leave_out_an_effects_parameter_that_varies() -> None:
+    drag = Effect("quadratic_drag", {"q": 0.2})
+    ranges = {"p": (0.5, 1.0, 2), "quadratic_drag.q": (0.1, 0.3, 2)}
+    found = pendmap.parameter_map(Pendulum(effects=(drag,)), ranges)
+    assert "q = 0.2" not in found.attrs["title"]
+    assert found.attrs["title"].endswith("quadratic_drag")
+    assert "0.2" not in drawn.subtitle(found)

@@ -14,6 +14,7 @@ from scipy.special import mathieu_a, mathieu_b
 import pendmap
 from drawn import made
 from pendmap import Effect, Pendulum, Rig, asymptotic, figures
+from pendmap.pictures import tongues as drawn
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -191,6 +192,46 @@ def test_the_recording_has_both_planes(whole: xr.Dataset, tmp_path: Path) -> Non
     for root in ("tongues", "paper"):
         for name in ("plus", "minus", "undamped", "own"):
             assert f"/{root}/data/{name}" in back.static
+
+
+@pytest.fixture(scope="module")
+def finer() -> xr.Dataset:
+    """Few frequencies, and those that a picture needs."""
+    return pendmap.tongues(DAMPED, np.linspace(1.1, 2.1, 11), 3.0, refine=True)
+
+
+def test_frequencies_are_added_until_curves_turn_where_they_do(finer: xr.Dataset) -> None:
+    omega, asked = finer["omega"].values, finer["asked"].values.astype(bool)
+    assert np.array_equal(omega[asked], np.linspace(1.1, 2.1, 11))
+    assert (np.diff(omega) > 0).all()
+    index, p = finer["index"].values, finer["p"].values
+    rows = [p[(index == k) & (finer["multiplier"].values < 0)] for k in range(omega.size)]
+    begins = next(k for k, row in enumerate(rows) if row.size)
+    # The nose of the first tongue is between two frequencies that no eye tells apart.
+    assert omega[begins] - omega[begins - 1] < 1e-5
+    assert np.ptp(rows[begins]) < 0.02
+    assert rows[begins].mean() == pytest.approx(2.3, abs=0.1)
+    # Between any two frequencies the curves are straight, as far as can be seen.
+    for k in range(begins + 1, omega.size - 1):
+        middle = (omega[k] + omega[k + 1]) / 2
+        exact = [q for q, m in found_at(DAMPED, middle, 3.0) if m < 0]
+        if rows[k].size == rows[k + 1].size == len(exact) and k % 7 == 0:
+            assert np.allclose((rows[k] + rows[k + 1]) / 2, exact, atol=0.01)
+
+
+def test_an_undamped_tongue_goes_down_to_its_tip(finer: xr.Dataset) -> None:
+    chart = drawn.chart(finer, "omega-p", 0.05)
+    tips = [line[np.argmin(line[:, 1])] for line in chart.undamped]
+    assert any(np.allclose(tip, (2.0, 0.0), atol=1e-3) for tip in tips)
+
+
+def test_json_lists_the_frequencies_that_were_asked_for(pendmap_command: Run) -> None:
+    told = [
+        json.loads(pendmap_command("tongues", "--omega", "1.2:1.4:5", "--json", *more).stdout)
+        for more in ((), ("--plot", "noses.png"))
+    ]
+    assert told[0]["curves"] == told[1]["curves"]
+    assert told[0]["asymptotic"] == told[1]["asymptotic"]
 
 
 def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:

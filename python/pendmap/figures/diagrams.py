@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from pendmap import palette
 from pendmap.errors import InputError
@@ -61,7 +60,9 @@ def figure(
         handles.append(Line2D([], [], marker="s", linestyle="none", color=palette.UNNAMED))
     if any((dataset[sweep].values < 0).any() for sweep in ("up", "down")):
         texts.append("sweep on none")
-        handles.append(Patch(facecolor="white", edgecolor=style.QUIET, linewidth=0.6))
+        white = Line2D([], [], marker="s", linestyle="none", color="white", markersize=6)
+        white.set(markeredgecolor=style.QUIET, markeredgewidth=0.6)
+        handles.append(white)
     width, height = size or _SIZE
     columns = max(1, int((width - _LEFT) / _COLUMN))
     rows = math.ceil(len(texts) / columns)

@@ -73,10 +73,12 @@ def figure(
         axes.plot(omega, values, color=colour, linestyle=look, linewidth=1.6)
         axes.fill_between(omega, values, top, color=colour, alpha=0.10, linewidth=0)
     axes.plot(*own, marker="*", color=style.INK, markersize=9, clip_on=False, zorder=4)
+    damped = np.nanmax(dataset["p_melnikov"].values, initial=0.0) > 0
+    follows = "fractal boundaries of basins" if damped else "chaos; no basins without damping"
     axes.text(
         0.5,
         0.93,
-        "manifolds cross: fractal boundaries of basins",
+        f"manifolds cross: {follows}",
         ha="center",
         transform=axes.transAxes,
         color=style.QUIET,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -79,7 +80,8 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
         axes.plot(chart.beyond[:, 0], chart.beyond[:, 1], color="#c8c8c8", linewidth=3.0, zorder=1)
     if marks:
         for p, omega, name in marks:
-            at = in_plane(omega, p, plane)
+            (x,), (y,) = in_plane(np.array([omega]), np.array([p]), plane)
+            at = float(x), float(y)
             axes.plot(*at, marker="o", color=style.INK, markersize=5)
             axes.annotate(name, at, xytext=(6, 4), textcoords="offset points")
     else:

@@ -202,7 +202,8 @@ def curves(dataset: xr.Dataset) -> dict[str, tuple[Stroke, list[npt.NDArray[np.f
     def to(line: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         return line[:, ::-1] if turned else line
 
-    fold = to(np.stack([omega, dataset["curve_fold"].values], axis=1))
+    sought = dataset["curve_fold_sought"].values > 0
+    fold = to(np.stack([omega, dataset["curve_fold"].values], axis=1)[sought])
     return {
         "rest: multiplier +1": ("-", [to(line) for line in tongues.joined(omega, rows, 1)]),
         "rest: multiplier −1": (

@@ -126,7 +126,7 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
         undamped,
         stable,
         edge,
-        to(np.stack([omega, dataset["fold"].values], axis=-1)),
+        to(np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0]),
         asymptotic,
         (float(own[0]), float(own[1])),
     )
