@@ -32,7 +32,7 @@ __all__ = [
 
 TABLE: Final = "table1"
 FIGURES: Final = {
-    "1": "Critical curves, and the three strange attractors",
+    "1": "Critical curves; strange attractors a, b and c",
     "2": "Tumbling chaos",
     "3": "The parametric pendulum",
     "4": "A decay, its velocity and half cycles",
