@@ -10,7 +10,8 @@ import pytest
 
 import pendmap
 from drawn import made, named
-from pendmap import Pendulum, Rig, figures
+from pendmap import Pendulum, Rig, figures, palette
+from pendmap.pictures import diagrams as drawn
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -125,3 +126,13 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
         refused = pendmap_command(*words)
         assert refused.returncode == 2, words
         assert wanted in refused.stderr
+
+
+def test_chaos_is_named_however_rare(diagram: xr.Dataset) -> None:
+    every = drawn.families(diagram)
+    assert len(every) > drawn.MOST
+    chaotic = [k for k, one in enumerate(every) if "chaos" in one.name]
+    assert chaotic
+    assert max(chaotic) < drawn.MOST
+    assert all(every[k].colour != palette.UNNAMED for k in chaotic)
+    assert all(one.colour == palette.UNNAMED for one in every[drawn.MOST :])

@@ -63,7 +63,10 @@ class Family:
 
 
 def families(dataset: xr.Dataset) -> list[Family]:
-    """Return the families, those that occur at most values first."""
+    """Return the families, those that occur at most values first.
+
+    Chaos is among the :data:`MOST` that are named, however rare.
+    """
     kind, n, w, cell = (dataset[f"entry_{key}"].values for key in ("kind", "n", "w", "cell"))
     keys = np.stack([kind, n, w], axis=1)
     every, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
@@ -75,7 +78,9 @@ def families(dataset: xr.Dataset) -> list[Family]:
     )
     sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
     found: list[Family] = []
-    for k in np.argsort(-count, kind="stable"):
+    rare = np.array(["chaos" not in str(dataset["kind"].values[word]) for word in every[:, 0]])
+    first = np.lexsort((-count, rare))[:MOST]
+    for k in np.lexsort((-count, ~np.isin(np.arange(count.size), first))):
         word, period, turns = every[k]
         called = _name(str(dataset["kind"].values[word]), int(period), int(turns))
         mine = which == k
