@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MOST", "Family", "across", "families", "name", "subtitle", "title"]
 
-MOST = 14
+MOST = 16
 """Families that a legend names; the rest are drawn in the grey of what has no name."""
 
 
