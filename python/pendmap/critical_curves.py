@@ -41,6 +41,9 @@ OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
 MOST_P = 100.0
 """Largest amplitude that may be asked for."""
 
+_TIPS = 8
+"""Without damping tongues have their tips at omega = 2/k, k = 1, 2, ...: so many are told."""
+
 NEAR = 0.05
 """An asymptotic curve that is off by less than this part is near the exact one."""
 
@@ -267,8 +270,10 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines[0] += f" {added} more values of omega where curves turn, end or bend."
     index, p = dataset["index"].values, dataset["p"].values
     first = [k for k in range(count) if k == 0 or index[k] != index[k - 1]]
-    first = [k for k in first if asked[index[k]]]
     never = omega[(dataset["stable_at_first"].values == 0) & asked]
+    if a["gamma"] == 0 and a["effects"] == "[]":
+        tips = [2 / k for k in range(1, _TIPS + 1)]
+        never = np.array([tip for tip in tips if omega[0] <= tip <= omega[-1]])
     if never.size:
         said = ", ".join(f"{value:.6g}" for value in never[:3])
         more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
@@ -276,8 +281,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     elif first:
         least = min(first, key=lambda k: p[k])
         lines.append(
-            f"Rest loses its stability soonest at p = {p[least]:.9g}, "
-            f"omega = {omega[index[least]]:.6g} (multiplier {dataset['multiplier'].values[least]})."
+            f"Of these frequencies rest loses its stability soonest at omega = "
+            f"{omega[index[least]]:.6g}: p = {p[least]:.9g} (multiplier "
+            f"{dataset['multiplier'].values[least]})."
         )
     fold = dataset["fold"].values
     if (born := np.isfinite(fold) & asked).any():

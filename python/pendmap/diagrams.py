@@ -18,7 +18,7 @@ from pendmap.planes import entries, undecided
 from pendmap.regimes import kind_of
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
-from pendmap.varied import title, varied
+from pendmap.varied import title, varied, without_damping
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -131,7 +131,11 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(dataset), *of_motion(model.effects, "attractors are")]
+    lines = [
+        *_summary(dataset),
+        *without_damping(model, axis),
+        *of_motion(model.effects, "attractors are"),
+    ]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
 
@@ -199,7 +203,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(f"{kind}{sense}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
-    lines += _hysteresis(dataset, name)
+    lines += _hysteresis(dataset, name) if count else ["Nothing attracts, as far as was seen."]
     lines += undecided(a)
     lines.append(
         f"{counted(a['starts'], 'start')} a value; {counted(a['points'], 'point')}; error after 5 "

@@ -197,7 +197,9 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
     count = dataset.sizes["orbit"]
     own = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
     own += f" {'forward' if a['w'] > 0 else 'backward'}" if a["w"] else ""
-    lines = [f"{counted(count, 'orbit') if count else 'No orbit'} of {own}, {stable} stable."]
+    lines = [
+        f"{counted(count, 'orbit')} of {own}, {stable} stable." if count else f"No orbit of {own}."
+    ]
     for k in range(min(count, _LISTED)):
         row = dataset.isel(orbit=k)
         pairs = [complex(*pair) for pair in row["multipliers"].values if pair[0] == pair[0]]
@@ -215,6 +217,11 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
         lines.append(f"{count - _LISTED} more are in the result.")
     if pendulum.p == 0 and a["n"] > 1:
         lines.append("Without drive nothing closes after more than one period: n = 1 is allowed.")
+    if pendulum.p == 0 and pendulum.gamma == 0 and a["w"]:
+        lines.append(
+            "Without drive and damping rotations are there in curves, of any period: Newton's "
+            "method finds what stands alone."
+        )
     if friction:
         lines.append("States that friction holds for ever are a set, and not listed.")
     reach = units.spoken(f"{a['low_velocity']:.4g} to {a['high_velocity']:.4g}")

@@ -18,7 +18,7 @@ from pendmap.model.units import RATE, VELOCITY
 from pendmap.regimes import kind_of, regimes
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
-from pendmap.varied import title, varied
+from pendmap.varied import title, varied, without_damping
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -151,7 +151,11 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(dataset), *of_motion(model.effects, "attractors are")]
+    lines = [
+        *_summary(dataset),
+        *without_damping(model, columns, rows),
+        *of_motion(model.effects, "attractors are"),
+    ]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
 

@@ -161,7 +161,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "period": ("period", np.arange(wrapped.size)),
         },
     )
-    turns = round((float(raw["theta"][-1]) - theta) / math.tau)
+    turns = math.trunc((float(raw["theta"][-1]) - theta) / math.tau)
     asked = {}
     if raw["interrupted"]:
         asked = {"interrupted": 1, "until_asked": until}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pendmap.model import Effect, Pendulum, Rig
 
-__all__ = ["Varied", "title", "title_without", "varied"]
+__all__ = ["Varied", "title", "title_without", "varied", "without_damping"]
 
 _UNITS = {"c_over_m": "1/s", "Omega": "rad/s", "Tr": "rad/s2", "phi": "rad", "phase": "rad"}
 
@@ -120,6 +120,18 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
     symbols = {symbol for name in names for symbol in _SYMBOLS.get(name, ())}
     kept = [part for part in own.split(", ") if part.partition(" = ")[0] not in symbols]
     return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
+
+
+def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
+    """Return a line where some of these pendulums have no damping at all, and nothing attracts."""
+    pendulum, _ = without_dimensions(model)
+    known = _core.parameter_names(pendulum.parameters)
+    least = {known[axis.index]: float(axis.bare[0]) for axis in axes}
+    if any(effect.brakes for effect in model.effects):
+        return []
+    if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
+        return []
+    return ["Without damping (gamma = 0) nothing attracts: such starts stay undecided."]
 
 
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:

@@ -108,6 +108,12 @@ impl Attractor {
         self.exponent.is_nan()
     }
 
+    /// Whether it is a running state without drive: its period is its own.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.kind == Kind::Rotation && self.multipliers.len() == 1
+    }
+
     /// From a running state without drive; its one multiplier is that of the angle section.
     #[must_use]
     pub fn running(rotation: &Rotation) -> Self {

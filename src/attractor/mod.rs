@@ -15,7 +15,7 @@ pub mod effort;
 pub mod find;
 pub mod kind;
 mod place;
-mod rest;
+pub mod rest;
 mod returns;
 pub mod trap;
 mod watch;

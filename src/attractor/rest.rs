@@ -17,11 +17,15 @@ pub fn centres(pendulum: &Pendulum) -> Vec<f64> {
         return Vec::new();
     }
     let equation = pendulum.equation();
-    [0.0, PI]
-        .into_iter()
-        .map(|middle| centre(&equation, middle))
-        .filter(|theta| equation.holds_for_ever(*theta))
-        .collect()
+    balances(pendulum).into_iter().filter(|theta| equation.holds_for_ever(*theta)).collect()
+}
+
+/// The angles, hanging and upside down, where the load at its greatest is least: where rest is, or
+/// the oscillation that a drive makes of it.
+#[must_use]
+pub fn balances(pendulum: &Pendulum) -> [f64; 2] {
+    let equation = pendulum.equation();
+    [0.0, PI].map(|middle| centre(&equation, middle))
 }
 
 fn centre(equation: &Equation<f64>, middle: f64) -> f64 {

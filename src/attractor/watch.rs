@@ -12,6 +12,9 @@ use crate::integrate::{State, Strobe};
 /// called chaos.
 const LEAST_DECAY: f64 = 20.0;
 
+/// Periods for which chaos is watched where friction could end it.
+const LONG: u32 = 5000;
+
 impl Catalogue {
     /// Decides what the trajectories that nothing captured are.
     pub(super) fn watch(
@@ -49,15 +52,34 @@ impl Catalogue {
     }
 
     /// Whether a set of few trajectories is more than a transient that happens to last.
+    ///
+    /// Where friction holds rest for ever, chaos that stops once is over, and such transients are long:
+    /// they are watched for [`LONG`] periods, or until one ends.
     fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
         let proved = self.effort.proved;
-        if set.members >= proved || set.band.is_some() {
+        if proved == 0 || set.band.is_some() {
+            return true;
+        }
+        let holds = !self.rests.is_empty();
+        if set.members >= proved && !holds {
             return true;
         }
         let stride = set.points.len().div_ceil(proved).max(1);
-        let points: Vec<State> = set.points.iter().step_by(stride).copied().collect();
-        capture::outcomes(strobe, &self.traps, length, &points, cancel)
-            .is_some_and(|outcomes| outcomes.iter().all(|o| matches!(o.fate, Fate::Open)))
+        let mut points: Vec<State> = set.points.iter().step_by(stride).copied().collect();
+        let (mut over, mut part) = (0, length);
+        loop {
+            let found = capture::outcomes(strobe, &self.traps, part, &points, cancel);
+            let Some(outcomes) = found.filter(|all| all.iter().all(|o| o.fate == Fate::Open))
+            else {
+                return false;
+            };
+            over += part;
+            if !holds || over >= LONG {
+                return true;
+            }
+            points = outcomes.iter().map(|o| o.state).collect();
+            part = over.min(LONG - over);
+        }
     }
 }
 

@@ -4,10 +4,12 @@ use super::cell::Cell;
 use super::control::{Control, pool};
 use super::parameter_map::{ParameterMap, Plane, Range, Request as MapRequest, parameter_map};
 use crate::attractor::Attractor;
+use crate::attractor::trap::Band;
 use crate::error::Error;
 use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
 use crate::model::Pendulum;
+use crate::orbit::rotation::running_states;
 
 /// Points that are kept of an attractor that does not close.
 const KEPT: usize = 200;
@@ -136,6 +138,13 @@ fn leading(cell: &Cell) -> Option<State> {
 /// Runs `state` until it has arrived on an attractor of the cell, whose place comes back; else its
 /// points.
 fn settle(strobe: &Strobe, cell: &Cell, state: &mut State) -> (Option<usize>, Vec<State>) {
+    // Without drive a running state keeps no time with the section: its band holds it.
+    let runs = cell.found.iter().any(|f| f.attractor.is_running());
+    let states = if runs { running_states(&strobe.pendulum) } else { Vec::new() };
+    let running: Vec<(i64, Band)> = states
+        .iter()
+        .filter_map(|one| Some((one.sense, Band::around(strobe, &one.curve, 0)?)))
+        .collect();
     for _ in 0..ROUNDS {
         step(strobe, state, ROUND);
         let mut next = *state;
@@ -144,6 +153,10 @@ fn settle(strobe: &Strobe, cell: &Cell, state: &mut State) -> (Option<usize>, Ve
             if a.is_held() {
                 let same = (state[0].cos() < 0.0) == (a.points[0][0].cos() < 0.0);
                 return same && state[1] == 0.0 && strobe.equation.holds_for_ever(state[0]);
+            }
+            if a.is_running() {
+                let held = |(sense, band): &(i64, Band)| *sense == a.sense && band.contains(*state);
+                return running.iter().any(held);
             }
             let near = |s: State| a.points.iter().any(|p| distance(*p, s) < ARRIVED);
             a.n.is_some() && near(*state) && near(next)

@@ -1,9 +1,9 @@
 //! One pendulum among many: its attractors from a few starts, and from those of pendulums like it.
 
 use std::collections::HashMap;
-use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
+use crate::attractor::rest::balances;
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
 use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
@@ -76,9 +76,14 @@ impl Search {
         hints: &[Hint],
         cancel: &AtomicBool,
     ) -> Cell {
+        if !strobe.pendulum.is_dissipative() {
+            // Nothing attracts.
+            return Cell { open: 1.0, ..Cell::default() };
+        }
         let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
         // At rest nothing moves it away, however unstable: such points are no starts.
-        catalogue.take_over(strobe, &[([0.0, 0.0], 1), ([PI, 0.0], 1)], cancel);
+        let rests = balances(&strobe.pendulum).map(|theta| ([theta, 0.0], 1));
+        catalogue.take_over(strobe, &rests, cancel);
         let (cycles, mut further): (Vec<Hint>, Vec<Hint>) =
             hints.iter().partition(|hint| hint.n.is_some());
         let cycles: Vec<(State, usize)> =

@@ -128,7 +128,10 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
         assert wanted in refused.stderr
 
 
-def test_chaos_is_named_however_rare(diagram: xr.Dataset) -> None:
+def test_chaos_is_named_however_rare(diagram: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    count = [one.points[:, 0] for one in drawn.families(diagram) if "chaos" in one.name]
+    assert min(np.unique(values).size for values in count) < 12
+    monkeypatch.setattr(drawn, "MOST", 4)
     every = drawn.families(diagram)
     assert len(every) > drawn.MOST
     chaotic = [k for k, one in enumerate(every) if "chaos" in one.name]
@@ -136,3 +139,28 @@ def test_chaos_is_named_however_rare(diagram: xr.Dataset) -> None:
     assert max(chaotic) < drawn.MOST
     assert all(every[k].colour != palette.UNNAMED for k in chaotic)
     assert all(one.colour == palette.UNNAMED for one in every[drawn.MOST :])
+
+
+def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_known() -> None:
+    # Rest at asin(torque) is there up to torque = 1; the sweep down runs until damping stops it.
+    found = pendmap.bifurcation(Pendulum(p=0.0), {"torque": (0.0, 1.19, 25)})
+    torque = found["torque"].values
+    kinds = found["kind"].values[found["entry_kind"].values]
+    cells = found["entry_cell"].values
+    assert set(cells[kinds == "rest"]) == set(np.flatnonzero(torque < 0.999))
+    rest = found["entry_theta"].values[kinds == "rest"]
+    assert np.allclose(rest, np.arcsin(torque[cells[kinds == "rest"]]), atol=1e-9)
+    up, down = (found[sweep].values for sweep in ("up", "down"))
+    # The last step is too wide for it.
+    assert (kinds[up[torque < 0.95]] == "rest").all()
+    assert (kinds[down[torque > 0.2]] == "rotation 1:1").all()
+    assert (kinds[down[torque < 0.1]] == "rest").all()
+    assert found.sizes["loose"] == 0
+
+
+def test_without_damping_nothing_attracts_and_it_says_so() -> None:
+    found = pendmap.bifurcation(Pendulum(gamma=0.0), {"p": (0.2, 2.0, 5)})
+    assert found.sizes["branch"] == 0
+    assert "Without damping (gamma = 0) nothing attracts" in found.attrs["summary"]
+    assert "same kinds" not in found.attrs["summary"]
+    assert "sweep, undecided" in named(made(found))

@@ -149,7 +149,7 @@ def test_the_parts_of_a_trajectory() -> None:
     figure = made(dataset)
     dashed = "energy (dashed: upside down at rest)"
     assert titles(figure) == [
-        "time history",
+        "time history (dark: the last fifth)",
         dashed,
         "phase plane",
         "Poincaré section, once a period",

@@ -251,3 +251,25 @@ def test_titles_leave_out_an_effects_parameter_that_varies() -> None:
     assert "q = 0.2" not in found.attrs["title"]
     assert found.attrs["title"].endswith("quadratic_drag")
     assert "0.2" not in drawn.subtitle(found)
+
+
+def test_what_no_damping_holds_has_no_attractors() -> None:
+    found = pendmap.parameter_map(Pendulum(omega=1.0), {"p": (0.0, 1.0, 3), "gamma": (0.0, 0.2, 3)})
+    assert (found["undecided"].values[0] == 1.0).all()
+    assert found["entry_cell"].values.min() >= 3
+    assert "Without damping (gamma = 0) nothing attracts" in found.attrs["summary"]
+
+
+def test_chaos_that_friction_ends_is_no_attractor() -> None:
+    # It lives for some 6000 periods: longer than a search looks, and not for ever.
+    plane = {"gamma": (0.08, 0.14, 3), "p": (1.9, 2.0, 3)}
+    found = pendmap.parameter_map(Pendulum(theta_r=0.02), plane)
+    assert not any("chaos" in str(kind) for kind in found["kind"].values)
+    assert found["undecided"].values.mean() > 0.1
+
+
+def test_both_halves_of_the_exponents_scale_have_ticks() -> None:
+    found = pendmap.parameter_map(Pendulum(theta_r=0.05), {"p": (1.8, 2, 3), "omega": (2, 2.01, 2)})
+    for one in (found, pendmap.parameter_map(Pendulum(), RANGES)):
+        ticks = made(one, "exponent").axes[1].get_yticks()
+        assert min(ticks) < 0 < max(ticks)

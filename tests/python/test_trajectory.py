@@ -207,3 +207,10 @@ def test_what_the_watcher_raises_ends_it() -> None:
         pendmap.simulate(Pendulum(), 1.0, 0.0, 1e6, live=show)
     with pytest.raises(InputError, match="live"):
         pendmap.simulate(Pendulum(), 1.0, 0.0, 10.0, live=3)  # type: ignore[arg-type]
+
+
+def test_half_a_turn_is_no_turn() -> None:
+    # It swings from 2 to -1.85 rad and never goes over the top.
+    swing = pendmap.simulate(Pendulum(gamma=0.0, p=0.0), 2.0, 0.0, 3.6)
+    assert swing.attrs["turns"] == 0
+    assert "full turn" not in swing.attrs["summary"]

@@ -139,8 +139,8 @@ def _row(figure: Figure, box: Box, one: Compared, letters: Iterator[str]) -> Non
     run = one.run
     held = ", held out" if run.hold_out else ""
     heading = (
-        f"{run.name}{held}: rms {1e3 * one.rms:.3g} mrad, {ratio(one):.3g} times the noise of "
-        f"{1e3 * one.sigma:.3g} mrad"
+        f"{run.name}{held}: rms {_small(one.rms)}, {ratio(one):.3g} times the noise of "
+        f"{_small(one.sigma)}"
     )
     if isinstance(one, ForcedComparison):
         heading += f", in {counted(one.windows, 'window')}"
@@ -165,6 +165,11 @@ def _row(figure: Figure, box: Box, one: Compared, letters: Iterator[str]) -> Non
     titles = (next(letters) + "error of each period", next(letters) + "error of each peak")
     periods, peaks = (cell.panel(figure) for cell in cells[2:])
     draw_panels(periods, peaks, {MODEL: one.errors}, one.peaks, titles)
+
+
+def _small(angle: float) -> str:
+    """Return an angle in rad or mrad."""
+    return f"{angle:.3g} rad" if angle >= 1 else f"{1e3 * angle:.3g} mrad"
 
 
 def _forced(

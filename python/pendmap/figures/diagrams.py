@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
-_SIZE = (7.4, 6.6)
-_LEFT, _RIGHT, _TOP, _BELOW = 0.85, 0.2, 0.78, 0.5
+_SIZE = (7.4, 6.8)
+_LEFT, _RIGHT, _TOP, _BELOW = 0.85, 0.2, 0.98, 0.5
 _STRIP, _GAP, _EXPONENT = 0.42, 0.16, 1.35
 _ROW, _COLUMN = 0.19, 2.1
-_LEAST = (4.5, 4.6)
+_LEAST = (4.5, 4.8)
 _LAYERS = ("theta", "velocity")
 
 
@@ -58,6 +58,9 @@ def figure(
     if len(every) > len(listed):
         texts.append(f"{len(every) - len(listed)} more")
         handles.append(Line2D([], [], marker="s", linestyle="none", color=palette.UNNAMED))
+    if dataset.sizes["loose"]:
+        texts.append("sweep, undecided")
+        handles.append(Line2D([], [], marker="o", linestyle="none", color=palette.UNNAMED, ms=2))
     if any((dataset[sweep].values < 0).any() for sweep in ("up", "down")):
         texts.append("sweep on none")
         white = Line2D([], [], marker="s", linestyle="none", color="white", markersize=6)

@@ -46,8 +46,10 @@ def figure(
     own = (float(a["own_omega"]), abs(float(a["own_p"])))
     top = max(min(float(known.max()) if known.size else 1.0, _HIGH * least), 1.15 * own[1], 1e-3)
     x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
-    alike = known.size and np.nanmax(np.abs(p[:, 0] - p[:, 1])) < 1e-9 * max(least, 1e-9)
-    branches = ["forward"] if alike else ["forward", "backward"]
+    apart = np.abs(p[:, 0] - p[:, 1])
+    alike = bool(np.isfinite(apart).any()) and np.nanmax(apart) < 1e-9 * max(least, 1e-9)
+    there = [name for k, name in enumerate(_LOOKS) if np.isfinite(p[:, k]).any()]
+    branches = there[:1] if alike else there
     handles, texts = [], []
     for name in branches:
         colour, look = _LOOKS[name]
@@ -82,6 +84,8 @@ def figure(
         ha="center",
         transform=axes.transAxes,
         color=style.QUIET,
+        bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 2},
+        zorder=3,
     )
     axes.set_xlim(*x)
     axes.set_ylim(0.0, top)

@@ -32,6 +32,9 @@ _CURVE: dict[str, Any] = {
     "linewidth": 1.1,
     "path_effects": [withStroke(linewidth=2.6, foreground="white")],
 }
+_LEAST = 0.05
+"""Least part of the other one that a half of the exponents' scale reaches."""
+
 _COUNTS = ("attractors", "period", "winding")
 _MOST_COUNT = 8
 _MAPS = {"exponent": "RdBu_r", "attractors": "viridis", "period": "viridis", "winding": "viridis"}
@@ -137,17 +140,25 @@ def _scalar(  # noqa: PLR0913 (where to draw, what, and how)
         style.colour_bar(bar, image, drawn.said(dataset, one), extend, ticks)
 
 
+def _few(low: float, high: float) -> list[float]:
+    """Return at most four round places in a half of a colour bar."""
+    ticks = [at for at, _ in plane.plain_ticks(low, high)]
+    return ticks[::2] if low == 0.0 or len(ticks) % 2 else ticks[1::2]
+
+
 def _norm(one: str, values: npt.NDArray[np.float64]) -> tuple[Normalize, str, list[float] | None]:
     """Return the colour scale: exponents about 0, counts in steps, shares from 0 to 1."""
     if one == "exponent":
         low, high = (float(q) for q in np.quantile(values, [0.01, 0.99])) if values.size else (0, 0)
-        low, high = min(low, -1e-3), max(high, 1e-3)
-        ticks = [at for at, _ in plane.plain_ticks(low, high)]
-        return TwoSlopeNorm(0.0, low, high), "both", ticks
+        low, high = min(low, -1e-3, -_LEAST * high), max(high, 1e-3, -_LEAST * low)
+        # The halves have scales of their own: without ticks on both, dark blue would look as far
+        # from 0 as dark red.
+        ticks = [at for side in ((low, 0.0), (0.0, high)) for at in _few(*side)]
+        return TwoSlopeNorm(0.0, low, high), "both", sorted(set(ticks))
     if one in _COUNTS:
         top = int(min(values.max(initial=1), _MOST_COUNT))
         bounds = np.arange(-0.5 if one != "period" else 0.5, top + 1)
         extend: Literal["max", "neither"] = "max" if values.max(initial=0) > top else "neither"
         ticks = [float(k) for k in range(int(bounds[0] + 0.5), top + 1)]
-        return BoundaryNorm(bounds, 256, extend=extend), "neither", ticks
+        return BoundaryNorm(bounds, 256, extend=extend), extend, ticks
     return Normalize(0.0, 1.0), "neither", None

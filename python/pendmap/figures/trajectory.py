@@ -111,7 +111,7 @@ def _history(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
         axes.set_ylim(low - FLAT, high + FLAT)
     style.scale(axes, "y", axes.get_ylim(), names.ANGLE, angle=True)
     _at_rest(axes, dataset)
-    axes.set_title(mark + "time history")
+    axes.set_title(mark + "time history (dark: the last fifth)")
 
 
 def _energy(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
@@ -188,7 +188,7 @@ def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     last = plane.broken_at_wrap(theta[late:], velocity[late:])
     axes.plot(early[:, 0], early[:, 1], color=_EARLY_COLOUR, lw=0.5)
     axes.plot(last[:, 0], last[:, 1], color=_LATE_COLOUR, lw=0.7)
-    if dataset.attrs.get("stuck"):
+    if dataset.attrs.get("stuck") or (np.ptp(theta) == 0.0 and not np.any(velocity)):
         rest = plane.wrapped(theta[-1:])
         axes.plot(rest, velocity[-1:], "o", ms=3.5, mew=0, color=_LATE_COLOUR)
     style.phase_plane(axes, (-math.pi, math.pi), plane.padded(velocity), Units.of(dataset.attrs))

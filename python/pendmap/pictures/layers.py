@@ -195,7 +195,7 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
 
 def symbol(name: str, unit: str = "1") -> str:
     """Return the symbol of a parameter with its unit, a blank between them."""
-    own = _SYMBOLS.get(name) or _SI_SYMBOLS.get(name, (name.replace("_", " "), ""))[0]
+    own = _SYMBOLS.get(name) or _SI_SYMBOLS.get(name, (name, ""))[0]
     return own if unit in ("", "1") else f"{own} ({unit})"
 
 

@@ -244,7 +244,7 @@ def said(dataset: xr.Dataset, name: str) -> str:
     if name == "exponent":
         unit = f" ({dataset['exponent'].attrs['units'].replace('tau', chr(0x3C4))})"
     if name == "period":
-        unit = " (drive's)"
+        unit = " (drive's; grey: none)"
     return LAYERS[name] + unit
 
 
