@@ -59,7 +59,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     followed, and nothing depends on the order of the work. Trajectories run until a stable orbit,
     found by Newton's method, has captured them. Those that nothing captures are watched for as long
     again; where none of a set of them ends and their exponent is positive by four standard errors,
-    the set is chaos of its kind. What is left is undecided.
+    the set is chaos of its kind. Where friction holds rest, and could end chaos, from sixteen of
+    its points none may end within 5000 periods. What is left is undecided.
 
     Parameters
     ----------

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pendmap.model.units import TIME, Units
 from pendmap.words import counted, written
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["of_motion", "summarise", "unlimited_rotation"]
 
 _NEARLY_CHANCE = 0.15
+_STILL = 1e-12
 
 
 def of_motion(effects: Sequence[Effect], what: str) -> list[str]:
@@ -104,10 +107,21 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
 
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
     """Say after how many periods a start is undecided, and what can be done about it."""
+    undecided = dataset["label"] == 0
+    if bool((undecided <= _at_rest(dataset)).all()):
+        return ": they stand exactly on an unstable rest, where nothing moves them"
     text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
     if chosen and any(str(kind).endswith("chaos") for kind in dataset["kind"].values):
         text += " (beside chaos ten times the longest settling seen, at least 200)"
     return f"{text}; --max-periods raises this bound"
+
+
+def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
+    """Return which starts hang, or stand upside down, without moving: rest whatever the drive."""
+    of = "start_" if "start_theta" in dataset else ""
+    hangs = abs(np.sin(dataset[f"{of}theta"])) < _STILL
+    still: xr.DataArray = hangs & (dataset[f"{of}velocity"] == 0)
+    return still & (dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]")
 
 
 def _conservative(dataset: xr.Dataset) -> str:

@@ -299,3 +299,11 @@ def test_slow_settling_is_not_called_chaos(p: float) -> None:
     )
     assert not [kind for kind in result.kind.values.tolist() if "chaos" in kind]
     assert result.attrs["undecided"] > 0.5
+
+
+def test_a_start_on_an_unstable_rest_is_told_from_one_that_takes_long() -> None:
+    alone = pendmap.basins(Pendulum(p=1.0), Grid.square(1))
+    assert "stand exactly on an unstable rest" in alone.attrs["summary"]
+    assert "--max-periods" not in alone.attrs["summary"]
+    early = pendmap.basins(Pendulum(p=1.0), Grid.square(20), max_periods=5)
+    assert "--max-periods raises this bound" in early.attrs["summary"]

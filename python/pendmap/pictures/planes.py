@@ -242,7 +242,8 @@ def said(dataset: xr.Dataset, name: str) -> str:
         return f"share of the starts on {name.removeprefix('share ')}"
     unit = ""
     if name == "exponent":
-        unit = f" ({dataset['exponent'].attrs['units'].replace('tau', chr(0x3C4))})"
+        none = "" if np.isfinite(dataset["exponent"].values).all() else "; grey: none"
+        unit = f" ({dataset['exponent'].attrs['units'].replace('tau', chr(0x3C4))}{none})"
     if name == "period":
         unit = " (drive's; grey: none)"
     return LAYERS[name] + unit
