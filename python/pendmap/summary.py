@@ -119,9 +119,10 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
 def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
     """Return which starts hang, or stand upside down, without moving: rest whatever the drive."""
     of = "start_" if "start_theta" in dataset else ""
-    hangs = abs(np.sin(dataset[f"{of}theta"])) < _STILL
-    still: xr.DataArray = hangs & (dataset[f"{of}velocity"] == 0)
-    return still & (dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]")
+    hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
+    alone = dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]"
+    still: xr.DataArray = hangs & (dataset[f"{of}velocity"] == 0) & alone
+    return still
 
 
 def _conservative(dataset: xr.Dataset) -> str:
