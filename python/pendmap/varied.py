@@ -179,6 +179,8 @@ def _values(name: str, given: object) -> NDArray[np.float64]:
     count = checks.whole(f"{name}: how many", given[2], 1, checks.MOST_CELLS)
     if not (low < high and math.isfinite(high - low)) and not (count == 1 and low == high):
         raise InputError(f"{name} is {low:g} to {high:g}: {allowed}, the lower one first")
+    if count == 1 and low < high:
+        raise InputError(f"{name} is {low:g} to {high:g}: one value has one bound")
     return np.linspace(low, high, count)
 
 

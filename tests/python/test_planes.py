@@ -273,3 +273,8 @@ def test_both_halves_of_the_exponents_scale_have_ticks() -> None:
     for one in (found, pendmap.parameter_map(Pendulum(), RANGES)):
         ticks = made(one, "exponent").axes[1].get_yticks()
         assert min(ticks) < 0 < max(ticks)
+
+
+def test_one_value_has_one_bound() -> None:
+    with pytest.raises(pendmap.InputError, match="p is 0 to 1: one value has one bound"):
+        pendmap.parameter_map(Pendulum(), {"p": (0.0, 1.0, 1), "omega": (1.0, 2.0, 2)})
