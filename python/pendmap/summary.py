@@ -108,7 +108,7 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
     """Say after how many periods a start is undecided, and what can be done about it."""
     undecided = dataset["label"] == 0
-    if bool((undecided <= _at_rest(dataset)).all()):
+    if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
         return ": they stand exactly on an unstable rest, where nothing moves them"
     text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
     if chosen and any(str(kind).endswith("chaos") for kind in dataset["kind"].values):
