@@ -197,9 +197,7 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
     count = dataset.sizes["orbit"]
     own = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
     own += f" {'forward' if a['w'] > 0 else 'backward'}" if a["w"] else ""
-    lines = [
-        f"{counted(count, 'orbit')} of {own}, {stable} stable." if count else f"No orbit of {own}."
-    ]
+    lines = [f"{counted(count, 'orbit') if count else 'No orbit'} of {own}, {stable} stable."]
     for k in range(min(count, _LISTED)):
         row = dataset.isel(orbit=k)
         pairs = [complex(*pair) for pair in row["multipliers"].values if pair[0] == pair[0]]

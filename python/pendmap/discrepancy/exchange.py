@@ -26,8 +26,8 @@ NEARLY: Final = (5.0, 0.3)
 """A candidate whose score promises so much less than another has gained, or less by this part of
 it, is still fitted in its place: to first order it gains less than it may."""
 
-SIMPLER: Final = 0.1
-"""A rival with fewer parameters that does less by so small a part is fitted from the other's motion
+SIMPLER: Final = 0.5
+"""A rival with fewer parameters that does less by up to this part is fitted from the other's motion
 too: where a window was lost on its own way it does less than it could."""
 
 RIVALS: Final = 2
