@@ -270,7 +270,7 @@ def test_turns_since_the_start_are_said_in_words(velocity: float, said: str) -> 
     line = run.attrs["summary"].splitlines()[0]
     assert said in line
     full = (0.5 - float(run.theta[-1])) / math.tau
-    assert str(round(full)) in line or velocity == 0
+    assert f"({math.trunc(full)} full" in line or velocity == 0
 
 
 @pytest.mark.parametrize(("theta", "said"), [(1.0, False), (1e5, False), (1e9, True), (1e16, True)])
