@@ -119,6 +119,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     if plane not in PLANES:
         raise InputError(f"plane is {checks.shown(plane)}: allowed are {', '.join(PLANES)}")
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
+    refine = checks.flag("refine", refine)
     began = time.perf_counter()
 
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None

@@ -178,10 +178,12 @@ def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path
             "greatest velocity",
         ]
         assert min(each.chance for each in one.statistics) > 0.01
-        assert one.statistics[1].measured > 20
-        assert one.statistics[3].measured > 10
-    # Which of two chaotic runs settles before its end, the rounding of the processor decides.
-    assert any(one.statistics[3].measured < 200 for one in runs)
+        escapes, settled = (one.statistics[k] for k in (1, 3))
+        # How often one chaotic run escapes, the rounding of the processor decides; not this:
+        assert escapes.median > 20
+        assert 10 < settled.median < 250
+        assert np.isinf(settled.ensemble).mean() < 0.05
+        assert 10 < settled.measured < 300
     figures.draw_motions(runs, tmp_path / "9.svg", steady=False, title="Tumbling", subtitle="rig")
     drawn = (tmp_path / "9.svg").read_text()
     assert drawn.count("record (95 % of the ensemble)") == 2

@@ -199,6 +199,22 @@ def test_the_recording(plane: xr.Dataset, tmp_path: Path) -> None:
     assert wanted <= back.static
 
 
+@pytest.mark.usefixtures("strict_recordings")
+def test_no_curve_of_the_recording_leaps_from_one_tongue_to_the_next(tmp_path: Path) -> None:
+    # The fold under the first tongue ends at omega = 1.26, that under the second begins at 0.97.
+    plane = {"p": (0.1, 1.0, 3), "omega": (0.8, 2.2, 3)}
+    found = pendmap.parameter_map(Pendulum(), plane, curves=True)
+    back = recorded(found, tmp_path)
+    columns = [back.columns[f"/kinds/data/curves/{k}"] for k in range(3)]
+    strips = [part for one in columns for part in one["LineStrips2D:strips"][0]]
+    assert len(strips) >= 4
+    for strip in strips:
+        step = np.abs(np.diff(np.asarray(strip), axis=0))
+        assert step.max() < 0.2
+    legend = str(back.one("/legend", "TextDocument:text"))
+    assert "Black lines: rest: multiplier +1" in legend
+
+
 def test_it_comes_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:
     for name in ("map.nc", "map.zarr"):
         back = pendmap.load(pendmap.save(plane, tmp_path / name))

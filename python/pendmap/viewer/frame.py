@@ -15,8 +15,9 @@ from pendmap.model.units import NONDIMENSIONAL, VELOCITY, Units
 from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
+    import numpy.typing as npt
     import xarray as xr
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Frame",
     "describe",
     "identified",
+    "pieces",
     "recording",
     "screen",
     "strict",
@@ -263,6 +265,25 @@ def write(
         show_labels=True,
     )
     stream.log(path, points, static=True)
+
+
+def pieces(
+    lines: Iterable[npt.NDArray[np.float64]],
+    low: npt.ArrayLike = -np.inf,
+    high: npt.ArrayLike = np.inf,
+) -> list[npt.NDArray[np.float64]]:
+    """Return the parts of lines, shape (n, 2) each, that are numbers from ``low`` to ``high``.
+
+    Two places or more a part: what is left out is a gap, where nothing is drawn across.
+    """
+    low, high = np.asarray(low), np.asarray(high)
+    found = []
+    for line in lines:
+        there = np.all(np.isfinite(line) & (low <= line) & (line <= high), axis=1)
+        cuts = np.flatnonzero(np.diff(there.astype(np.int8))) + 1
+        parts = zip(np.split(line, cuts), np.split(there, cuts), strict=True)
+        found += [part for part, seen in parts if len(part) > 1 and seen.all()]
+    return found
 
 
 def _plain(value: object) -> float | str | None:

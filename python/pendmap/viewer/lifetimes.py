@@ -53,8 +53,9 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     fit = drawn.fit(dataset)
     if fit is not None:
         curves = [_columns(fit.periods, np.log10(y)) for y in (fit.share, fit.low, fit.high)]
-        survival.strips(stream, "survival/data/tail", curves[:1], _FIT, 1.5)
-        survival.strips(stream, "survival/data/band", curves[1:], _FIT, 0.6)
+        middle, band = survival.within(curves[:1]), survival.within(curves[1:])
+        survival.strips(stream, "survival/data/tail", middle, _FIT, 1.5)
+        survival.strips(stream, "survival/data/band", band, _FIT, 0.6)
         lines.append(f"- {fit.text}: vermillion, two standard errors thin")
     frame.text(stream, "legend", "\n".join(lines))
     if "tail" in panels:

@@ -96,16 +96,25 @@ class Panel:
         stream.log(f"{root}/axes/frame", shown, static=True)
         frame.write(stream, f"{root}/axes/ticks", places, labels)
 
-    def strips(
+    def within(self, lines: Sequence[Floats]) -> list[Floats]:
+        """Return the parts of lines that lie in the panel: a view clips nothing."""
+        return frame.pieces(lines, *zip(self.x, self.y, strict=True))
+
+    def strips(  # noqa: PLR0913 (where, what, and its look)
         self,
         stream: rr.RecordingStream,
         path: str,
         lines: Sequence[Floats],
         colour: tuple[int, int, int],
         width: float,
+        *,
+        order: float | None = None,
     ) -> None:
-        """Log lines, shape (n, 2) each, in physical units; one without two places is not drawn."""
-        whole = [line[np.isfinite(line).all(axis=1)].astype(np.float32) for line in lines]
-        drawn = [line for line in whole if len(line) > 1]
+        """Log lines, shape (n, 2) each, in physical units, broken where they are not numbers.
+
+        Lines of a higher ``order`` are drawn over others; by default it is 20.
+        """
+        drawn = frame.pieces(lines)
         radii = rr.Radius.ui_points(width)
-        stream.log(path, rr.LineStrips2D(drawn, colors=[colour], radii=radii), static=True)
+        strips = rr.LineStrips2D(drawn, colors=[colour], radii=radii, draw_order=order)
+        stream.log(path, strips, static=True)

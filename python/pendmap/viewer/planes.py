@@ -48,15 +48,17 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     image = drawn.striped(dataset, SIZE, STRIPE)
     stream.log("kinds/data/kinds", around.of_pixels(image.shape), static=True)
     stream.log("kinds/data/kinds", rr.SegmentationImage(image, opacity=1.0), static=True)
-    for k, (_, parts) in enumerate(drawn.curves(dataset).values()):
-        strips = [part[np.isfinite(part).all(axis=1)].astype(np.float32) for part in parts]
-        strips = [strip for strip in strips if len(strip) > 1]
+    curves = drawn.curves(dataset)
+    for k, (_, parts) in enumerate(curves.values()):
+        strips = frame.pieces(parts)
         if strips:
             thin = rr.Radius.ui_points(1.0)
             curve = rr.LineStrips2D(strips, colors=[(20, 20, 20)], radii=thin, draw_order=50.0)
             stream.log(f"kinds/data/curves/{k}", curve, static=True)
     lines = ["| kind | of the cells | colour |", "|---|---|---|"]
     lines += [f"| {kind.name} | {100 * kind.presence:.2g} % | {kind.shade} |" for kind in listed]
+    if curves:
+        lines += ["", f"Black lines: {'; '.join(curves)}."]
     frame.text(stream, "legend", "\n".join(lines))
     for one in _FIELDS:
         values = np.asarray(dataset[one].values, dtype=np.float64)

@@ -41,11 +41,12 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     for plane, (root, _) in _ROOTS.items():
         panel, chart = _panel(dataset, plane)
         panel.log(stream, root)
-        panel.strips(stream, f"{root}/data/undamped", _within(panel, chart.undamped), _BARE, 0.6)
+        bare = panel.within(chart.undamped)
+        panel.strips(stream, f"{root}/data/undamped", bare, _BARE, 0.6, order=10.0)
         for multiplier, (name, colour) in _CURVES.items():
-            lines = _within(panel, chart.lines[multiplier])
+            lines = panel.within(chart.lines[multiplier])
             panel.strips(stream, f"{root}/data/{name}", lines, colour, 1.5)
-        panel.strips(stream, f"{root}/data/fold", _within(panel, [chart.fold]), _FOLD, 1.5)
+        panel.strips(stream, f"{root}/data/fold", panel.within([chart.fold]), _FOLD, 1.5)
         own = np.array([chart.own], dtype=np.float32)
         points = rr.Points2D(own, colors=[_OWN], radii=rr.Radius.ui_points(5.0))
         stream.log(f"{root}/data/own", points, static=True)
@@ -62,14 +63,3 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 def _panel(dataset: xr.Dataset, plane: str) -> tuple[Panel, drawn.Chart]:
     chart = drawn.chart(dataset, plane, NEAR)
     return Panel(chart.x, chart.y, *chart.names), chart
-
-
-def _within(panel: Panel, lines: list[drawn.Floats]) -> list[drawn.Floats]:
-    """Cut lines where they leave the panel: a view clips nothing."""
-    pieces = []
-    for line in lines:
-        inside = (line[:, 1] <= panel.y[1]) & (line[:, 0] <= panel.x[1])
-        cuts = np.flatnonzero(np.diff(inside.astype(int))) + 1
-        parts = zip(np.split(line, cuts), np.split(inside, cuts), strict=True)
-        pieces += [part for part, keep in parts if keep.all()]
-    return pieces
