@@ -168,7 +168,8 @@ def test_a_figure_too_small_is_refused(tmp_path: Path) -> None:
     [
         ("multiarm_single_free_large.csv", 1000, 0.0, 6e-5),
         ("cartpend_free_long.csv", 50, 2 * np.pi / 4000, 1.7e-3),
-        ("cartpend_forced_cart_pulse.csv", 50, 2 * np.pi / 4000, 0.5e-3),
+        # A pendulum fitted to it from 3 to 25 s leaves 1.04e-3; the noise of that part is 1.07e-3.
+        ("cartpend_forced_cart_pulse.csv", 50, 2 * np.pi / 4000, 0.85e-3),
     ],
 )
 def test_measured_records(name: str, rate: float, count: float, noise: float) -> None:
