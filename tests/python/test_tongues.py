@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from matplotlib.path import Path as Outline
 from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
+    from numpy.typing import NDArray
 
     from conftest import Run
 
@@ -223,6 +225,27 @@ def test_an_undamped_tongue_goes_down_to_its_tip(finer: xr.Dataset) -> None:
     chart = drawn.chart(finer, "omega-p", 0.05)
     tips = [line[np.argmin(line[:, 1])] for line in chart.undamped]
     assert any(np.allclose(tip, (2.0, 0.0), atol=1e-3) for tip in tips)
+
+
+def test_steep_strips_of_stability_are_shaded_between_frequencies_too() -> None:
+    # Between the first tongue and the second a strip climbs by its own width from one to the next.
+    omega = np.linspace(0.8, 3.0, 60)
+    areas = [Outline(area) for area in drawn.chart(tongues_of(omega), "omega-p", 0.05).stable]
+    middles = (omega[:-1] + omega[1:]) / 2
+    between = tongues_of(middles)
+    index, p = between["index"].values, between["p"].values
+    looked = 0
+    for k in np.flatnonzero(between["stable_above"].values):
+        high = p[k + 1] if k + 1 < p.size and index[k + 1] == index[k] else 6.0
+        if high - p[k] > 0.2:
+            looked += 1
+            at = (float(middles[index[k]]), float(p[k] + high) / 2)
+            assert any(area.contains_point(at) for area in areas), at
+    assert looked >= 5
+
+
+def tongues_of(omega: NDArray[np.float64]) -> xr.Dataset:
+    return pendmap.tongues(DAMPED, omega, 6.0)
 
 
 def test_json_lists_the_frequencies_that_were_asked_for(pendmap_command: Run) -> None:

@@ -233,11 +233,17 @@ def _stable(
     first: npt.NDArray[np.int8],
     p_max: float,
 ) -> list[Floats]:
-    """Return quadrangles between neighbouring frequencies in which rest is stable."""
+    """Return quadrangles between neighbouring frequencies in which rest is stable.
+
+    Between the same curves strips follow one another in their order, however steep they are; where
+    a curve begins or ends, those that overlap.
+    """
     index, p = dataset["index"].values, dataset["p"].values
     intervals: list[list[tuple[float, float]]] = []
+    curves: list[tuple[int, ...]] = []
     for k in range(omega.size):
         mine = index == k
+        curves.append(tuple(dataset["multiplier"].values[mine]))
         edges = [0.0, *p[mine], p_max]
         is_stable = [int(first[k]), *above[mine]]
         pairs = zip(edges[:-1], edges[1:], is_stable, strict=True)
@@ -250,11 +256,12 @@ def _stable(
         intervals.append(merged)
     areas = []
     for k in range(omega.size - 1):
-        for a in intervals[k]:
-            for b in intervals[k + 1]:
-                if min(a[1], b[1]) > max(a[0], b[0]):
-                    here, there = omega[k], omega[k + 1]
-                    areas.append(
-                        np.array([(here, a[0]), (here, a[1]), (there, b[1]), (there, b[0])])
-                    )
+        here, there = omega[k], omega[k + 1]
+        before, after = intervals[k], intervals[k + 1]
+        # Those that go beyond p_max on one side are the last.
+        shared = min(len(curves[k]), len(curves[k + 1]))
+        same = curves[k][:shared] == curves[k + 1][:shared] and len(before) == len(after)
+        for a, b in zip(before, after, strict=True) if same else itertools.product(before, after):
+            if same or min(a[1], b[1]) > max(a[0], b[0]):
+                areas.append(np.array([(here, a[0]), (here, a[1]), (there, b[1]), (there, b[0])]))
     return areas
