@@ -86,7 +86,7 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
         let left = directions - first;
         // The narrowest numbers that hold what is left.
         match register {
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Register::Avx512(isa) => match left {
                 ..=8 => follow.pass::<Bundle<_, 1>, 1>(isa, first, &mut motion),
                 _ => follow.pass::<Bundle<_, 1>, 2>(isa, first, &mut motion),

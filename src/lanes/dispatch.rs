@@ -42,13 +42,13 @@ impl Path {
     pub fn available(self) -> bool {
         match self {
             Self::Portable => true,
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Self::Avx512 => pulp::x86::V4::try_new().is_some(),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => pulp::x86::V3::try_new().is_some(),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "sse"))]
             Self::Sse => pulp::x86::V2::try_new().is_some(),
-            #[cfg(not(target_arch = "x86_64"))]
+            #[allow(unreachable_patterns, reason = "one for what this build leaves out")]
             _ => false,
         }
     }
@@ -72,7 +72,7 @@ impl Path {
 #[derive(Clone, Copy, Debug)]
 pub enum Register {
     /// Eight numbers.
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
     Avx512(pulp::x86::V4),
     /// Four.
     #[cfg(target_arch = "x86_64")]
@@ -87,6 +87,7 @@ impl Path {
     pub fn register(self) -> Register {
         #[cfg(target_arch = "x86_64")]
         match self {
+            #[cfg(feature = "avx512")]
             Self::Avx512 => {
                 if let Some(isa) = pulp::x86::V4::try_new() {
                     return Register::Avx512(isa);
@@ -97,7 +98,7 @@ impl Path {
                     return Register::Avx2(isa);
                 }
             }
-            Self::Sse | Self::Portable => {}
+            _ => {}
         }
         Register::Single
     }
@@ -108,7 +109,7 @@ impl Register {
     #[must_use]
     pub const fn width(self) -> usize {
         match self {
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Self::Avx512(_) => 8,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => 4,
@@ -155,24 +156,25 @@ impl<J: Job, S: Isa> WithSimd for Entry<J, S> {
 pub fn run<J: Job>(path: Path, job: J) -> J::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        use pulp::x86::{V2, V3, V4};
         match path {
+            #[cfg(feature = "avx512")]
             Path::Avx512 => {
-                if let Some(isa) = V4::try_new() {
+                if let Some(isa) = pulp::x86::V4::try_new() {
                     return Simd::vectorize(isa, Entry(job, isa));
                 }
             }
             Path::Avx2 => {
-                if let Some(isa) = V3::try_new() {
+                if let Some(isa) = pulp::x86::V3::try_new() {
                     return Simd::vectorize(isa, Entry(job, isa));
                 }
             }
+            #[cfg(feature = "sse")]
             Path::Sse => {
-                if let Some(isa) = V2::try_new() {
+                if let Some(isa) = pulp::x86::V2::try_new() {
                     return Simd::vectorize(isa, Entry(job, isa));
                 }
             }
-            Path::Portable => {}
+            _ => {}
         }
     }
     let _ = path;
