@@ -3,7 +3,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::lanes::sine::Degree;
-use crate::lanes::{Lane, MAX_WIDTH, Real, Work};
+use crate::lanes::{Lane, MAX_WIDTH, Real, Work, each};
 
 /// The least root that its derivative is divided by: at 0 that is steep, but a number.
 const LEAST_ROOT: f64 = 1e-150;
@@ -17,16 +17,14 @@ pub struct Tangent<L, const N: usize> {
     pub slope: [L; N],
 }
 
-// Loops and no closures: what the compiler leaves as a function of its own would lose the
+// No closures: what the compiler leaves as a function of its own would lose the
 // instruction set that the caller was compiled for.
 
 impl<L: Lane, const N: usize> Add for Tangent<L, N> {
     type Output = Self;
     #[inline(always)]
     fn add(mut self, other: Self) -> Self {
-        for i in 0..N {
-            self.slope[i] = self.slope[i] + other.slope[i];
-        }
+        each!(i in N => self.slope[i] = self.slope[i] + other.slope[i]);
         self.value = self.value + other.value;
         self
     }
@@ -36,9 +34,7 @@ impl<L: Lane, const N: usize> Sub for Tangent<L, N> {
     type Output = Self;
     #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
-        for i in 0..N {
-            self.slope[i] = self.slope[i] - other.slope[i];
-        }
+        each!(i in N => self.slope[i] = self.slope[i] - other.slope[i]);
         self.value = self.value - other.value;
         self
     }
@@ -48,9 +44,7 @@ impl<L: Lane, const N: usize> Mul for Tangent<L, N> {
     type Output = Self;
     #[inline(always)]
     fn mul(mut self, other: Self) -> Self {
-        for i in 0..N {
-            self.slope[i] = self.slope[i].mul_add(other.value, other.slope[i] * self.value);
-        }
+        each!(i in N => self.slope[i] = self.slope[i].mul_add(other.value, other.slope[i] * self.value));
         self.value = self.value * other.value;
         self
     }
@@ -62,9 +56,7 @@ impl<L: Lane, const N: usize> Div for Tangent<L, N> {
     fn div(mut self, other: Self) -> Self {
         // d(a/b) = (da - (a/b) db)/b.
         self.value = self.value / other.value;
-        for i in 0..N {
-            self.slope[i] = (self.slope[i] - self.value * other.slope[i]) / other.value;
-        }
+        each!(i in N => self.slope[i] = (self.slope[i] - self.value * other.slope[i]) / other.value);
         self
     }
 }
@@ -73,9 +65,7 @@ impl<L: Lane, const N: usize> Neg for Tangent<L, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(mut self) -> Self {
-        for slope in &mut self.slope {
-            *slope = -*slope;
-        }
+        each!(i in N => self.slope[i] = -self.slope[i]);
         self.value = -self.value;
         self
     }
@@ -84,37 +74,31 @@ impl<L: Lane, const N: usize> Neg for Tangent<L, N> {
 impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     #[inline(always)]
     fn mul_add(mut self, a: Self, b: Self) -> Self {
-        for i in 0..N {
+        each!(i in N => {
             let rest = self.value.mul_add(a.slope[i], b.slope[i]);
             self.slope[i] = self.slope[i].mul_add(a.value, rest);
-        }
+        });
         self.value = self.value.mul_add(a.value, b.value);
         self
     }
 
     #[inline(always)]
     fn scale_add(mut self, factor: f64, addend: Self) -> Self {
-        for i in 0..N {
-            self.slope[i] = self.slope[i].scale_add(factor, addend.slope[i]);
-        }
+        each!(i in N => self.slope[i] = self.slope[i].scale_add(factor, addend.slope[i]));
         self.value = self.value.scale_add(factor, addend.value);
         self
     }
 
     #[inline(always)]
     fn affine(mut self, factor: f64, addend: f64) -> Self {
-        for slope in &mut self.slope {
-            *slope = slope.scale(factor);
-        }
+        each!(i in N => self.slope[i] = self.slope[i].scale(factor));
         self.value = self.value.affine(factor, addend);
         self
     }
 
     #[inline(always)]
     fn scale(mut self, factor: f64) -> Self {
-        for slope in &mut self.slope {
-            *slope = slope.scale(factor);
-        }
+        each!(i in N => self.slope[i] = self.slope[i].scale(factor));
         self.value = self.value.scale(factor);
         self
     }
@@ -123,9 +107,7 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     fn sine<D: Degree>(mut self) -> Self {
         // d sin(pi x) = pi cos(pi x) dx.
         let slope_of_sine = self.value.cosine::<D>().scale(std::f64::consts::PI);
-        for slope in &mut self.slope {
-            *slope = *slope * slope_of_sine;
-        }
+        each!(i in N => self.slope[i] = self.slope[i] * slope_of_sine);
         self.value = self.value.sine::<D>();
         self
     }
@@ -133,9 +115,7 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     #[inline(always)]
     fn cosine<D: Degree>(mut self) -> Self {
         let slope_of_cosine = self.value.sine::<D>().scale(-std::f64::consts::PI);
-        for slope in &mut self.slope {
-            *slope = *slope * slope_of_cosine;
-        }
+        each!(i in N => self.slope[i] = self.slope[i] * slope_of_cosine);
         self.value = self.value.cosine::<D>();
         self
     }
@@ -149,17 +129,13 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     #[inline(always)]
     fn exponential(mut self) -> Self {
         self.value = self.value.exponential();
-        for slope in &mut self.slope {
-            *slope = *slope * self.value;
-        }
+        each!(i in N => self.slope[i] = self.slope[i] * self.value);
         self
     }
 
     #[inline(always)]
     fn logarithm(mut self) -> Self {
-        for slope in &mut self.slope {
-            *slope = *slope / self.value;
-        }
+        each!(i in N => self.slope[i] = self.slope[i] / self.value);
         self.value = self.value.logarithm();
         self
     }
@@ -168,9 +144,7 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     fn root(mut self) -> Self {
         self.value = self.value.root();
         let double = self.value.max(self.value.like(LEAST_ROOT)).scale(2.0);
-        for slope in &mut self.slope {
-            *slope = *slope / double;
-        }
+        each!(i in N => self.slope[i] = self.slope[i] / double);
         self
     }
 
@@ -222,9 +196,7 @@ impl<L: Lane, const N: usize> Number for Tangent<L, N> {
 
     #[inline(always)]
     fn reset(mut self, value: f64, factor: f64) -> Self {
-        for slope in &mut self.slope {
-            *slope = slope.scale(factor);
-        }
+        each!(i in N => self.slope[i] = self.slope[i].scale(factor));
         Self { value: self.value.like(value), slope: self.slope }
     }
 }

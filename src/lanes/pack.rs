@@ -50,17 +50,18 @@ impl<W: Work> WithSimd for Apart<W> {
     }
 }
 
-// Loops and no closures: what the compiler leaves as a function of its own would lose the
-// instruction set that the caller was compiled for, and run 50 times slower.
+// No closures: what the compiler leaves as a function of its own would lose the instruction set that
+// the caller was compiled for, and run 50 times slower.
 macro_rules! operator {
     ($name:ident, $method:ident, $simd:ident) => {
         impl<S: Isa, const N: usize> $name for Bundle<S, N> {
             type Output = Self;
             #[inline(always)]
             fn $method(mut self, other: Self) -> Self {
-                for (a, b) in self.0.iter_mut().zip(&other.0) {
+                each!(i in N => {
+                    let (a, b) = (&mut self.0[i], other.0[i]);
                     a.value = a.isa.$simd(a.value, b.value);
-                }
+                });
                 self
             }
         }
@@ -76,10 +77,11 @@ impl<S: Isa, const N: usize> Neg for Bundle<S, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(mut self) -> Self {
-        for a in &mut self.0 {
+        each!(i in N => {
+            let a = &mut self.0[i];
             // As a difference the compiler sees through it, and joins it with sums and products.
             a.value = a.isa.sub_f64s(a.isa.splat_f64s(-0.0), a.value);
-        }
+        });
         self
     }
 }
@@ -87,18 +89,14 @@ impl<S: Isa, const N: usize> Neg for Bundle<S, N> {
 impl<S: Isa, const N: usize> Real for Bundle<S, N> {
     #[inline(always)]
     fn mul_add(mut self, a: Self, b: Self) -> Self {
-        for i in 0..N {
-            self.0[i] = self.0[i].mul_add(a.0[i], b.0[i]);
-        }
+        each!(i in N => self.0[i] = self.0[i].mul_add(a.0[i], b.0[i]));
         self
     }
 
     #[inline(always)]
     fn scale_add(mut self, factor: f64, addend: Self) -> Self {
         let factor = self.0[0].constant(factor);
-        for (a, b) in self.0.iter_mut().zip(&addend.0) {
-            *a = a.mul_add(factor, *b);
-        }
+        each!(i in N => self.0[i] = self.0[i].mul_add(factor, addend.0[i]));
         self
     }
 
@@ -106,18 +104,17 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
     fn affine(mut self, factor: f64, addend: f64) -> Self {
         let factor = self.0[0].constant(factor);
         let addend = self.0[0].constant(addend);
-        for a in &mut self.0 {
-            *a = a.mul_add(factor, addend);
-        }
+        each!(i in N => self.0[i] = self.0[i].mul_add(factor, addend));
         self
     }
 
     #[inline(always)]
     fn scale(mut self, factor: f64) -> Self {
         let factor = self.0[0].constant(factor);
-        for a in &mut self.0 {
+        each!(i in N => {
+            let a = &mut self.0[i];
             a.value = a.isa.mul_f64s(a.value, factor.value);
-        }
+        });
         self
     }
 
@@ -148,9 +145,10 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
 
     #[inline(always)]
     fn root(mut self) -> Self {
-        for a in &mut self.0 {
+        each!(i in N => {
+            let a = &mut self.0[i];
             a.value = a.isa.sqrt_f64s(a.value);
-        }
+        });
         self
     }
 
@@ -190,18 +188,14 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
         // Whole registers: a partial load is a function call.
         let (whole, _) = S::as_simd_f64s(&source[..Self::WIDTH]);
         let mut bundle = Self::splat(isa, 0.0);
-        for (pack, value) in bundle.0.iter_mut().zip(whole) {
-            pack.value = *value;
-        }
+        each!(i in N => bundle.0[i].value = whole[i]);
         bundle
     }
 
     #[inline(always)]
     fn store(self, target: &mut [f64]) {
         let (whole, _) = S::as_mut_simd_f64s(&mut target[..Self::WIDTH]);
-        for (value, pack) in whole.iter_mut().zip(&self.0) {
-            *value = pack.value;
-        }
+        each!(i in N => whole[i] = self.0[i].value);
     }
 
     #[inline(always)]
@@ -212,56 +206,61 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
 
     #[inline(always)]
     fn min(mut self, other: Self) -> Self {
-        for (a, b) in self.0.iter_mut().zip(&other.0) {
+        each!(i in N => {
+            let (a, b) = (&mut self.0[i], other.0[i]);
             a.value = a.isa.min_f64s(a.value, b.value);
-        }
+        });
         self
     }
 
     #[inline(always)]
     fn max(mut self, other: Self) -> Self {
-        for (a, b) in self.0.iter_mut().zip(&other.0) {
+        each!(i in N => {
+            let (a, b) = (&mut self.0[i], other.0[i]);
             a.value = a.isa.max_f64s(a.value, b.value);
-        }
+        });
         self
     }
 
     #[inline(always)]
     fn with_sign_of(mut self, other: Self) -> Self {
-        for (a, b) in self.0.iter_mut().zip(&other.0) {
+        each!(i in N => {
+            let (a, b) = (&mut self.0[i], other.0[i]);
             let isa = a.isa;
             let sign = isa.splat_u64s(1 << 63);
             let other = isa.and_u64s(isa.transmute_u64s_f64s(b.value), sign);
             let bits = isa.transmute_u64s_f64s(isa.abs_f64s(a.value));
             a.value = isa.transmute_f64s_u64s(isa.or_u64s(bits, other));
-        }
+        });
         self
     }
 
     #[inline(always)]
     fn signs(self) -> u128 {
         let mut bits = 0;
-        for (i, a) in self.0.iter().enumerate() {
+        each!(i in N => {
+            let a = self.0[i];
             bits |= u128::from(a.isa.sign_bits(a.value)) << (i * S::F64_LANES);
-        }
+        });
         bits
     }
 
     #[inline(always)]
     fn add_to_exponent(mut self, count: Self) -> Self {
-        for (a, c) in self.0.iter_mut().zip(&count.0) {
+        each!(i in N => {
+            let (a, c) = (&mut self.0[i], count.0[i]);
             let isa = a.isa;
             let shifted = isa.lowest_bits_to_exponent(isa.transmute_u64s_f64s(c.value));
             let bits = isa.add_u64s(isa.transmute_u64s_f64s(a.value), shifted);
             a.value = isa.transmute_f64s_u64s(bits);
-        }
+        });
         self
     }
 
     #[inline(always)]
     fn split(self) -> (Self, Self) {
         let (mut mantissa, mut exponent) = (self, self);
-        for i in 0..N {
+        each!(i in N => {
             let isa = self.0[i].isa;
             let bits = isa.transmute_u64s_f64s(self.0[i].value);
             let mask = isa.splat_u64s(EXPONENT_BITS);
@@ -273,18 +272,19 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
             let integer = isa.or_u64s(integer, isa.splat_u64s(INTEGER_BITS));
             let offset = isa.splat_f64s(INTEGER_OFFSET);
             exponent.0[i].value = isa.sub_f64s(isa.transmute_f64s_u64s(integer), offset);
-        }
+        });
         (mantissa, exponent)
     }
 
     #[inline(always)]
     fn flip_where_odd(mut self, count: Self) -> Self {
-        for (a, c) in self.0.iter_mut().zip(&count.0) {
+        each!(i in N => {
+            let (a, c) = (&mut self.0[i], count.0[i]);
             let isa = a.isa;
             let parity = isa.lowest_bit_to_sign(isa.transmute_u64s_f64s(c.value));
             let bits = isa.xor_u64s(isa.transmute_u64s_f64s(a.value), parity);
             a.value = isa.transmute_f64s_u64s(bits);
-        }
+        });
         self
     }
 }
