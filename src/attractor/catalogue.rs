@@ -6,14 +6,13 @@ use nalgebra::Complex;
 
 use super::chaos::ChaoticSet;
 use super::kind::Kind;
+use super::region::Region;
+use super::walk::Senses;
 use crate::integrate::State;
 use crate::integrate::accuracy::{distance, wrapped};
 use crate::model::Pendulum;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::rotation::Rotation;
-
-/// Mean angles of sampled sets that differ by less are the same.
-const SAME_LEAN: f64 = 0.1;
 
 /// An attractor.
 #[derive(Clone, Debug)]
@@ -36,6 +35,8 @@ pub struct Attractor {
     pub period: Option<f64>,
     /// Sense of rotation of a set that has no `w`: 1, -1 or 0.
     pub sense: i64,
+    /// Where its trajectories stay, if no trap tells that.
+    pub region: Option<Region>,
     /// A name that stays.
     pub name: String,
     /// Its mirror image in the catalogue: itself where it is symmetric.
@@ -65,6 +66,7 @@ impl Attractor {
             exponent_stderr: 0.0,
             period: Some(period),
             sense: orbit.w.signum(),
+            region: None,
             name: String::new(),
             twin: None,
         }
@@ -83,6 +85,7 @@ impl Attractor {
             exponent_stderr: 0.0,
             period: None,
             sense: 0,
+            region: None,
             name: String::new(),
             twin: None,
         }
@@ -127,6 +130,7 @@ impl Attractor {
             exponent_stderr: 0.0,
             period: Some(rotation.period),
             sense: rotation.sense,
+            region: None,
             name: String::new(),
             twin: None,
         }
@@ -145,9 +149,19 @@ impl Attractor {
             exponent_stderr: set.exponent_stderr,
             period: None,
             sense: set.sense,
+            region: set.band.is_none().then(|| set.region.clone()),
             name: String::new(),
             twin: None,
         }
+    }
+
+    /// Whether it is a set in whose region these points lie, most of them, and which turns so.
+    #[must_use]
+    pub fn keeps(&self, points: &[State], senses: Senses) -> bool {
+        let inside = |region: &Region| points.iter().filter(|p| region.contains(**p)).count();
+        let (kind, sense) = senses.kind();
+        let turns = self.kind == Kind::TumblingChaos || (self.kind, self.sense) == (kind, sense);
+        turns && self.region.as_ref().is_some_and(|region| 2 * inside(region) > points.len())
     }
 
     /// What stays when a catalogue is sorted anew: the bits of the first point.
@@ -163,12 +177,13 @@ impl Attractor {
 
     /// Whether the other is this one's image under `(th, v) -> (-th, -v)`.
     fn mirrors(&self, other: &Self) -> bool {
-        if (self.kind, self.n, self.w) != (other.kind, other.n, other.w.map(|w| -w)) {
+        let image = (other.kind, other.n, other.w.map(|w| -w), -other.sense);
+        if (self.kind, self.n, self.w, self.sense) != image {
             return false;
         }
         if self.n.is_none() {
-            let opposite = (self.lean() + other.lean()).abs() < SAME_LEAN;
-            return self.sense == -other.sense && opposite;
+            let (Some(own), Some(other)) = (&self.region, &other.region) else { return true };
+            return own.mirrored().meets(other);
         }
         let image = |p: &State| [wrapped(-p[0]), -p[1]];
         self.points.iter().all(|p| other.points.iter().any(|q| distance(image(p), *q) < 1e-7))

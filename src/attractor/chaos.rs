@@ -1,29 +1,37 @@
 //! Sets that keep their trajectories without closing: chaotic attractors and quasi-periodic
 //! rotation, told apart from transients that have not ended yet.
+//!
+//! Each long run is cut into windows. Windows that turn alike and whose regions meet form a group. Groups that
+//! trajectories leave for one another are one set; a set that a trajectory leaves for good, for
+//! another group or for a trap, is a transient.
 
-use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::effort::Effort;
 use super::kind::Kind;
+use super::region::Region;
 use super::trap::Band;
+use super::walk::{Cut, Senses, Window, walk};
 use crate::integrate::Strobe;
 use crate::integrate::accuracy::distance;
-use crate::integrate::block::Block;
 use crate::integrate::stroboscopic::State;
 
 /// Stroboscopic points that are kept as a picture of the set.
 const KEPT: usize = 2000;
-/// Trajectories that draw the curve of a quasi-periodic set.
-const CURVES: usize = 32;
-/// Trajectories that are watched so.
-const FOLLOWED: usize = 16;
-/// An exponent this many standard errors above zero is positive.
+/// Windows of a run.
+const WINDOWS: usize = 4;
+/// Windows that draw the curve of a quasi-periodic set.
+const CURVES: usize = 128;
+/// An exponent this many standard errors above zero is positive ...
 const SIGNIFICANCE: f64 = 4.0;
+/// ... if it is greater than this, per period.
+const LEAST_EXPONENT: f64 = 1e-3;
 /// Points this near are the same.
 const SAME: f64 = 1e-6;
 /// Exponents (per period) within this of zero may belong to quasi-periodic motion.
 const NEUTRAL: f64 = 2e-3;
+/// Such motion turns this often per period at least.
+const LEAST_TURNS: f64 = 0.02;
 
 /// A set of trajectories that share a region and stay there.
 #[derive(Clone, Debug)]
@@ -46,158 +54,235 @@ pub struct ChaoticSet {
     pub band: Option<Band>,
 }
 
-/// The cells that a set's stroboscopic points visit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Region {
-    occupied: Vec<bool>,
-    side: usize,
-    speed: f64,
-}
-
-impl Region {
-    fn new(side: usize, speed: f64) -> Self {
-        Self { occupied: vec![false; side * side], side, speed }
-    }
-
-    fn cell(&self, state: State) -> Option<usize> {
-        let x = (state[0] / TAU + 0.5).rem_euclid(1.0) * self.side as f64;
-        let y = (0.5 * state[1] / self.speed + 0.5) * self.side as f64;
-        let inside = y >= 0.0 && y < self.side as f64;
-        inside.then(|| y as usize * self.side + (x as usize).min(self.side - 1))
-    }
-
-    fn mark(&mut self, state: State) {
-        if let Some(cell) = self.cell(state) {
-            self.occupied[cell] = true;
-        }
-    }
-
-    /// Whether a state lies in a visited cell.
+impl ChaoticSet {
+    /// Its image under `(th, v) -> (-th, -v)`.
     #[must_use]
-    pub fn contains(&self, state: State) -> bool {
-        self.cell(state).is_some_and(|cell| self.occupied[cell])
-    }
-
-    fn unite(&mut self, other: &Self) {
-        for (mine, theirs) in self.occupied.iter_mut().zip(&other.occupied) {
-            *mine |= theirs;
+    pub fn mirrored(&self) -> Self {
+        Self {
+            sense: -self.sense,
+            points: self.points.iter().map(|p| [-p[0], -p[1]]).collect(),
+            region: self.region.mirrored(),
+            band: self.band.as_ref().map(Band::mirrored),
+            ..self.clone()
         }
-    }
-
-    /// Whether the two share a fifth of the smaller one's cells.
-    #[must_use]
-    pub fn meets(&self, other: &Self) -> bool {
-        self.overlap(other) > 0.2
-    }
-
-    fn overlap(&self, other: &Self) -> f64 {
-        let both = self.occupied.iter().zip(&other.occupied).filter(|(a, b)| **a && **b).count();
-        let count = |r: &Self| r.occupied.iter().filter(|x| **x).count();
-        both as f64 / count(self).min(count(other)).max(1) as f64
     }
 }
 
-/// Sorts trajectories that nothing captured, first for `settled` periods and now for `watch`
-/// more, into sets; those sets of which no member was captured in the second stretch are returned.
+/// Sorts trajectories that nothing has captured, watched from `states` on for `periods` more, into the sets
+/// that none of them leaves.
 ///
-/// `states` are the trajectories after the first stretch, `lost` says which of them a trap took in
-/// the second one. None are returned if `cancel` was set.
+/// `captured` says after how many of these periods a trap took each, if one did. No set is returned if
+/// `cancel` was set.
 #[must_use]
 pub fn sets(
     strobe: &Strobe,
     states: &[State],
-    lost: &[bool],
-    watch: usize,
+    captured: &[Option<u32>],
+    periods: usize,
     effort: &Effort,
     cancel: &AtomicBool,
 ) -> Vec<ChaoticSet> {
-    let Some(walks) = walk(strobe, states, watch, effort.cells, cancel) else { return Vec::new() };
-    let mut groups: Vec<(Vec<usize>, Region)> = Vec::new();
-    for (i, walk) in walks.iter().enumerate() {
-        if walk.closes(effort.longest_cycle) || 2 * walk.outside > watch {
-            continue;
+    let length = periods / WINDOWS;
+    let cut = Cut { windows: WINDOWS, length, side: effort.cells };
+    let Some(mut walks) = walk(strobe, states, cut, cancel) else { return Vec::new() };
+    for (windows, captured) in walks.iter_mut().zip(captured) {
+        windows.truncate(captured.map_or(WINDOWS, |at| at as usize / length.max(1)));
+        if closes(windows, effort.longest_cycle) {
+            windows.clear();
         }
-        let mut joined = (vec![i], walk.region.clone());
-        groups.retain_mut(|(members, region)| {
-            let same = region.meets(&walk.region);
-            if same {
-                joined.0.append(members);
-                joined.1.unite(region);
+    }
+    let groups = Groups::new(&walks, captured);
+    let describe = |class: Vec<usize>| {
+        let windows: Vec<&Window> = groups.windows(&walks, &class);
+        let members = groups.members(&class);
+        describe(strobe, &windows, members, length, effort, cancel)
+    };
+    groups.classes().into_iter().filter_map(describe).collect()
+}
+
+/// Whether it repeats itself: a start exactly on an orbit that does not attract, such as upright or
+/// hanging rest, stays there for want of a perturbation.
+fn closes(windows: &[Window], longest: usize) -> bool {
+    let Some(points) = windows.last().map(|window| &window.points) else { return false };
+    (1..=longest).any(|n| {
+        points.len() > 2 * n
+            && points.iter().zip(&points[n..]).all(|(a, b)| distance(*a, *b) < SAME)
+    })
+}
+
+/// Windows that turn alike in regions that meet, and where trajectories go from them.
+struct Groups {
+    /// The group of every window of every walk.
+    of: Vec<Vec<usize>>,
+    /// The groups that the next windows belong to; `None` is a trap.
+    next: Vec<Vec<Option<usize>>>,
+}
+
+impl Groups {
+    fn new(walks: &[Vec<Window>], captured: &[Option<u32>]) -> Self {
+        // Groups that a window joins become one: `parent` leads to it.
+        let mut found: Vec<(Senses, Region)> = Vec::new();
+        let mut parent: Vec<usize> = Vec::new();
+        let mut of: Vec<Vec<usize>> = Vec::with_capacity(walks.len());
+        for windows in walks {
+            let mut own = Vec::with_capacity(windows.len());
+            for window in windows {
+                let (senses, mut region) = (window.senses, window.region.clone());
+                let place = found.len();
+                for k in 0..place {
+                    if parent[k] == k && found[k].0 == senses && found[k].1.meets(&window.region) {
+                        region.unite(&found[k].1);
+                        parent[k] = place;
+                    }
+                }
+                found.push((senses, region));
+                parent.push(place);
+                own.push(place);
             }
-            !same
-        });
-        groups.push(joined);
+            of.push(own);
+        }
+        let root = |mut k: usize| {
+            while parent[k] != k {
+                k = parent[k];
+            }
+            k
+        };
+        for group in of.iter_mut().flatten() {
+            *group = root(*group);
+        }
+        let mut next = vec![Vec::new(); found.len()];
+        for (own, captured) in of.iter().zip(captured) {
+            for pair in own.windows(2) {
+                next[pair[0]].push(Some(pair[1]));
+            }
+            if let (Some(last), Some(_)) = (own.last(), captured) {
+                next[*last].push(None);
+            }
+        }
+        Self { of, next }
     }
-    for (members, _) in &mut groups {
-        members.sort_unstable();
+
+    /// The groups that trajectories leave for one another only, and stay in.
+    fn classes(&self) -> Vec<Vec<usize>> {
+        let mut classes: Vec<Vec<usize>> = Vec::new();
+        let mut used: Vec<usize> = self.of.iter().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        for group in used {
+            let Some(reached) = self.reached(group) else { continue };
+            let back =
+                |k: &usize| self.reached(*k).is_some_and(|others| others.contains(&group));
+            if !reached.is_empty() && reached.iter().all(back) && !classes.contains(&reached) {
+                classes.push(reached);
+            }
+        }
+        classes
     }
-    groups.sort_by(|a, b| a.0.cmp(&b.0));
-    groups
-        .into_iter()
-        .filter(|(members, _)| !members.iter().any(|i| lost[*i]))
-        .filter_map(|(members, region)| {
-            let walks: Vec<&Walk> = members.iter().map(|i| &walks[*i]).collect();
-            describe(strobe, &walks, region, watch, effort)
-        })
-        .collect()
+
+    /// The groups that trajectories come to from this one, sorted; `None` if a trap is among them.
+    fn reached(&self, group: usize) -> Option<Vec<usize>> {
+        let mut reached: Vec<usize> = Vec::new();
+        let mut from = vec![group];
+        while let Some(group) = from.pop() {
+            for next in &self.next[group] {
+                let next = (*next)?;
+                if !reached.contains(&next) {
+                    reached.push(next);
+                    from.push(next);
+                }
+            }
+        }
+        reached.sort_unstable();
+        Some(reached)
+    }
+
+    fn windows<'a>(&self, walks: &'a [Vec<Window>], class: &[usize]) -> Vec<&'a Window> {
+        let all = walks.iter().flatten().zip(self.of.iter().flatten());
+        all.filter(|(_, group)| class.contains(group)).map(|(window, _)| window).collect()
+    }
+
+    fn members(&self, class: &[usize]) -> usize {
+        let ends = |own: &&Vec<usize>| own.last().is_some_and(|group| class.contains(group));
+        self.of.iter().filter(ends).count()
+    }
 }
 
-/// One trajectory's long run.
-struct Walk {
-    region: Region,
-    points: Vec<State>,
-    turns: f64,
-    /// Periods that ended faster than the region reaches: a motion that is so for most of the time gains
-    /// speed for ever, and rounding makes its exponent.
-    outside: usize,
-    /// Exponent per period over the run.
-    exponent: f64,
-}
-
-impl Walk {
-    /// Whether it repeats itself: a start exactly on an orbit that does not attract, such as upright
-    /// or hanging rest, stays there for want of a perturbation.
-    fn closes(&self, longest: usize) -> bool {
-        (1..=longest).any(|n| {
-            self.points.len() > 2 * n
-                && self.points.iter().zip(&self.points[n..]).all(|(a, b)| distance(*a, *b) < SAME)
-        })
+/// What a set of windows is; `None` where it is neither chaos nor quasi-periodic.
+fn describe(
+    strobe: &Strobe,
+    windows: &[&Window],
+    members: usize,
+    length: usize,
+    effort: &Effort,
+    cancel: &AtomicBool,
+) -> Option<ChaoticSet> {
+    if strobe.pendulum.is_autonomous() {
+        // A flow in the plane has no chaos; what is left here has not settled yet.
+        return None;
     }
+    let mut region = Region::new(effort.cells, &strobe.pendulum);
+    for window in windows {
+        region.unite(&window.region);
+    }
+    let every: Vec<State> = windows.iter().flat_map(|w| w.points.iter().copied()).collect();
+    let points = spread(&every, KEPT);
+    let exponents = exponents(strobe, &spread(&every, effort.watched), length, cancel)?;
+    let (mean, stderr) = mean_and_error(&exponents);
+    let period = strobe.pendulum.period();
+    let turning = |w: &&Window| w.turns.abs() > LEAST_TURNS * length as f64;
+    let found = |kind: Kind, sense: i64, mean: f64, band: Option<Band>| ChaoticSet {
+        kind,
+        sense,
+        members,
+        points,
+        exponent: mean / period,
+        exponent_stderr: stderr / period,
+        region,
+        band,
+    };
+    if mean.abs() < NEUTRAL && windows.iter().all(turning) {
+        // Near a resonance one trajectory takes long to fill the curve; several fill it sooner.
+        let curve: Vec<State> =
+            windows.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
+        let band = Band::around(strobe, &curve, 0)?;
+        let sense = windows[0].turns.signum() as i64;
+        return Some(found(Kind::QuasiperiodicRotation, sense, 0.0, Some(band)));
+    }
+    if mean < LEAST_EXPONENT.max(SIGNIFICANCE * stderr) {
+        return None;
+    }
+    let (kind, sense) =
+        windows.iter().fold(Senses::default(), |all, window| all.with(window.senses)).kind();
+    Some(found(kind, sense, mean, None))
 }
 
-/// The long runs of all states; `None` if `cancel` was set.
-fn walk(
+/// `most` of the points at equal distances in their list, or all.
+pub(super) fn spread(points: &[State], most: usize) -> Vec<State> {
+    let count = most.min(points.len());
+    (0..count).map(|k| points[k * points.len() / count]).collect()
+}
+
+/// The growth of a tangent along each trajectory, per period, over `periods` after as many others: by then it
+/// has turned into the direction of growth, and the shear of regular motion, which grows it in
+/// proportion to time, adds no more than ln 2.
+///
+/// `None` if `cancel` was set.
+fn exponents(
     strobe: &Strobe,
     states: &[State],
     periods: usize,
-    side: usize,
     cancel: &AtomicBool,
-) -> Option<Vec<Walk>> {
-    let count = states.len();
-    let speed = 1.5 * states.iter().fold(4.0_f64, |m, s| m.max(s[1].abs()));
+) -> Option<Vec<f64>> {
     let mut theta: Vec<f64> = states.iter().map(|s| s[0]).collect();
     let mut velocity: Vec<f64> = states.iter().map(|s| s[1]).collect();
-    let mut turns = vec![0.0; count];
+    let count = states.len();
+    let (mut turns, mut growth) = (vec![0.0; count], vec![0.0; count]);
     let mut tangents = (vec![1.0; count], vec![0.0; count]);
-    let mut growth = vec![0.0; count];
-    let mut walks: Vec<Walk> = states
-        .iter()
-        .map(|_| Walk {
-            region: Region::new(side, speed),
-            points: Vec::new(),
-            turns: 0.0,
-            outside: 0,
-            exponent: 0.0,
-        })
-        .collect();
-    let align = periods / 2;
-    for period in 0..periods {
+    for period in 0..2 * periods {
         if cancel.load(Ordering::Relaxed) {
             return None;
         }
-        if period == align {
-            // Count from here: the tangents have turned into the direction of growth, and the shear
-            // of regular motion, which grows them in proportion to time, adds no more than ln 2.
+        if period == periods {
             growth.fill(0.0);
         }
         // Lengths agree, so this cannot fail.
@@ -208,73 +293,8 @@ fn walk(
             &mut growth,
             1,
         );
-        for (i, walk) in walks.iter_mut().enumerate() {
-            let state = [theta[i], velocity[i]];
-            walk.region.mark(state);
-            walk.outside += usize::from(walk.region.cell(state).is_none());
-            if walk.points.len() < KEPT {
-                walk.points.push(state);
-            }
-        }
     }
-    for (i, walk) in walks.iter_mut().enumerate() {
-        walk.turns = turns[i];
-        walk.exponent = growth[i] / (periods - align).max(1) as f64;
-    }
-    Some(walks)
-}
-
-fn describe(
-    strobe: &Strobe,
-    members: &[&Walk],
-    region: Region,
-    watch: usize,
-    effort: &Effort,
-) -> Option<ChaoticSet> {
-    if strobe.pendulum.is_autonomous() {
-        // A flow in the plane has no chaos; what is left here has not settled yet.
-        return None;
-    }
-    let (mean, stderr) = mean_and_error(&members.iter().map(|w| w.exponent).collect::<Vec<_>>());
-    let period = strobe.pendulum.period();
-    let first = members[0];
-    let share = KEPT / members.len().max(1) + 1;
-    let mut points: Vec<State> =
-        members.iter().flat_map(|m| m.points.iter().take(share).copied()).collect();
-    points.truncate(KEPT);
-    let turning = |w: &&Walk| w.turns.abs() > 0.02 * watch as f64;
-    if mean.abs() < NEUTRAL && members.iter().all(turning) {
-        // Near a resonance one trajectory takes long to fill the curve; several fill it sooner.
-        let curve: Vec<State> =
-            members.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
-        let band = Band::around(strobe, &curve, 0)?;
-        return Some(ChaoticSet {
-            kind: Kind::QuasiperiodicRotation,
-            sense: first.turns.signum() as i64,
-            members: members.len(),
-            points,
-            exponent: 0.0,
-            exponent_stderr: stderr / period,
-            region,
-            band: Some(band),
-        });
-    }
-    // A single trajectory has no spread: ask for a clearly positive value.
-    let floor: f64 = if members.len() < 3 { 0.01 } else { 1e-3 };
-    if mean < floor.max(SIGNIFICANCE * stderr) {
-        return None;
-    }
-    let (kind, sense) = turns_over_the_top(strobe, members, effort.turning);
-    Some(ChaoticSet {
-        kind,
-        sense,
-        members: members.len(),
-        points,
-        exponent: mean / period,
-        exponent_stderr: stderr / period,
-        region,
-        band: None,
-    })
+    Some(growth.iter().map(|g| g / periods.max(1) as f64).collect())
 }
 
 /// Mean and standard error of values that do not depend on one another.
@@ -286,55 +306,4 @@ pub(crate) fn mean_and_error(values: &[f64]) -> (f64, f64) {
     }
     let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
     (mean, (variance / count).sqrt())
-}
-
-/// Follows the members step by step: passages over the top in one sense, both, or none.
-fn turns_over_the_top(strobe: &Strobe, members: &[&Walk], periods: usize) -> (Kind, i64) {
-    let ends: Vec<State> = members.iter().filter_map(|m| m.points.last().copied()).collect();
-    let (theta, velocity): (Vec<f64>, Vec<f64>) = ends.iter().map(|s| (s[0], s[1])).unzip();
-    let width = strobe.block_width(FOLLOWED);
-    let followed = width.min(theta.len()).min(FOLLOWED);
-    let mut block = Block::new(width);
-    block.fill(&theta[..followed], &velocity[..followed], strobe.schedule.kick);
-    // The well between two upright positions; a passage over the top changes it by one.
-    let well = |half_turns: f64| (0.5 * half_turns + 0.5).floor() as i64;
-    let mut last: Vec<i64> = block.half_turns[..followed].iter().map(|x| well(*x)).collect();
-    let mut before = vec![None::<i64>; followed];
-    let mut turned = vec![[false; 2]; followed];
-    for _ in 0..periods {
-        for k in 0..strobe.steps() {
-            strobe.step(&mut block, k);
-            for i in 0..followed {
-                let now = well(block.half_turns[i]);
-                if now != last[i] {
-                    let sense = (now - last[i]).signum();
-                    // Over the top and back again at once is no turn; twice in one sense is.
-                    if before[i] == Some(sense) {
-                        turned[i][usize::from(sense > 0)] = true;
-                    }
-                    (before[i], last[i]) = (Some(sense), now);
-                }
-            }
-        }
-    }
-    let restless = before.iter().zip(&turned).any(|(b, t)| b.is_some() && *t == [false; 2]);
-    let backward = restless || turned.iter().any(|t| t[0]);
-    let forward = restless || turned.iter().any(|t| t[1]);
-    match (forward, backward) {
-        (false, false) => (Kind::LibrationChaos, 0),
-        (true, false) => (Kind::RotatingChaos, 1),
-        (false, true) => (Kind::RotatingChaos, -1),
-        (true, true) => (Kind::TumblingChaos, 0),
-    }
-}
-
-/// The set whose region holds most of a trajectory's last points, if any does.
-#[must_use]
-pub fn member_of(sets: &[(usize, &Region)], points: &[State]) -> Option<usize> {
-    let hits = |region: &Region| points.iter().filter(|p| region.contains(**p)).count();
-    sets.iter()
-        .map(|(index, region)| (hits(region), *index))
-        .filter(|(hits, _)| *hits * 2 > points.len())
-        .max_by_key(|(hits, index)| (*hits, std::cmp::Reverse(*index)))
-        .map(|(_, index)| index)
 }

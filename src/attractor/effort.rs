@@ -20,10 +20,7 @@ pub struct Effort {
     /// A set of fewer trajectories than this is proved once more: from so many of its points, for as
     /// long again, nothing may be captured.
     pub proved: usize,
-    /// Periods over which turns over the top are watched step by step.
-    pub turning: usize,
-    /// Cells along each side of the picture of where a set lives: enough for its points to fill what it
-    /// visits.
+    /// Cells around the circle of the region of a set: few enough for its points to fill what it visits.
     pub cells: usize,
     /// How far traps reach.
     pub trap: Sampling,
@@ -56,7 +53,6 @@ impl Effort {
         watched: 256,
         watch: 4,
         proved: 0,
-        turning: 400,
         cells: 96,
         trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
     };
@@ -67,10 +63,9 @@ impl Effort {
         first_round: 24,
         tries: 6,
         watched: 16,
-        watch: 1,
+        watch: 4,
         proved: 16,
-        turning: 60,
-        cells: 20,
+        cells: 24,
         trap: Sampling { points: 3, rays: 12, levels: 8, ratio: 0.5, rounds: 2, returns: 2 },
     };
 }

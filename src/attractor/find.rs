@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::capture::{self, Fate, Traps};
 use super::catalogue::{Attractor, arrange};
-use super::chaos::{ChaoticSet, Region};
+use super::chaos::ChaoticSet;
 use super::effort::Effort;
 use super::rest;
 use super::returns::{escape_speed, near_returns};
@@ -39,8 +39,6 @@ pub struct Catalogue {
     pub attractors: Vec<Attractor>,
     /// The regions that capture; indices are those of `attractors`.
     pub traps: Traps,
-    /// Regions of the attractors that have no trap: index and cells.
-    pub regions: Vec<(usize, Region)>,
     /// Longest time to capture that the searches saw, in periods.
     pub longest_settle: u32,
     pub(super) effort: Effort,
@@ -59,7 +57,6 @@ impl Catalogue {
         let mut empty = Self {
             attractors: Vec::new(),
             traps: Traps::default(),
-            regions: Vec::new(),
             longest_settle: 0,
             effort,
             orbits: Vec::new(),
@@ -123,7 +120,7 @@ impl Catalogue {
             alive = endings.iter().any(|e| matches!(e, Ending::Open(_)));
         }
         if alive && !cancel.load(Ordering::Relaxed) {
-            self.watch(strobe, &open(&endings), bound, cancel);
+            self.watch(strobe, &mut endings, bound, cancel);
         }
         endings
     }
@@ -210,7 +207,7 @@ impl Catalogue {
             }
             tries += 1;
             let Some(orbit) = newton::find(map, start, n, REACH) else { continue };
-            if !attracts(strobe, &orbit) || self.knows(&orbit) {
+            if !self.attracts_anew(strobe, &orbit) {
                 continue;
             }
             let traps = self.admit(strobe, orbit, cancel);
@@ -226,7 +223,7 @@ impl Catalogue {
     }
 
     /// Takes an orbit and its mirror image, if they can be trapped, and returns their traps.
-    fn admit(
+    pub(super) fn admit(
         &mut self,
         strobe: &Strobe,
         orbit: PeriodicOrbit,
@@ -250,7 +247,7 @@ impl Catalogue {
         traps
     }
 
-    /// Attractors, traps and regions anew from orbits, rotations and sets.
+    /// Attractors and traps anew from orbits, rotations and sets.
     pub(super) fn rebuild(&mut self, pendulum: &Pendulum) {
         let mut all: Vec<Attractor> =
             self.orbits.iter().map(|(o, _)| Attractor::periodic(pendulum, o)).collect();
@@ -259,7 +256,6 @@ impl Catalogue {
         all.extend(self.sets.iter().map(Attractor::sampled));
         let (attractors, place) = arrange(pendulum, all);
         let mut traps = Traps::default();
-        let mut regions = Vec::new();
         let mut place = place.into_iter();
         for ((_, ellipses), at) in self.orbits.iter().zip(place.by_ref()) {
             traps.ellipses.extend(ellipses.iter().map(|e| Ellipse { attractor: at, ..*e }));
@@ -271,14 +267,15 @@ impl Catalogue {
             traps.rests.0[usize::from(theta.cos() < 0.0)] = Some(at);
         }
         for (set, at) in self.sets.iter().zip(place) {
-            match &set.band {
-                Some(band) => traps.bands.push(Band { attractor: at, ..band.clone() }),
-                None => regions.push((at, set.region.clone())),
-            }
+            traps.bands.extend(set.band.iter().map(|b| Band { attractor: at, ..b.clone() }));
         }
         self.attractors = attractors;
         self.traps = traps;
-        self.regions = regions;
+    }
+
+    /// Whether this orbit attracts and is none of those found.
+    pub(super) fn attracts_anew(&self, strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
+        attracts(strobe, orbit) && !self.knows(orbit)
     }
 
     /// Whether this orbit is one of those found.

@@ -6,7 +6,7 @@
 //! - [`catalogue`]: keys, names, twins
 //! - [`trap`]: regions that nothing leaves
 //! - [`capture`]: trajectories run until a trap holds them
-//! - [`chaos`]: what never closes
+//! - [`chaos`]: what never closes, from long runs cut into windows ([`walk`]), and where it lives ([`region`])
 
 pub mod capture;
 pub mod catalogue;
@@ -15,9 +15,12 @@ pub mod effort;
 pub mod find;
 pub mod kind;
 mod place;
+pub mod region;
 pub mod rest;
 mod returns;
+mod short_cycles;
 pub mod trap;
+pub mod walk;
 mod watch;
 
 pub use catalogue::Attractor;

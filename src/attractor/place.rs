@@ -1,11 +1,16 @@
 //! Which attractor a trajectory belongs to that no trap has captured.
 
+use std::sync::atomic::AtomicBool;
+
 use super::catalogue::Attractor;
-use super::chaos::{self, Region};
 use super::find::{Catalogue, REACH, SAME};
 use super::returns::{nearest_return, tracks};
+use super::walk::{Cut, Window, walk};
 use crate::integrate::{State, Strobe};
 use crate::orbit::newton;
+
+/// Stroboscopic points that tell on which set a trajectory stays.
+const LAST_POINTS: usize = 64;
 
 impl Catalogue {
     /// The index of the one chaotic attractor, if there is no other attractor at all.
@@ -38,15 +43,25 @@ impl Catalogue {
                 };
                 self.attractors.iter().position(own)
             });
-            known.or_else(|| self.region_of(&track[1..]))
+            known
         };
-        tracks(strobe, states, longest).iter().map(place).collect()
+        let tracks = tracks(strobe, states, longest);
+        let homes = self.homes(strobe, states).into_iter();
+        tracks.iter().zip(homes).map(|(track, home)| place(track).or(home)).collect()
     }
 
-    /// The attractor without trap in whose region a trajectory's last points lie.
+    /// The chaotic attractors that open trajectories stay on, by their next stroboscopic points and the way they
+    /// turn over these.
     #[must_use]
-    pub fn region_of(&self, points: &[State]) -> Option<usize> {
-        let regions: Vec<(usize, &Region)> = self.regions.iter().map(|(i, r)| (*i, r)).collect();
-        chaos::member_of(&regions, points)
+    pub fn homes(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
+        if !self.has_chaos() {
+            return vec![None; states.len()];
+        }
+        let cut = Cut { windows: 1, length: LAST_POINTS, side: self.effort.cells };
+        let walks = walk(strobe, states, cut, &AtomicBool::new(false)).unwrap_or_default();
+        let home = |window: &Window| {
+            self.attractors.iter().position(|a| a.keeps(&window.points, window.senses))
+        };
+        walks.iter().map(|windows| windows.last().and_then(home)).collect()
     }
 }

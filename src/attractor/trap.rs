@@ -209,6 +209,12 @@ impl Band {
         (state[1] - self.at(state[0])).abs() < self.half_width
     }
 
+    /// The band around the image of its curve under `(th, v) -> (-th, -v)`.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        Self { curve: self.curve.iter().rev().map(|v| -v).collect(), ..*self }
+    }
+
     /// The band around states `curve` of a running state, `None` where no sampled width is safe.
     #[must_use]
     pub fn around(strobe: &Strobe, states: &[State], attractor: usize) -> Option<Self> {

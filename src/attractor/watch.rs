@@ -3,8 +3,8 @@
 use std::sync::atomic::AtomicBool;
 
 use super::capture::{self, Fate};
-use super::chaos::{self, ChaoticSet};
-use super::find::Catalogue;
+use super::chaos::{self, ChaoticSet, spread};
+use super::find::{Catalogue, Ending};
 use super::kind::Kind;
 use crate::integrate::{State, Strobe};
 
@@ -17,38 +17,68 @@ const LONG: u32 = 5000;
 
 impl Catalogue {
     /// Decides what the trajectories that nothing captured are.
+    ///
+    /// Those that a trap takes while they are watched end there.
     pub(super) fn watch(
         &mut self,
         strobe: &Strobe,
-        alive: &[State],
+        endings: &mut [Ending],
         bound: u32,
         cancel: &AtomicBool,
     ) {
-        let stride = alive.len().div_ceil(self.effort.watched);
-        let sample: Vec<State> = alive.iter().step_by(stride).copied().collect();
+        let open: Vec<(usize, State)> = endings
+            .iter()
+            .enumerate()
+            .filter_map(|(k, end)| if let Ending::Open(s) = end { Some((k, *s)) } else { None })
+            .collect();
+        let stride = open.len().div_ceil(self.effort.watched).max(1);
+        let (places, sample): (Vec<usize>, Vec<State>) = open.into_iter().step_by(stride).unzip();
         let length = self.effort.watch * bound;
         // Nearly conservative motion takes longer than this to show where it ends.
         let watched = strobe.pendulum.period() * f64::from(bound + length);
-        if strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
+        if sample.is_empty() || strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
             return;
         }
         let Some(outcomes) = capture::outcomes(strobe, &self.traps, length, &sample, cancel) else {
             return;
         };
-        let lost: Vec<bool> = outcomes.iter().map(|o| !matches!(o.fate, Fate::Open)).collect();
-        if lost.iter().all(|l| *l) {
+        for (place, outcome) in places.into_iter().zip(&outcomes) {
+            if let Fate::Captured(attractor) = outcome.fate {
+                endings[place] = Ending::Captured(self.attractors[attractor].mark());
+            }
+        }
+        if outcomes.iter().all(|o| o.fate != Fate::Open) {
             return;
         }
+        let captured: Vec<Option<u32>> =
+            outcomes.iter().map(|o| (o.fate != Fate::Open).then_some(o.periods)).collect();
         let new: Vec<ChaoticSet> =
-            chaos::sets(strobe, &sample, &lost, length as usize, &self.effort, cancel)
+            chaos::sets(strobe, &sample, &captured, length as usize, &self.effort, cancel)
                 .into_iter()
                 .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
-                .filter(|new| self.stays(strobe, new, length, cancel))
                 .collect();
-        if !new.is_empty() {
-            self.sets.extend(new);
-            self.rebuild(&strobe.pendulum);
+        if new.is_empty() {
+            return;
         }
+        let points: Vec<State> = new.iter().flat_map(|set| set.points.iter().copied()).collect();
+        if self.find_short_cycles(strobe, &points, cancel) {
+            // What was taken for chaos may end there.
+            return self.watch(strobe, endings, bound, cancel);
+        }
+        let symmetric = strobe.pendulum.is_mirror_symmetric();
+        for set in new {
+            if self.sets.iter().any(|old| old.same_as(&set))
+                || !self.stays(strobe, &set, length, cancel)
+            {
+                continue;
+            }
+            let image = set.mirrored();
+            if symmetric && !set.same_as(&image) {
+                self.sets.push(image);
+            }
+            self.sets.push(set);
+        }
+        self.rebuild(&strobe.pendulum);
     }
 
     /// Whether a set of few trajectories is more than a transient that happens to last.
@@ -64,8 +94,7 @@ impl Catalogue {
         if set.members >= proved && !holds {
             return true;
         }
-        let stride = set.points.len().div_ceil(proved).max(1);
-        let mut points: Vec<State> = set.points.iter().step_by(stride).copied().collect();
+        let mut points = spread(&set.points, proved);
         let (mut over, mut part) = (0, length);
         loop {
             let found = capture::outcomes(strobe, &self.traps, part, &points, cancel);

@@ -19,10 +19,8 @@ pub const NEVER: i32 = -1;
 
 /// Starts that a worker takes at a time.
 const TAKE: usize = 32;
-/// Open trajectories are compared with the regions of chaotic attractors in such lots.
+/// Open trajectories are given to chaotic attractors in such lots.
 const LOT: usize = 512;
-/// Stroboscopic points that tell whether a trajectory lives in a region.
-const LAST_POINTS: usize = 16;
 
 /// Labels and what goes with them, one entry a start.
 #[derive(Debug)]
@@ -107,30 +105,14 @@ impl Source for Worker<'_> {
 }
 
 impl Worker<'_> {
-    /// Gives the open trajectories of the lot to the regions that they live in.
+    /// Gives the open trajectories of the lot to the chaotic attractors that they stay on.
     fn sort_lot(&mut self) {
-        let shared = self.shared;
+        let Shared { catalogue, strobe, label, .. } = self.shared;
         let lot = std::mem::take(&mut self.lot);
-        if !shared.catalogue.has_chaos() {
-            self.open.extend(lot);
-            return;
-        }
-        let mut theta: Vec<f64> = lot.iter().map(|(_, s)| s[0]).collect();
-        let mut velocity: Vec<f64> = lot.iter().map(|(_, s)| s[1]).collect();
-        let mut turns = vec![0.0; lot.len()];
-        let mut tracks = vec![Vec::with_capacity(LAST_POINTS); lot.len()];
-        for _ in 0..LAST_POINTS {
-            // Lengths agree, so this cannot fail.
-            let _ = shared.strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
-            for (track, (a, b)) in tracks.iter_mut().zip(theta.iter().zip(&velocity)) {
-                track.push([*a, *b]);
-            }
-        }
-        for ((index, state), track) in lot.into_iter().zip(tracks) {
-            match shared.catalogue.region_of(&track) {
-                Some(attractor) => {
-                    shared.label[index].store(attractor as i16 + 1, Ordering::Relaxed);
-                }
+        let states: Vec<State> = lot.iter().map(|(_, state)| *state).collect();
+        for ((index, state), home) in lot.into_iter().zip(catalogue.homes(strobe, &states)) {
+            match home {
+                Some(attractor) => label[index].store(attractor as i16 + 1, Ordering::Relaxed),
                 None => self.open.push((index, state)),
             }
         }

@@ -35,8 +35,6 @@ const STRETCH: usize = 64;
 const AT_ONCE: u32 = 2;
 /// Periods within which a trap takes what lies in it.
 const TAKEN: u32 = 64;
-/// Last points of a trajectory that say in which region it lives.
-const LAST_POINTS: usize = 16;
 
 /// What to compute, and how well.
 #[derive(Clone, Copy, Debug)]
@@ -162,14 +160,14 @@ impl Run<'_> {
         catalogue.search(self.strobe, seeds, SEARCH_BOUND, self.control.flag());
         self.control.check()?;
         let (mut fate, mut periods) = self.follow(course, &catalogue, result.bound)?;
-        let mut home = self.region(course, &catalogue, fate)?;
+        let mut home = self.home(course, &catalogue, fate);
         if fate == Fate::Open && home.is_none() {
             // Something that the search has not met: it begins anew where the start has come to.
             let here: Vec<State> = course.states.last().copied().into_iter().collect();
             catalogue.search(self.strobe, &here, SEARCH_BOUND, self.control.flag());
             self.control.check()?;
             (fate, periods) = self.follow(course, &catalogue, result.bound)?;
-            home = self.region(course, &catalogue, fate)?;
+            home = self.home(course, &catalogue, fate);
         }
         if let (Fate::Open, Some(index)) = (fate, home) {
             let chaos = catalogue.attractors[index].clone();
@@ -229,24 +227,13 @@ impl Run<'_> {
         Ok((Fate::Open, bound as u32))
     }
 
-    /// The chaotic attractor in whose region an open course goes on.
-    fn region(
-        &self,
-        course: &Course,
-        catalogue: &Catalogue,
-        fate: Fate,
-    ) -> Result<Option<usize>, Error> {
-        let Some([theta, velocity]) = course.states.last().copied() else { return Ok(None) };
-        if fate != Fate::Open || !catalogue.has_chaos() {
-            return Ok(None);
+    /// The chaotic attractor that an open course stays on.
+    fn home(&self, course: &Course, catalogue: &Catalogue, fate: Fate) -> Option<usize> {
+        let last: Vec<State> = course.states.last().copied().into_iter().collect();
+        if fate != Fate::Open {
+            return None;
         }
-        let (mut theta, mut velocity) = ([theta], [velocity]);
-        let mut points = Vec::with_capacity(LAST_POINTS);
-        for _ in 0..LAST_POINTS {
-            self.strobe.advance(&mut theta, &mut velocity, &mut [0.0], 1)?;
-            points.push([theta[0], velocity[0]]);
-        }
-        Ok(catalogue.region_of(&points))
+        catalogue.homes(self.strobe, &last).into_iter().next().flatten()
     }
 
     /// How many of the `ends` of an ensemble are captured: by what is known, or by what a search finds

@@ -1,0 +1,70 @@
+//! Which part of the plane a set of stroboscopic points visits.
+
+use std::collections::HashSet;
+use std::f64::consts::TAU;
+
+use crate::integrate::State;
+use crate::model::Pendulum;
+
+/// Two regions that share more than this part of the smaller one's cells meet.
+const SHARED: f64 = 0.2;
+
+/// Cells of equal size that stroboscopic points lie in, angles taken modulo a turn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    cells: HashSet<[i32; 2]>,
+    /// Cells per radian and per unit of velocity.
+    scale: [f64; 2],
+    /// Cells around the circle.
+    side: i32,
+}
+
+impl Region {
+    /// No cell yet; `side` cells make a turn, and as many the velocity that gravity and drive give over a
+    /// radian.
+    #[must_use]
+    pub fn new(side: usize, pendulum: &Pendulum) -> Self {
+        let pull = pendulum.greatest_pull().sqrt();
+        let speed = if pull.is_finite() { pull.max(1.0) } else { 1.0 };
+        let scale = side as f64 / TAU;
+        Self { cells: HashSet::new(), scale: [scale, scale / speed], side: side as i32 }
+    }
+
+    fn cell(&self, [theta, velocity]: State) -> [i32; 2] {
+        let column = ((theta * self.scale[0] + 0.5).floor() as i32).rem_euclid(self.side);
+        // The conversion saturates where a motion has left all bounds.
+        [column, (velocity * self.scale[1] + 0.5).floor() as i32]
+    }
+
+    /// Adds the cell of a state.
+    pub fn mark(&mut self, state: State) {
+        self.cells.insert(self.cell(state));
+    }
+
+    /// Whether a state lies in a visited cell.
+    #[must_use]
+    pub fn contains(&self, state: State) -> bool {
+        self.cells.contains(&self.cell(state))
+    }
+
+    /// Adds the cells of another region of the same pendulum.
+    pub fn unite(&mut self, other: &Self) {
+        self.cells.extend(&other.cells);
+    }
+
+    /// Whether the two share a fifth of the smaller one's cells.
+    #[must_use]
+    pub fn meets(&self, other: &Self) -> bool {
+        let (small, large) =
+            if self.cells.len() < other.cells.len() { (self, other) } else { (other, self) };
+        let both = small.cells.iter().filter(|cell| large.cells.contains(*cell)).count();
+        both as f64 > SHARED * small.cells.len() as f64
+    }
+
+    /// The image under `(th, v) -> (-th, -v)`; cells are centred on 0, so that it is exact.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let image = |[a, b]: &[i32; 2]| [(-a).rem_euclid(self.side), b.saturating_neg()];
+        Self { cells: self.cells.iter().map(image).collect(), ..*self }
+    }
+}

@@ -1,0 +1,78 @@
+//! Stable orbits of few periods that no trajectory has come to: what a basin is too small for a few
+//! starts to hit.
+
+use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::find::{Catalogue, REACH};
+use crate::integrate::accuracy::distance;
+use crate::integrate::{State, Strobe};
+use crate::orbit::newton;
+
+/// Longest period, in forcing periods.
+const LONGEST: usize = 4;
+/// Starts along each side of the grid.
+const SIDE: usize = 64;
+/// Starts from which Newton's method is tried.
+const TRIED: usize = 16;
+/// The grid reaches so much further than the fastest point of what was seen.
+const MARGIN: f64 = 1.1;
+
+impl Catalogue {
+    /// Newton's method from where a grid of starts comes back nearest to itself, after 1 to 4 periods; whether
+    /// a stable orbit was found that was not known.
+    ///
+    /// The grid reaches as far as the velocities of `points`.
+    pub(super) fn find_short_cycles(
+        &mut self,
+        strobe: &Strobe,
+        points: &[State],
+        cancel: &AtomicBool,
+    ) -> bool {
+        let fastest = MARGIN * points.iter().fold(0.0_f64, |most, s| most.max(s[1].abs()));
+        let map = self.map(strobe);
+        let known = self.orbits.len();
+        for (start, n) in least_gaps(strobe, fastest) {
+            if cancel.load(Ordering::Relaxed) {
+                break;
+            }
+            let Some(orbit) = newton::find(&map, start, n, REACH) else { continue };
+            if self.attracts_anew(strobe, &orbit) {
+                self.admit(strobe, orbit, cancel);
+            }
+        }
+        let found = self.orbits.len() > known;
+        if found {
+            self.rebuild(&strobe.pendulum);
+        }
+        found
+    }
+}
+
+/// Starts of the grid whose gap after `n` periods is less than those of their neighbours, the least first, each
+/// with its `n`.
+fn least_gaps(strobe: &Strobe, fastest: f64) -> Vec<(State, usize)> {
+    let at = |k: usize| {
+        let part = |i: usize| (i as f64 + 0.5) / SIDE as f64 - 0.5;
+        [TAU * part(k % SIDE), 2.0 * fastest * part(k / SIDE)]
+    };
+    let starts: Vec<State> = (0..SIDE * SIDE).map(at).collect();
+    let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) = starts.iter().map(|s| (s[0], s[1])).unzip();
+    let mut turns = vec![0.0; starts.len()];
+    let mut least: Vec<(f64, State, usize)> = Vec::new();
+    for n in 1..=LONGEST {
+        // Lengths agree, so this cannot fail.
+        let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
+        let gap: Vec<f64> =
+            (0..starts.len()).map(|k| distance([theta[k], velocity[k]], starts[k])).collect();
+        let lowest = |k: &usize| {
+            let (i, j) = (k % SIDE, k / SIDE);
+            let rows = j.saturating_sub(1)..=(j + 1).min(SIDE - 1);
+            rows.flat_map(|b| [SIDE - 1, 0, 1].map(|a| b * SIDE + (i + a) % SIDE))
+                .all(|other| gap[*k] <= gap[other])
+        };
+        least.extend((0..starts.len()).filter(lowest).map(|k| (gap[k], starts[k], n)));
+    }
+    least.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+    least.into_iter().take(TRIED).map(|(_, start, n)| (start, n)).collect()
+}
