@@ -121,6 +121,7 @@ def complete(
         "steps_per_period": raw["steps_per_period"],
         "max_periods": raw["bound"],
         "chaos_bound": raw["chaos_bound"],
+        "searched_starts": raw["searched_starts"],
         "plane": raw["plane"],
         "layers": _LAYERS[raw["plane"]],
         "layer_periods": raw["layer_periods"],

@@ -121,6 +121,7 @@ class CellSearch:
             "reached_error": raw["reached_error"],
             "searched_again": raw["searched_again"],
             "undecided": float(raw["undecided"].mean()),
+            "chaos_periods": min((int(n) for n in raw["chaos_periods"] if n), default=0),
             "failed": float(raw["failed"].mean()),
             "seed": self.seed,
             "threads": self.workers or _core.default_threads(),

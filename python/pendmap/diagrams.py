@@ -14,7 +14,7 @@ from pendmap.cell_search import STARTS, CellSearch
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.model.units import VELOCITY
-from pendmap.planes import entries, undecided
+from pendmap.planes import CHAOS_PERIODS, chaos, entries, undecided
 from pendmap.regimes import kind_of
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
@@ -80,7 +80,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     xarray.Dataset
         Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
         ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
-        ``entry_branch``; branches over ``branch``: ``branch_kind``, ``branch_w``,
+        ``entry_branch``; ``undecided``, ``failed`` and ``chaos_periods`` over the parameter as of
+        that function; branches over ``branch``: ``branch_kind``, ``branch_w``,
         ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the entry that
         the sweep is on, -1 where that is none of them; its points there over ``loose``.
 
@@ -171,6 +172,7 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
         "down": (axis.name, raw["down"], {"comment": "entry, -1: none"}),
         "undecided": (axis.name, raw["undecided"]),
         "failed": (axis.name, raw["failed"]),
+        "chaos_periods": (axis.name, raw["chaos_periods"], {"comment": CHAOS_PERIODS}),
         "loose_sweep": (
             "loose",
             np.repeat([1, -1], [raw["up_value"].size, raw["down_value"].size]),
@@ -204,7 +206,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["Nothing attracts, as far as was seen."]
-    lines += undecided(a)
+    lines += [*chaos(a), *undecided(a)]
     lines.append(
         f"{counted(a['starts'], 'start')} a value; {counted(a['points'], 'point')}; error after 5 "
         f"periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "

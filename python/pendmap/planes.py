@@ -31,8 +31,10 @@ if TYPE_CHECKING:
     from pendmap.model.units import Units
     from pendmap.varied import Varied
 
-__all__ = ["entries", "parameter_map", "undecided"]
+__all__ = ["CHAOS_PERIODS", "chaos", "entries", "parameter_map", "undecided"]
 
+CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
+"""Comment of the variable ``chaos_periods``."""
 _LISTED = 10
 _FREQUENCIES = 81
 
@@ -57,9 +59,11 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     cell beginning also from what its neighbours on the coarser grid have; then, in six passes, from
     what cells at distances from eight to one have and it lacks. So branches that coexist are
     followed, and nothing depends on the order of the work. Trajectories run until a stable orbit,
-    found by Newton's method, has captured them. Those that nothing captures are watched for as long
-    again; where none of a set of them ends and their exponent is positive by four standard errors,
-    the set is chaos of its kind. Where friction holds rest, and could end chaos, from sixteen of
+    found by Newton's method, has captured them. Those that nothing captures are watched four times
+    as long again, in four windows. Windows that turn alike in regions that meet form a group; a
+    set of groups that no trajectory leaves, with an exponent that is positive by four standard
+    errors, is chaos of its kind, unless it holds a stable orbit of period 1 to 4 (Newton's method
+    from the least gaps of 64 by 64 starts) that captures it. Where friction holds rest, and could end chaos, from sixteen of
     its points none may end within 5000 periods. What is left is undecided.
 
     Parameters
@@ -97,7 +101,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         Over (row, column): ``regime`` (index into ``regime_kinds`` and ``regime_share``),
         ``attractors`` (how many coexist, mirror images counted), ``period`` and ``winding`` of the
         kind that most starts end on (0 for chaos), ``exponent`` (the largest of all attractors),
-        ``undecided`` and ``failed`` (shares of the starts), ``share`` over ``kind`` too. All
+        ``undecided`` and ``failed`` (shares of the starts), ``chaos_periods`` (periods within which
+        nothing captured the chaos of a cell, 0 without), ``share`` over ``kind`` too. All
         attractors over ``entry``: ``entry_cell``, ``entry_kind``, ``entry_n``, ``entry_w``,
         ``entry_theta``, ``entry_velocity``, ``entry_exponent``, ``entry_exponent_stderr``,
         ``entry_share``. An attractor that only a neighbour led to has the share 0.
@@ -198,6 +203,11 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
         ),
         "undecided": (dims, raw["undecided"].reshape(shape)),
         "failed": (dims, raw["failed"].reshape(shape)),
+        "chaos_periods": (
+            dims,
+            raw["chaos_periods"].reshape(shape),
+            {"comment": CHAOS_PERIODS},
+        ),
         "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
         **entries(raw, which, units),
     }
@@ -259,6 +269,17 @@ def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[s
     }
 
 
+def chaos(attributes: Mapping[str, Any]) -> list[str]:
+    """Return for how long chaos was watched, where there is any."""
+    periods = attributes["chaos_periods"]
+    if not periods:
+        return []
+    return [
+        f"Chaos: nothing captured it within {counted(periods, 'period')} (the least of all; "
+        "chaos_periods holds each); a longer transient looks the same."
+    ]
+
+
 def undecided(attributes: Mapping[str, Any]) -> list[str]:
     """Return what a summary says of starts that end nowhere."""
     return [
@@ -278,7 +299,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
-    lines += undecided(a)
+    lines += [*chaos(a), *undecided(a)]
     lines.append(
         f"{counted(a['starts'], 'start')} a cell; {counted(a['searched_again'], 'cell')} searched "
         f"again for what a neighbour has; error after 5 periods {a['reached_error']:.2g}; "

@@ -257,7 +257,7 @@ fn describe(
 }
 
 /// `most` of the points at equal distances in their list, or all.
-pub(super) fn spread(points: &[State], most: usize) -> Vec<State> {
+pub(crate) fn spread(points: &[State], most: usize) -> Vec<State> {
     let count = most.min(points.len());
     (0..count).map(|k| points[k * points.len() / count]).collect()
 }

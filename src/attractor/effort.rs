@@ -59,10 +59,10 @@ impl Effort {
     /// Of one among thousands.
     pub const BRISK: Self = Self {
         precise: false,
-        longest_cycle: 16,
+        longest_cycle: 32,
         first_round: 24,
         tries: 6,
-        watched: 16,
+        watched: 24,
         watch: 4,
         proved: 16,
         cells: 24,

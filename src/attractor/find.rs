@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::capture::{self, Fate, Traps};
+use super::capture::{self, Fate, Outcome, Traps};
 use super::catalogue::{Attractor, arrange};
 use super::chaos::ChaoticSet;
 use super::effort::Effort;
@@ -172,14 +172,19 @@ impl Catalogue {
             capture::outcomes(strobe, &self.traps, length, &alive, cancel).unwrap_or_default();
         let free = endings.iter_mut().filter(|e| matches!(e, Ending::Open(_)));
         for (ending, outcome) in free.zip(outcomes) {
-            *ending = match outcome.fate {
-                Fate::Open => Ending::Open(outcome.state),
-                Fate::Captured(attractor) => {
-                    self.longest_settle = self.longest_settle.max(elapsed + outcome.periods);
-                    Ending::Captured(self.attractors[attractor].mark())
-                }
-                Fate::Failed => Ending::Failed,
-            };
+            if matches!(outcome.fate, Fate::Captured(_)) {
+                self.longest_settle = self.longest_settle.max(elapsed + outcome.periods);
+            }
+            *ending = self.ending(&outcome);
+        }
+    }
+
+    /// How a start has ended by this outcome.
+    pub(super) fn ending(&self, outcome: &Outcome) -> Ending {
+        match outcome.fate {
+            Fate::Open => Ending::Open(outcome.state),
+            Fate::Captured(attractor) => Ending::Captured(self.attractors[attractor].mark()),
+            Fate::Failed => Ending::Failed,
         }
     }
 
@@ -291,7 +296,7 @@ fn attracts(strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
 }
 
 /// The states that nothing has captured.
-fn open(endings: &[Ending]) -> Vec<State> {
+pub(super) fn open(endings: &[Ending]) -> Vec<State> {
     let state = |ending: &Ending| match ending {
         Ending::Open(state) => Some(*state),
         _ => None,

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::catalogue::Attractor;
-use super::find::{Catalogue, REACH, SAME};
+use super::find::{Catalogue, Ending, REACH, SAME, open};
 use super::returns::{nearest_return, tracks};
 use super::walk::{Cut, Window, walk};
 use crate::integrate::{State, Strobe};
@@ -48,6 +48,13 @@ impl Catalogue {
         let tracks = tracks(strobe, states, longest);
         let homes = self.homes(strobe, states).into_iter();
         tracks.iter().zip(homes).map(|(track, home)| place(track).or(home)).collect()
+    }
+
+    /// Whether all starts are open and stay on chaotic attractors.
+    #[must_use]
+    pub fn holds_all(&self, strobe: &Strobe, endings: &[Ending]) -> bool {
+        let open = open(endings);
+        open.len() == endings.len() && self.homes(strobe, &open).iter().all(Option::is_some)
     }
 
     /// The chaotic attractors that open trajectories stay on, by their next stroboscopic points and the way they

@@ -18,7 +18,7 @@ const LONG: u32 = 5000;
 impl Catalogue {
     /// Decides what the trajectories that nothing captured are.
     ///
-    /// Those that a trap takes while they are watched end there.
+    /// Those that are watched end where that takes them.
     pub(super) fn watch(
         &mut self,
         strobe: &Strobe,
@@ -43,9 +43,7 @@ impl Catalogue {
             return;
         };
         for (place, outcome) in places.into_iter().zip(&outcomes) {
-            if let Fate::Captured(attractor) = outcome.fate {
-                endings[place] = Ending::Captured(self.attractors[attractor].mark());
-            }
+            endings[place] = self.ending(outcome);
         }
         if outcomes.iter().all(|o| o.fate != Fate::Open) {
             return;

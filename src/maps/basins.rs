@@ -84,6 +84,9 @@ pub struct BasinMap {
     pub plane: Plane,
     /// Periods of the finite-time layers.
     pub layer_periods: u32,
+    /// Starts from which attractors were searched first; where one chaotic attractor takes everything, all of them
+    /// end there.
+    pub searched: usize,
     /// Share of the starts of each attractor.
     pub fractions: Vec<f64>,
     /// Starts whose label changes nearby; `None` for a list, and where it was not asked for.
@@ -161,12 +164,12 @@ pub fn basins(
     let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
     let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
     let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
-    catalogue.search(&strobe, &seeds, SEARCH_BOUND, control.flag());
+    let endings = catalogue.endings(&strobe, &seeds, SEARCH_BOUND, control.flag());
     control.check()?;
 
     let plane = if !pendulum.is_dissipative() {
         Plane::Conservative
-    } else if catalogue.only_chaos().is_some() {
+    } else if catalogue.only_chaos().is_some() && catalogue.holds_all(&strobe, &endings) {
         Plane::OnlyChaos
     } else {
         Plane::Basins
@@ -177,6 +180,7 @@ pub fn basins(
         layers: None,
         plane,
         layer_periods: 0,
+        searched: seeds.len(),
         fractions: Vec::new(),
         uncertainty: None,
         texture: Texture::plain(),

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
+use crate::attractor::chaos::spread;
 use crate::attractor::rest::balances;
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
 use crate::integrate::accuracy::distance;
@@ -24,6 +25,8 @@ const DECAY: f64 = 40.0;
 const BOUNDS: [f64; 2] = [64.0, 1000.0];
 /// Hints that a search takes at the most.
 const MOST_HINTS: usize = 16;
+/// Points of an attractor that does not close: where it has changed a little one alone may lie beside it.
+pub const HINTED: usize = 4;
 
 /// An attractor of a cell.
 #[derive(Clone, Debug)]
@@ -43,12 +46,16 @@ pub struct Cell {
     pub open: f64,
     /// Share of the starts that left the range of numbers.
     pub failed: f64,
+    /// Of chaos: periods within which nothing captured it; 0 without.
+    pub watched: u32,
 }
 
-/// A point of an attractor of another cell; its period, none where it does not close.
-#[derive(Clone, Copy, Debug)]
+/// An attractor of another cell: one point of it, several where it does not close; its kind, period and
+/// turns.
+#[derive(Clone, Debug)]
 pub struct Hint {
-    point: State,
+    points: Vec<State>,
+    kind: Kind,
     n: Option<usize>,
     w: i64,
 }
@@ -84,19 +91,21 @@ impl Search {
         // At rest nothing moves it away, however unstable: such points are no starts.
         let rests = balances(&strobe.pendulum).map(|theta| ([theta, 0.0], 1));
         catalogue.take_over(strobe, &rests, cancel);
-        let (cycles, mut further): (Vec<Hint>, Vec<Hint>) =
-            hints.iter().partition(|hint| hint.n.is_some());
         let cycles: Vec<(State, usize)> =
-            cycles.iter().filter_map(|hint| Some((hint.point, hint.n?))).collect();
-        let lost = catalogue.take_over(strobe, &cycles, cancel);
-        further.extend(lost.into_iter().map(|point| Hint { point, n: None, w: 0 }));
+            hints.iter().filter_map(|hint| Some((hint.points[0], hint.n?))).collect();
+        let mut further = catalogue.take_over(strobe, &cycles, cancel);
+        further.extend(hints.iter().filter(|hint| hint.n.is_none()).flat_map(|h| &h.points));
         let first = number.wrapping_mul(self.each);
         let own = |k: usize| self.starts[(first + k) % self.starts.len()];
         let mut starts: Vec<State> = (0..self.each).map(own).collect();
-        starts.extend(further.iter().map(|hint| hint.point));
+        starts.extend(further);
         let bound = self.bound.unwrap_or_else(|| bound(&strobe.pendulum));
         let endings = catalogue.endings(strobe, &starts, bound, cancel);
-        self.told(strobe, &catalogue, &endings)
+        let watched = bound * (1 + Effort::BRISK.watch);
+        Cell {
+            watched: if catalogue.has_chaos() { watched } else { 0 },
+            ..self.told(strobe, &catalogue, &endings)
+        }
     }
 
     /// Those of `hints` that promise what `cell` does not have: a stable orbit that Newton's method finds
@@ -120,7 +129,7 @@ impl Search {
         let map = PoincareMap::of_steps(strobe);
         let promises = |hint: &Hint| {
             let Some(n) = hint.n else { return beside };
-            let orbit = newton::find(&map, hint.point, n, REACH).filter(PeriodicOrbit::is_stable);
+            let orbit = newton::find(&map, hint.points[0], n, REACH).filter(PeriodicOrbit::is_stable);
             let Some(orbit) = orbit else { return beside && !cell.has(n, hint.w) };
             let has = |orbit: &PeriodicOrbit| {
                 let own = |p: &State| orbit.contains(*p, SAME);
@@ -171,7 +180,7 @@ impl Search {
                 Found { attractor, share: share(*count) }
             })
             .collect();
-        Cell { found, open: share(undecided), failed: share(failed) }
+        Cell { found, open: share(undecided), failed: share(failed), watched: 0 }
     }
 }
 
@@ -191,6 +200,13 @@ impl Cell {
         hints
     }
 
+    /// Whether it has an attractor that `other` has not.
+    #[must_use]
+    pub fn has_more_than(&self, other: &Self, symmetric: bool) -> bool {
+        let lacks = |hint: &Hint| !other.found.iter().any(|f| hint.is_like(&f.attractor, symmetric));
+        self.found.iter().filter_map(|f| Hint::of(&f.attractor)).any(|hint| lacks(&hint))
+    }
+
     /// Whether it has an orbit of that period and winding, in either sense.
     fn has(&self, n: usize, w: i64) -> bool {
         let alike = |a: &Attractor| a.n == Some(n) && a.w.map(i64::abs) == Some(w.abs());
@@ -204,19 +220,22 @@ impl Hint {
         if matches!(attractor.kind, Kind::Rest | Kind::InvertedRest) {
             return None;
         }
-        let point = *attractor.points.first()?;
-        Some(Self { point, n: attractor.n, w: attractor.w.unwrap_or(attractor.sense) })
+        let most = if attractor.n.is_some() { 1 } else { HINTED };
+        let points = spread(&attractor.points, most);
+        let (kind, w) = (attractor.kind, attractor.w.unwrap_or(attractor.sense));
+        (!points.is_empty()).then_some(Self { points, kind, n: attractor.n, w })
     }
 
     /// Whether an attractor is like the one it comes from, or like its mirror image where there is
     /// one.
     fn is_like(&self, attractor: &Attractor, symmetric: bool) -> bool {
         let w = attractor.w.unwrap_or(attractor.sense);
-        let image = [-self.point[0], -self.point[1]];
+        let image = [-self.points[0][0], -self.points[0][1]];
         let near = |point: State| attractor.points.iter().any(|p| distance(*p, point) < LIKE);
         let either =
             |sign: i64, point: State| w == sign * self.w && (self.n.is_none() || near(point));
-        self.n == attractor.n && (either(1, self.point) || (symmetric && either(-1, image)))
+        (self.kind, self.n) == (attractor.kind, attractor.n)
+            && (either(1, self.points[0]) || (symmetric && either(-1, image)))
     }
 }
 

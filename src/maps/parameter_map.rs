@@ -20,7 +20,9 @@ use crate::model::Pendulum;
 const COARSEST: usize = 8;
 /// Distances over which cells exchange their attractors, pass after pass: what one cell alone has found
 /// comes to all that can have it.
-const EXCHANGES: [usize; 6] = [8, 4, 2, 1, 1, 1];
+const EXCHANGES: [usize; 3] = [8, 4, 2];
+/// Passes between next neighbours at the most; they end where no cell has gained an attractor.
+const MOST_PASSES: usize = 64;
 /// Starts of that measurement.
 const PROBES: usize = 100;
 
@@ -177,14 +179,19 @@ pub fn parameter_map(
     }
     let mut cells: Vec<Cell> = cells.into_iter().flatten().collect();
     let mut searched_again = 0;
-    for stride in EXCHANGES {
+    let mut gained = vec![true; count];
+    for stride in EXCHANGES.into_iter().chain([1; MOST_PASSES]) {
         let known = &cells;
+        let gains = &gained;
         let again: Vec<(usize, Cell)> = pool.install(|| {
             let one = |cell: usize| {
                 control.check()?;
                 let strobe = strobe(cell);
                 let symmetric = strobe.pendulum.is_mirror_symmetric();
                 let around = plane.neighbours(cell, stride, false);
+                if !around.iter().any(|other| gains[*other]) {
+                    return Ok(None);
+                }
                 let theirs = Cell::hints(around.iter().map(|c| &known[*c]), symmetric);
                 let lacking = search.promising(&strobe, &known[cell], theirs, stride == 1);
                 if lacking.is_empty() {
@@ -200,8 +207,15 @@ pub fn parameter_map(
                 .collect::<Result<_, Error>>()
         })?;
         searched_again += again.len();
+        // The first pass between next neighbours looks at all of them.
+        gained.fill(stride > 1);
         for (cell, found) in again {
+            let symmetric = plane.pendulum(cell).is_mirror_symmetric();
+            gained[cell] |= found.has_more_than(&cells[cell], symmetric);
             cells[cell] = found;
+        }
+        if !gained.contains(&true) {
+            break;
         }
     }
     control.check()?;

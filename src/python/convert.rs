@@ -27,6 +27,7 @@ pub fn basin_map<'py>(py: Python<'py>, map: BasinMap) -> PyResult<Bound<'py, PyD
     };
     dict.set_item("plane", plane)?;
     dict.set_item("chaos_bound", CHAOS_BOUND)?;
+    dict.set_item("searched_starts", map.searched)?;
     dict.set_item("layer_periods", map.layer_periods)?;
     dict.set_item("bound", map.bound)?;
     dict.set_item("steps_per_period", map.steps)?;

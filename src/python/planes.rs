@@ -8,7 +8,7 @@ use super::watch::watched;
 use super::{Parameters, pendulum};
 use crate::integrate::State;
 use crate::maps::bifurcation as diagram;
-use crate::maps::cell::{Cell, Found};
+use crate::maps::cell::{Cell, Found, HINTED};
 use crate::maps::parameter_map::{Range, Request, parameter_map as search};
 
 /// `(place in the list of parameters, values)`.
@@ -46,7 +46,7 @@ pub fn parameter_map<'py>(
         each,
         tol,
         bound,
-        kept: 1,
+        kept: HINTED,
         threads,
     };
     let map = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
@@ -147,5 +147,7 @@ fn attractors_of<'py>(py: Python<'py>, cells: &[Cell]) -> PyResult<Bound<'py, Py
     let failed: Vec<f64> = cells.iter().map(|cell| cell.failed).collect();
     dict.set_item("undecided", undecided.into_pyarray(py))?;
     dict.set_item("failed", failed.into_pyarray(py))?;
+    let watched: Vec<u32> = cells.iter().map(|cell| cell.watched).collect();
+    dict.set_item("chaos_periods", watched.into_pyarray(py))?;
     Ok(dict)
 }

@@ -97,6 +97,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "neighbours_agree",
         "neighbours_chance",
         "chaos_bound",
+        "searched_starts",
         "plane",
         "layer_periods",
         "steps_per_period",
