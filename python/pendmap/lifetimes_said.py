@@ -33,9 +33,14 @@ def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     else:
         lines.append(_why_not(dataset, exponent))
     if a["chaotic_share"] and not a["persistent"]:
+        names = [
+            str(name)
+            for name, kind in zip(found["attractor"].values, found["kind"].values, strict=True)
+            if str(kind).endswith("chaos")
+        ]
         lines.append(
-            f"{100 * a['chaotic_share']:.3g} % of the starts end on a chaotic attractor, and are "
-            "left out: there chaos persists."
+            f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
+            f"left out: nothing captured chaos there within {a['chaos_bound']} periods."
         )
     if a["censored"] and found.attrs["plane"] == "basins":
         lines.append(
@@ -84,6 +89,8 @@ def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
 
 def _why_not(dataset: xr.Dataset, exponent: str) -> str:
     a = dataset.attrs
+    if not a["captured"] and a["chaotic_share"]:
+        return "No start ends on anything that repeats: no lifetime."
     if not a["captured"]:
         return (
             "No start was captured, and nothing says that chaos persists: undecided within "

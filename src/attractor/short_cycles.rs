@@ -7,14 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::find::{Catalogue, REACH};
 use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
-use crate::orbit::newton;
+use crate::orbit::newton::{self, PeriodicOrbit};
 
 /// Longest period, in forcing periods.
 const LONGEST: usize = 4;
 /// Starts along each side of the grid.
 const SIDE: usize = 64;
-/// Starts from which Newton's method is tried.
+/// Starts from which Newton's method is tried, for each period.
 const TRIED: usize = 16;
+/// Starts nearer to an orbit that was found than so many cells lead to that again.
+const SAME_CELL: f64 = 2.0;
 /// The grid reaches so much further than the fastest point of what was seen.
 const MARGIN: f64 = 1.1;
 
@@ -32,13 +34,23 @@ impl Catalogue {
         let fastest = MARGIN * points.iter().fold(0.0_f64, |most, s| most.max(s[1].abs()));
         let map = self.map(strobe);
         let known = self.orbits.len();
-        for (start, n) in least_gaps(strobe, fastest) {
-            if cancel.load(Ordering::Relaxed) {
-                break;
-            }
-            let Some(orbit) = newton::find(&map, start, n, REACH) else { continue };
-            if self.attracts_anew(strobe, &orbit) {
-                self.admit(strobe, orbit, cancel);
+        let near = SAME_CELL * TAU / SIDE as f64;
+        let mut met: Vec<PeriodicOrbit> = Vec::new();
+        for (starts, n) in least_gaps(strobe, fastest).iter().zip(1..) {
+            let mut tried = 0;
+            for start in starts {
+                if tried == TRIED || cancel.load(Ordering::Relaxed) {
+                    break;
+                }
+                if met.iter().any(|orbit| orbit.contains(*start, near)) {
+                    continue;
+                }
+                tried += 1;
+                let Some(orbit) = newton::find(&map, *start, n, REACH) else { continue };
+                if self.attracts_anew(strobe, &orbit) {
+                    self.admit(strobe, orbit.clone(), cancel);
+                }
+                met.push(orbit);
             }
         }
         let found = self.orbits.len() > known;
@@ -49,9 +61,9 @@ impl Catalogue {
     }
 }
 
-/// Starts of the grid whose gap after `n` periods is less than those of their neighbours, the least first, each
-/// with its `n`.
-fn least_gaps(strobe: &Strobe, fastest: f64) -> Vec<(State, usize)> {
+/// Starts of the grid whose gap after 1, 2, ... periods is less than those of their neighbours, the least
+/// first.
+fn least_gaps(strobe: &Strobe, fastest: f64) -> [Vec<State>; LONGEST] {
     let at = |k: usize| {
         let part = |i: usize| (i as f64 + 0.5) / SIDE as f64 - 0.5;
         [TAU * part(k % SIDE), 2.0 * fastest * part(k / SIDE)]
@@ -59,8 +71,7 @@ fn least_gaps(strobe: &Strobe, fastest: f64) -> Vec<(State, usize)> {
     let starts: Vec<State> = (0..SIDE * SIDE).map(at).collect();
     let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) = starts.iter().map(|s| (s[0], s[1])).unzip();
     let mut turns = vec![0.0; starts.len()];
-    let mut least: Vec<(f64, State, usize)> = Vec::new();
-    for n in 1..=LONGEST {
+    std::array::from_fn(|_| {
         // Lengths agree, so this cannot fail.
         let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
         let gap: Vec<f64> =
@@ -71,8 +82,8 @@ fn least_gaps(strobe: &Strobe, fastest: f64) -> Vec<(State, usize)> {
             rows.flat_map(|b| [SIDE - 1, 0, 1].map(|a| b * SIDE + (i + a) % SIDE))
                 .all(|other| gap[*k] <= gap[other])
         };
-        least.extend((0..starts.len()).filter(lowest).map(|k| (gap[k], starts[k], n)));
-    }
-    least.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
-    least.into_iter().take(TRIED).map(|(_, start, n)| (start, n)).collect()
+        let mut least: Vec<usize> = (0..starts.len()).filter(lowest).collect();
+        least.sort_by(|a, b| gap[*a].total_cmp(&gap[*b]));
+        least.into_iter().map(|k| starts[k]).collect()
+    })
 }

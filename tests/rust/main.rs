@@ -20,6 +20,7 @@
 mod attractors;
 mod bifurcations;
 mod chaos;
+mod chaotic_sets;
 mod corners;
 mod edges;
 mod effects;
