@@ -170,8 +170,7 @@ impl Groups {
         used.dedup();
         for group in used {
             let Some(reached) = self.reached(group) else { continue };
-            let back =
-                |k: &usize| self.reached(*k).is_some_and(|others| others.contains(&group));
+            let back = |k: &usize| self.reached(*k).is_some_and(|others| others.contains(&group));
             if !reached.is_empty() && reached.iter().all(back) && !classes.contains(&reached) {
                 classes.push(reached);
             }

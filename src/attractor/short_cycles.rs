@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::find::{Catalogue, REACH};
 use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
-use crate::orbit::newton::{self, PeriodicOrbit};
+use crate::orbit::newton;
 
 /// Longest period, in forcing periods.
 const LONGEST: usize = 4;
@@ -15,8 +15,8 @@ const LONGEST: usize = 4;
 const SIDE: usize = 64;
 /// Starts from which Newton's method is tried, for each period.
 const TRIED: usize = 16;
-/// Starts nearer to an orbit that was found than so many cells lead to that again.
-const SAME_CELL: f64 = 2.0;
+/// Orbits that are looked for from one start.
+const BESIDE: usize = 3;
 /// The grid reaches so much further than the fastest point of what was seen.
 const MARGIN: f64 = 1.1;
 
@@ -34,23 +34,20 @@ impl Catalogue {
         let fastest = MARGIN * points.iter().fold(0.0_f64, |most, s| most.max(s[1].abs()));
         let map = self.map(strobe);
         let known = self.orbits.len();
-        let near = SAME_CELL * TAU / SIDE as f64;
-        let mut met: Vec<PeriodicOrbit> = Vec::new();
+        // Repelled by all that was met: a stable orbit lies next to the one that it was born with.
+        let mut met: Vec<State> = Vec::new();
         for (starts, n) in least_gaps(strobe, fastest).iter().zip(1..) {
-            let mut tried = 0;
-            for start in starts {
-                if tried == TRIED || cancel.load(Ordering::Relaxed) {
-                    break;
+            for start in starts.iter().take(TRIED) {
+                for _ in 0..BESIDE {
+                    let found = newton::find_other(&map, *start, n, REACH, &met);
+                    let Some(orbit) = found.filter(|_| !cancel.load(Ordering::Relaxed)) else {
+                        break;
+                    };
+                    met.extend(&orbit.points);
+                    if self.attracts_anew(strobe, &orbit) {
+                        self.admit(strobe, orbit, cancel);
+                    }
                 }
-                if met.iter().any(|orbit| orbit.contains(*start, near)) {
-                    continue;
-                }
-                tried += 1;
-                let Some(orbit) = newton::find(&map, *start, n, REACH) else { continue };
-                if self.attracts_anew(strobe, &orbit) {
-                    self.admit(strobe, orbit.clone(), cancel);
-                }
-                met.push(orbit);
             }
         }
         let found = self.orbits.len() > known;
@@ -69,8 +66,10 @@ fn least_gaps(strobe: &Strobe, fastest: f64) -> [Vec<State>; LONGEST] {
         [TAU * part(k % SIDE), 2.0 * fastest * part(k / SIDE)]
     };
     let starts: Vec<State> = (0..SIDE * SIDE).map(at).collect();
-    let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) = starts.iter().map(|s| (s[0], s[1])).unzip();
+    let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) =
+        starts.iter().map(|s| (s[0], s[1])).unzip();
     let mut turns = vec![0.0; starts.len()];
+    let symmetric = strobe.pendulum.is_mirror_symmetric();
     std::array::from_fn(|_| {
         // Lengths agree, so this cannot fail.
         let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
@@ -82,7 +81,9 @@ fn least_gaps(strobe: &Strobe, fastest: f64) -> [Vec<State>; LONGEST] {
             rows.flat_map(|b| [SIDE - 1, 0, 1].map(|a| b * SIDE + (i + a) % SIDE))
                 .all(|other| gap[*k] <= gap[other])
         };
-        let mut least: Vec<usize> = (0..starts.len()).filter(lowest).collect();
+        // Of mirror images one will do.
+        let count = if symmetric { starts.len() / 2 } else { starts.len() };
+        let mut least: Vec<usize> = (0..count).filter(lowest).collect();
         least.sort_by(|a, b| gap[*a].total_cmp(&gap[*b]));
         least.into_iter().map(|k| starts[k]).collect()
     })

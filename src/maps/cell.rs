@@ -129,7 +129,8 @@ impl Search {
         let map = PoincareMap::of_steps(strobe);
         let promises = |hint: &Hint| {
             let Some(n) = hint.n else { return beside };
-            let orbit = newton::find(&map, hint.points[0], n, REACH).filter(PeriodicOrbit::is_stable);
+            let orbit =
+                newton::find(&map, hint.points[0], n, REACH).filter(PeriodicOrbit::is_stable);
             let Some(orbit) = orbit else { return beside && !cell.has(n, hint.w) };
             let has = |orbit: &PeriodicOrbit| {
                 let own = |p: &State| orbit.contains(*p, SAME);
@@ -203,7 +204,8 @@ impl Cell {
     /// Whether it has an attractor that `other` has not.
     #[must_use]
     pub fn has_more_than(&self, other: &Self, symmetric: bool) -> bool {
-        let lacks = |hint: &Hint| !other.found.iter().any(|f| hint.is_like(&f.attractor, symmetric));
+        let lacks =
+            |hint: &Hint| !other.found.iter().any(|f| hint.is_like(&f.attractor, symmetric));
         self.found.iter().filter_map(|f| Hint::of(&f.attractor)).any(|hint| lacks(&hint))
     }
 

@@ -42,7 +42,7 @@ fn what_leaves_its_region_is_no_set() {
     let strobe = Strobe::new(&runaway(), 60, path());
     let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
     assert!(
-        sets(&strobe, &states, &[false; 6], 200, &Effort::THOROUGH, &AtomicBool::new(false))
+        sets(&strobe, &states, &[None; 6], 200, &Effort::THOROUGH, &AtomicBool::new(false))
             .is_empty()
     );
 }

@@ -5,12 +5,12 @@ use std::f64::consts::{PI, TAU};
 
 use pendmap::attractor::{Attractor, Kind};
 use pendmap::integrate::State;
+use pendmap::integrate::Strobe;
 use pendmap::maps::basins::{BasinMap, Plane};
 use pendmap::maps::bifurcation::{Request, bifurcation};
 use pendmap::maps::cell::{Cell, Search};
 use pendmap::maps::control::Control;
 use pendmap::maps::parameter_map::Range;
-use pendmap::integrate::Strobe;
 
 use crate::support::{basins_on_plane, driven, path, plane, spread};
 
@@ -128,7 +128,8 @@ fn sets_at_random_points_do_what_their_kind_says() {
 }
 
 fn searched(own: &Own) -> Cell {
-    let search = Search { starts: plane(1000).sampled_states(9, 1), each: 9, bound: None, kept: 64 };
+    let search =
+        Search { starts: plane(1000).sampled_states(9, 1), each: 9, bound: None, kept: 64 };
     let strobe = Strobe::new(&driven(0.1, own.p, own.omega), 40, path());
     search.cell(0, &strobe, &[], Control::default().flag())
 }
@@ -170,10 +171,10 @@ fn a_stable_orbit_of_few_periods_is_no_part_of_chaos() {
     let cell = searched(&own);
     assert!(!cell.found.iter().any(|f| f.attractor.kind.is_chaotic()));
     let rotations: Vec<&Attractor> = cell.found.iter().map(|f| &f.attractor).collect();
-    assert_eq!(rotations.iter().map(|a| (a.n, a.w)).collect::<Vec<_>>(), [
-        (Some(2), Some(-1)),
-        (Some(2), Some(1)),
-    ]);
+    assert_eq!(
+        rotations.iter().map(|a| (a.n, a.w)).collect::<Vec<_>>(),
+        [(Some(2), Some(-1)), (Some(2), Some(1)),]
+    );
     for rotation in rotations {
         let mut point = rotation.points[0];
         let turned = TAU * rotation.w.unwrap_or(0) as f64;
