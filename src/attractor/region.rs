@@ -1,6 +1,6 @@
 //! Which part of the plane a set of stroboscopic points visits.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use crate::integrate::State;
@@ -12,7 +12,7 @@ const SHARED: f64 = 0.2;
 /// Cells of equal size that stroboscopic points lie in, angles taken modulo a turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    cells: HashSet<[i32; 2]>,
+    cells: BTreeSet<[i32; 2]>,
     /// Cells per radian and per unit of velocity.
     scale: [f64; 2],
     /// Cells around the circle.
@@ -27,7 +27,7 @@ impl Region {
         let pull = pendulum.greatest_pull().sqrt();
         let speed = if pull.is_finite() { pull.max(1.0) } else { 1.0 };
         let scale = side as f64 / TAU;
-        Self { cells: HashSet::new(), scale: [scale, scale / speed], side: side as i32 }
+        Self { cells: BTreeSet::new(), scale: [scale, scale / speed], side: side as i32 }
     }
 
     fn cell(&self, [theta, velocity]: State) -> [i32; 2] {

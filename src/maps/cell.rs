@@ -178,6 +178,7 @@ impl Search {
             .map(|(attractor, count)| {
                 let mut attractor = attractor.clone();
                 attractor.points.truncate(attractor.n.unwrap_or(self.kept));
+                attractor.region = None;
                 Found { attractor, share: share(*count) }
             })
             .collect();

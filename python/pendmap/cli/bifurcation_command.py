@@ -61,7 +61,16 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         {"kind": str(kinds[kind]), "w": int(w), "first": float(first), "last": float(last)}
         for kind, w, first, last in rows
     ]
-    names = ("points", "starts", "undecided", "failed", "chaos_periods", "seconds", "threads", "reached_error")
+    names = (
+        "points",
+        "starts",
+        "undecided",
+        "failed",
+        "chaos_periods",
+        "seconds",
+        "threads",
+        "reached_error",
+    )
     return {
         "units": a["units"],
         "varied": a["varied"],

@@ -53,7 +53,16 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
             dataset["regime_kinds"].values, dataset["regime_share"].values, strict=True
         )
     ]
-    names = ("cells", "starts", "undecided", "failed", "chaos_periods", "seconds", "threads", "reached_error")
+    names = (
+        "cells",
+        "starts",
+        "undecided",
+        "failed",
+        "chaos_periods",
+        "seconds",
+        "threads",
+        "reached_error",
+    )
     return {
         "units": a["units"],
         "columns": a["columns"],
