@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import subprocess
@@ -46,23 +47,26 @@ class Run(Protocol):
         ...
 
 
+def run_command(
+    folder: Path, *words: object, env: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run `pendmap` with these words in a folder, without a display."""
+    clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
+    return subprocess.run(
+        [str(COMMAND), *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        cwd=folder,
+        env=clean | (env or {}),
+    )
+
+
 @pytest.fixture
 def pendmap_command(tmp_path: Path) -> Run:
     """Run `pendmap` with these words in `tmp_path`, without a display."""
-
-    def run(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-        clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
-        return subprocess.run(
-            [str(COMMAND), *map(str, words)],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=120,
-            cwd=tmp_path,
-            env=clean | (env or {}),
-        )
-
-    return run
+    return functools.partial(run_command, tmp_path)
 
 
 @pytest.fixture
