@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pytest
 from hypothesis import HealthCheck, settings
 
+import hidden
 from pendmap import cli
 
 if TYPE_CHECKING:
@@ -28,6 +29,16 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("steady")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_diagnoses(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of `hidden.diagnosed`: of this run alone, and of all its processes."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "diagnoses"
+    folder.mkdir(exist_ok=True)
+    hidden.KNOWN[:] = [folder]
+    return folder
 
 
 @pytest.fixture(scope="session")
