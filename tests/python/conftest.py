@@ -68,7 +68,7 @@ def run_command(
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=600,  # s: what hangs; what else the machine does may take minutes
         cwd=folder,
         env=clean | (env or {}),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PATIENCE = 60.0
+"""So much processor time, s, a command may take: what else the machine does is not in it."""
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -56,10 +59,16 @@ def needed(place: int, lines: list[list[str]]) -> list[int]:
     return sorted({k for k in map(last.get, names) if k is not None})
 
 
+def children_seconds() -> float:
+    """Processor time, s, of all processes that ended."""
+    spent = os.times()
+    return spent.children_user + spent.children_system
+
+
 @pytest.fixture(scope="module")
-def ran() -> dict[Path, tuple[Path, set[int]]]:
+def ran(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, tuple[Path, set[int]]]:
     """The folder of each page in this process, and the places of the commands that ran in it."""
-    return {}
+    return {page: (tmp_path_factory.mktemp(page.stem), set()) for page in PAGES}
 
 
 @pytest.mark.parametrize(
@@ -70,21 +79,18 @@ def ran() -> dict[Path, tuple[Path, set[int]]]:
         for k, line in enumerate(lines)
     ],
 )
-def test_every_command_runs(
-    page: Path,
-    place: int,
-    ran: dict[Path, tuple[Path, set[int]]],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> None:
-    folder, done = ran.setdefault(page, (tmp_path_factory.mktemp("page"), set()))
+def test_every_command_runs(page: Path, place: int, ran: dict[Path, tuple[Path, set[int]]]) -> None:
+    folder, done = ran[page]
     lines = PROMISED[page]
 
     def run(place: int) -> None:
         for before in needed(place, lines):
             if before not in done:
                 run(before)
+        began = children_seconds()
         finished = run_command(folder, *lines[place][1:])
         assert finished.returncode == 0, f"{lines[place]}: {finished.stderr}"
+        assert children_seconds() - began < PATIENCE
         done.add(place)
 
     run(place)
