@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import subprocess
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pytest
 from hypothesis import HealthCheck, settings
 
+import hidden
 from pendmap import cli
 
 if TYPE_CHECKING:
@@ -27,6 +29,16 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("steady")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_diagnoses(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of `hidden.diagnosed`: of this run alone, and of all its processes."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "diagnoses"
+    folder.mkdir(exist_ok=True)
+    hidden.KNOWN[:] = [folder]
+    return folder
 
 
 @pytest.fixture(scope="session")
@@ -46,23 +58,26 @@ class Run(Protocol):
         ...
 
 
+def run_command(
+    folder: Path, *words: object, env: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run `pendmap` with these words in a folder, without a display."""
+    clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
+    return subprocess.run(
+        [str(COMMAND), *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,  # s: what hangs; what else the machine does may take minutes
+        cwd=folder,
+        env=clean | (env or {}),
+    )
+
+
 @pytest.fixture
 def pendmap_command(tmp_path: Path) -> Run:
     """Run `pendmap` with these words in `tmp_path`, without a display."""
-
-    def run(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-        clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
-        return subprocess.run(
-            [str(COMMAND), *map(str, words)],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=120,
-            cwd=tmp_path,
-            env=clean | (env or {}),
-        )
-
-    return run
+    return functools.partial(run_command, tmp_path)
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conftest import run_command
 from pendmap.records.description import read_description
 
 if TYPE_CHECKING:
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PATIENCE = 120.0
+"""So much processor time, s, a command may take: what else the machine does is not in it."""
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -35,13 +39,66 @@ def commands(text: str = README) -> list[list[str]]:
 SNIPPETS = [code for page in PAGES for code in blocks("python", page.read_text(encoding="utf-8"))]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_command_runs(page: Path, pendmap_command: Run) -> None:
-    words = [line for line in commands(page.read_text(encoding="utf-8")) if line[0] == "pendmap"]
-    assert len(words) >= {"README.md": 7, "diagnose.md": 5}.get(page.name, 0)
-    for line in words:
-        run = pendmap_command(*line[1:])
-        assert run.returncode == 0, f"{line}: {run.stderr}"
+PROMISED = {
+    page: [line for line in commands(page.read_text(encoding="utf-8")) if line[0] == "pendmap"]
+    for page in PAGES
+}
+
+
+def written(words: list[str]) -> str | None:
+    """The name, without its ending, that the files of a command have."""
+    if "--out" in words:
+        return Path(words[words.index("--out") + 1]).stem
+    return None if "--json" in words else words[1]
+
+
+def needed(place: int, lines: list[list[str]]) -> list[int]:
+    """Places of the commands that must run before one: the last that wrote each name in it."""
+    names = {Path(word).parts[0].partition(".")[0] for word in lines[place][2:]}
+    last = {written(lines[k]): k for k in range(place)}
+    return sorted({k for k in map(last.get, names) if k is not None})
+
+
+def children_seconds() -> float:
+    """Processor time, s, of all processes that ended."""
+    spent = os.times()
+    return spent.children_user + spent.children_system
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, tuple[Path, set[int]]]:
+    """The folder of each page in this process, and the places of the commands that ran in it."""
+    return {page: (tmp_path_factory.mktemp(page.stem), set()) for page in PAGES}
+
+
+@pytest.mark.parametrize(
+    ("page", "place"),
+    [
+        pytest.param(page, k, id=f"{page.name} {k} {line[1]}")
+        for page, lines in PROMISED.items()
+        for k, line in enumerate(lines)
+    ],
+)
+def test_every_command_runs(page: Path, place: int, ran: dict[Path, tuple[Path, set[int]]]) -> None:
+    folder, done = ran[page]
+    lines = PROMISED[page]
+
+    def run(place: int) -> None:
+        for before in needed(place, lines):
+            if before not in done:
+                run(before)
+        began = children_seconds()
+        finished = run_command(folder, *lines[place][1:])
+        assert finished.returncode == 0, f"{lines[place]}: {finished.stderr}"
+        assert children_seconds() - began < PATIENCE
+        done.add(place)
+
+    run(place)
+
+
+def test_there_are_commands() -> None:
+    for name, least in {"README.md": 7, "diagnose.md": 5}.items():
+        assert any(page.name == name and len(PROMISED[page]) >= least for page in PAGES)
 
 
 def test_make_knows_the_other_commands() -> None:

@@ -7,8 +7,9 @@ that of what was found in records, ``record_discrepancy`` that of what a model l
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError
 from pendmap.files import whole_file
@@ -25,8 +26,6 @@ from pendmap.viewer import (
     tongues,
     trajectory,
 )
-from pendmap.viewer.discrepancy import record_discrepancy
-from pendmap.viewer.identification import record_identification
 from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
 from pendmap.viewer.window import (
     NoDisplayError,
@@ -41,6 +40,9 @@ if TYPE_CHECKING:
     import os
 
     import xarray as xr
+
+    from pendmap.viewer.discrepancy import record_discrepancy
+    from pendmap.viewer.identification import record_identification
 
 __all__ = [
     "ADDRESS",
@@ -73,6 +75,18 @@ _KINDS = {
     "tongues": (tongues.blueprint, tongues.log),
     "trajectory": (trajectory.blueprint, trajectory.log),
 }
+
+_OF_RECORDS = {
+    "record_discrepancy": "pendmap.viewer.discrepancy",
+    "record_identification": "pendmap.viewer.identification",
+}
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 (functions)
+    """What is made of records waits until it is asked for: importing fits takes half a second."""
+    if name not in _OF_RECORDS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_OF_RECORDS[name]), name)
 
 
 def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
