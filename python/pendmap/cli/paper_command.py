@@ -78,6 +78,7 @@ def command(  # noqa: PLR0913 (an option each)
         if paper_figures.TABLE in keys:
             _say(paper_figures.report(seed))
         click.echo("Written: " + ", ".join(written))
+    written.check()
 
 
 def _files(
