@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import re
 import shutil
 import signal
+import stat
 import threading
+import tomllib
 import uuid
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,12 +26,21 @@ except ImportError:  # without locks no folder of another run is certainly left 
     fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterator, Sequence
     from types import FrameType
     from typing import IO
 
-__all__ = ["STOPS", "check_room", "held_interrupts", "toml_text", "whole_file", "whole_folder"]
+__all__ = [
+    "STOPS",
+    "check_regular",
+    "check_room",
+    "held_interrupts",
+    "read_toml",
+    "read_whole",
+    "toml_text",
+    "whole_file",
+    "whole_folder",
+]
 
 STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -46,6 +58,9 @@ _OWNER: Final = "owner"
 
 _PROBE: Final = 2**20
 """Bytes that a disk takes unless it is the reason why a library could not write."""
+
+_MOST_TOML: Final = 2**22
+"""Bytes of the largest TOML file that is read: a thousand runs take a tenth of it."""
 
 _LEAST: Final = 4096
 """Bytes that are written on trial before anything is computed: one block of most disks."""
@@ -158,6 +173,54 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         except OSError:
             _put_back(stage)
             raise
+
+
+def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
+    """Read a file of at most ``most`` bytes; pipes and devices are refused, not waited for.
+
+    Raises
+    ------
+    InputError
+        If it is no regular file, or longer.
+    OSError
+        If it cannot be read.
+    """
+    source = Path(path)
+    _check_regular(source, source.stat().st_mode)
+    with open(source, "rb", opener=_at_once) as stream:
+        _check_regular(source, os.fstat(stream.fileno()).st_mode)
+        data = bytearray()
+        while len(data) <= most and (read := stream.read(_PROBE)):
+            data += read
+    if len(data) > most:
+        raise InputError(
+            f"{source}: is larger than {most / 2**20:g} MiB: allowed are smaller files"
+        )
+    return bytes(data)
+
+
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Refuse what is no regular file: a folder, a pipe or a device.
+
+    Raises
+    ------
+    InputError
+        If it is one of these.
+    OSError
+        If there is nothing.
+    """
+    _check_regular(Path(path), Path(path).stat().st_mode)
+
+
+def _check_regular(source: Path, mode: int) -> None:
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{source}: is a folder: allowed is a file")
+    if not stat.S_ISREG(mode):
+        raise InputError(f"{source}: is no file but a pipe or a device: allowed is a file")
+
+
+def _at_once(name: str, flags: int) -> int:
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def check_room(path: str | os.PathLike[str], size: int = 0) -> None:
@@ -289,6 +352,26 @@ def _remove(stage: Path) -> None:
     with contextlib.suppress(OSError):
         (stage / _OWNER).unlink()
         stage.rmdir()
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a TOML file, with the mark before it that editors on Windows put there.
+
+    Raises
+    ------
+    InputError
+        If it is no TOML, no regular file, or too large.
+    OSError
+        If it cannot be read.
+    """
+    data = read_whole(path, _MOST_TOML)
+    try:
+        return tomllib.loads(data.decode("utf-8-sig"))
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # an integer of thousands of digits is a ValueError
+        raise InputError(f"{os.fspath(path)}: not a TOML file: {error}") from None
 
 
 def toml_text(content: Mapping[str, Any]) -> str:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
+import os
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+import numpy as np
 import xarray as xr
 
 from pendmap.errors import InputError
-from pendmap.files import whole_file, whole_folder
-
-if TYPE_CHECKING:
-    import os
+from pendmap.files import check_regular, whole_file, whole_folder
 
 __all__ = ["FORMAT_VERSION", "SUFFIXES", "check_replaceable", "load", "save"]
 
@@ -141,17 +141,42 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         raise FileNotFoundError(2, "no such file", str(source))
     if source.suffix.lower() not in SUFFIXES:
         raise InputError(f"{source}: suffix {source.suffix!r}: allowed are {', '.join(SUFFIXES)}")
+    zarr = source.suffix.lower() == ".zarr"
+    if not (zarr and source.is_dir()):
+        check_regular(source)
     try:
-        if source.suffix.lower() == ".zarr":
-            dataset: xr.Dataset = xr.open_zarr(source, consolidated=True).load()
-        else:
-            dataset = xr.load_dataset(source, engine="netcdf4")
-    except (OSError, ValueError, KeyError) as error:
+        dataset: xr.Dataset = (
+            xr.open_zarr(source, consolidated=True)
+            if zarr
+            else xr.open_dataset(source, engine="netcdf4")
+        )
+        with dataset:
+            _check_result(dataset, source)
+            return dataset.load()
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of the reader
         raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+
+
+def _check_result(dataset: xr.Dataset, source: Path) -> None:
     if not _is_result(dataset):
         raise InputError(f"{source}: is not a result of pendmap")
-    version = dataset.attrs["format_version"]
-    if int(version) > FORMAT_VERSION:
+    version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
+    if not isinstance(version, int | np.integer) or not 1 <= version <= FORMAT_VERSION:
         known = f"this pendmap reads format {FORMAT_VERSION}"
         raise InputError(f"{source}: has format {version}, {known}")
-    return dataset
+    if not isinstance(kind, str):
+        raise InputError(f"{source}: has kind {kind}, which is no text")
+    # What is lazily opened has a size, but takes no memory yet.
+    if dataset.nbytes > _memory() / 2:
+        size = f"{dataset.nbytes / 2**20:.0f} MiB"
+        raise InputError(f"{source}: unpacks to {size}: allowed is half of this memory")
+
+
+def _memory() -> float:
+    """Bytes of memory of this machine; without bound where it does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return math.inf

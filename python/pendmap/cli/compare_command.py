@@ -90,5 +90,5 @@ def command(  # noqa: PLR0913 (an option each)
             if line not in doubts:
                 click.echo(line)
         if written:
-            click.echo("Written: " + ", ".join(written))
+            click.echo(written.line())
     written.check()

@@ -146,7 +146,7 @@ def command(  # noqa: PLR0913 (an option each)
         click.echo(json.dumps(plain(fields(found) | model_file), allow_nan=False))
     elif not quiet:
         _say(found)
-        click.echo("Written: " + ", ".join(written))
+        click.echo(written.line())
     written.check()
     if view and rerun is not None:
         open_recording(rerun)

@@ -73,7 +73,7 @@ def command(
         written = write_all(_files(outputs, report, model))
     _show(report, outputs, written.name(outputs.out))
     if written and not outputs.as_json and not outputs.quiet:
-        click.echo("Written: " + ", ".join(written))
+        click.echo(written.line())
     written.check()
     open_viewer(outputs)
 

@@ -45,5 +45,5 @@ def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> Non
     elif not quiet:
         click.echo(as_text(experiment))
         if written:
-            click.echo("Written: " + ", ".join(written))
+            click.echo(written.line())
     written.check()

@@ -11,6 +11,7 @@ import re
 import signal
 import sys
 import threading
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -108,6 +109,8 @@ def run() -> None:
 
     What terminals and schedulers ask to stop with (SIGTERM, SIGHUP) stops it as Ctrl-C does.
     """
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # libraries' words to programmers
     os.environ["MPLBACKEND"] = "agg"  # figures go to files: no window of the user's is needed
     stops: list[int] = []
     try:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.errors import NotWrittenError
+from pendmap.errors import NotWrittenError, one_line
 from pendmap.files import held_interrupts
 from pendmap.notebook import columns
 
@@ -68,7 +68,7 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
         click.echo(dataset.attrs["title"])
         click.echo(dataset.attrs["summary"])
         if written:
-            click.echo("Written: " + ", ".join(written))
+            click.echo(written.line())
     written.check()
     open_viewer(outputs)
 
@@ -83,6 +83,10 @@ class Written(list[str]):
     def name(self, path: Path | None) -> str | None:
         """Return the name of a file that is complete, none of another."""
         return str(path) if str(path) in self else None
+
+    def line(self) -> str:
+        """Return what is said of the files that are complete."""
+        return "Written: " + ", ".join(map(one_line, self))
 
     def check(self) -> None:
         """End the command, after all else is said, where a file could not be written.
