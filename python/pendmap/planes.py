@@ -31,10 +31,14 @@ if TYPE_CHECKING:
     from pendmap.model.units import Units
     from pendmap.varied import Varied
 
+    Progress = Callable[[int, int], object]
+
 __all__ = ["entries", "parameter_map", "undecided"]
 
 _LISTED = 10
 _FREQUENCIES = 81
+_STEPS = 10_000
+"""Parts of a computation that are told apart where two parts are one."""
 
 
 def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -48,7 +52,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     threads: int | None = None,
     seed: int = 0,
     curves: bool = False,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """The set of attractors over a plane of two parameters.
 
@@ -120,7 +124,10 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     checks.call("progress", progress)
     search = CellSearch(starts, box, tol, max_periods, threads, seed)
     theta, velocity = search.initial(units)
-    drawn = _curves(model, columns, rows) if checks.flag("curves", curves) else None
+    drawn = None
+    if checks.flag("curves", curves):
+        first, progress = _halves(progress)
+        drawn = _curves(model, columns, rows, first)
     began = time.perf_counter()
     try:
         raw = _core.parameter_map(
@@ -205,8 +212,31 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
     return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
 
 
-def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
+def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
+    """Return what two parts of a computation report to; the first may begin again, and waits then.
+
+    Each part counts as half of all.
+    """
+    if progress is None:
+        return None, None
+    furthest = 0.0
+
+    def part(number: int) -> Progress:
+        def report(done: int, total: int) -> None:
+            nonlocal furthest
+            furthest = max(furthest, (number + done / max(total, 1)) / 2)
+            progress(round(_STEPS * furthest), _STEPS)
+
+        return report
+
+    return part(0), part(1)
+
+
+def _curves(
+    model: Pendulum | Rig, columns: Varied, rows: Varied, progress: Progress | None
+) -> dict[str, Any]:
     """Return the critical curves between the ends of the axes, before anything else is computed."""
+    axes = (columns, rows)
     by_name = {axis.name.lower(): axis for axis in axes}
     if set(by_name) != {"p", "omega"}:
         given = " and ".join(axis.name for axis in axes)
@@ -220,7 +250,7 @@ def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
     above = p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0)
     p_max = max(float(p.bare[-1]), min(float(above), MOST_P))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
-    found = tongues(model, frequency, p_max, refine=True)
+    found = tongues(model, frequency, p_max, refine=True, progress=progress)
     scale = omega.values[-1] / omega.bare[-1]
     return {
         "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
