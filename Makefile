@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test lint bench clean develop
+.PHONY: demo test fuzz lint bench clean develop
 
 demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -19,6 +19,11 @@ test: $(VENV)/.develop ## set up everything and run all tests, those of the lane
 	for path in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
 		PENDMAP_SIMD=$$path cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
 	$(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
+
+SEED ?= 1
+COUNT ?= 1000
+fuzz: $(VENV)/.develop ## COUNT cases of bad input and faults drawn from SEED, each a command that must end well
+	$(BIN)/python tests/python/fuzz.py --seed $(SEED) --count $(COUNT)
 
 lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of imports
 	cargo fmt --check

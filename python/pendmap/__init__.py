@@ -9,29 +9,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-from pendmap.errors import InputError
-from pendmap.model import (
-    PRESETS,
-    Effect,
-    Formula,
-    Pendulum,
-    Rig,
-    load_formulas,
-    load_model,
-    save_model,
-)
-from pendmap.model.library import EffectDefinition, EffectParameter, effects
-
+TYPE_CHECKING = False  # importing typing takes most of the time that this file takes
 if TYPE_CHECKING:
+    from typing import Any
+
     from pendmap.critical_curves import tongues
     from pendmap.diagrams import bifurcation
+    from pendmap.errors import InputError
     from pendmap.exponents import lyapunov
     from pendmap.grid import Axis, Grid
     from pendmap.homoclinic import melnikov
     from pendmap.lifetimes import lifetime
     from pendmap.maps import basins, basins_of
+    from pendmap.model import (
+        PRESETS,
+        Effect,
+        Formula,
+        Pendulum,
+        Rig,
+        load_formulas,
+        load_model,
+        save_model,
+    )
+    from pendmap.model.library import EffectDefinition, EffectParameter, effects
     from pendmap.orbits import orbit
     from pendmap.planes import parameter_map
     from pendmap.records import (
@@ -95,10 +95,18 @@ __all__ = [
 _HOMES = {
     "Axis": "grid",
     "BasinEntropy": "texture",
+    "Effect": "model",
+    "EffectDefinition": "model.library",
+    "EffectParameter": "model.library",
     "Experiment": "records",
     "Finding": "records",
+    "Formula": "model",
     "Grid": "grid",
+    "InputError": "errors",
     "NoiseFloor": "records",
+    "PRESETS": "model",
+    "Pendulum": "model",
+    "Rig": "model",
     "Run": "records",
     "Segment": "records",
     "UncertaintyExponent": "uncertainty",
@@ -107,8 +115,11 @@ _HOMES = {
     "basins": "maps",
     "basins_of": "maps",
     "bifurcation": "diagrams",
+    "effects": "model.library",
     "lifetime": "lifetimes",
     "load": "store",
+    "load_formulas": "model",
+    "load_model": "model",
     "lyapunov": "exponents",
     "melnikov": "homoclinic",
     "noise_floor": "records",
@@ -116,6 +127,7 @@ _HOMES = {
     "parameter_map": "planes",
     "read_experiment": "records",
     "save": "store",
+    "save_model": "model",
     "simulate": "trajectory",
     "tongues": "critical_curves",
     "uncertainty_exponent": "uncertainty",

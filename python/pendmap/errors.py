@@ -1,9 +1,39 @@
-"""What can be wrong with a request."""
+"""What can be wrong with a request, and how it is put."""
 
 from __future__ import annotations
 
-__all__ = ["InputError"]
+__all__ = ["InputError", "NotWrittenError", "one_line"]
+
+MOST = 500
+"""Characters of a message."""
+
+
+def one_line(text: str) -> str:
+    """Return a text on one line as a terminal may show it: no control characters, 500 at most.
+
+    Parameters
+    ----------
+    text : str
+        A message; file names, values and what libraries say may stand in it.
+
+    Returns
+    -------
+    str
+        Control characters and marks of direction as escapes; the middle left out where it is long.
+    """
+    line = " ".join(text[: 100 * MOST].split())
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+    if len(line) <= MOST:
+        return line
+    return f"{line[: MOST // 2]} ... {line[-(MOST // 2 - 5) :]}"
 
 
 class InputError(ValueError):
     """A value that was given is not allowed; the message names it and what is allowed."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(one_line(str(message)))
+
+
+class NotWrittenError(OSError):
+    """Results were computed that could not be written; the message names them and what was."""

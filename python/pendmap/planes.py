@@ -31,12 +31,16 @@ if TYPE_CHECKING:
     from pendmap.model.units import Units
     from pendmap.varied import Varied
 
+    Progress = Callable[[int, int], object]
+
 __all__ = ["CHAOS_PERIODS", "chaos", "entries", "parameter_map", "undecided"]
 
 CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
 """Comment of the variable ``chaos_periods``."""
 _LISTED = 10
 _FREQUENCIES = 81
+_STEPS = 10_000
+"""Parts of a computation that are told apart where two parts are one."""
 
 
 def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -50,7 +54,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     threads: int | None = None,
     seed: int = 0,
     curves: bool = False,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """The set of attractors over a plane of two parameters.
 
@@ -63,8 +67,9 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     as long again, in four windows. Windows that turn alike in regions that meet form a group; a
     set of groups that no trajectory leaves, with an exponent that is positive by four standard
     errors, is chaos of its kind, unless it holds a stable orbit of period 1 to 4 (Newton's method
-    from the least gaps of 64 by 64 starts) that captures it. Where friction holds rest, and could end chaos, from sixteen of
-    its points none may end within 5000 periods. What is left is undecided.
+    from the least gaps of 64 by 64 starts) that captures it. Where friction holds rest, and could
+    end chaos, from sixteen of its points none may end within 5000 periods. What is left is
+    undecided.
 
     Parameters
     ----------
@@ -125,7 +130,10 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     checks.call("progress", progress)
     search = CellSearch(starts, box, tol, max_periods, threads, seed)
     theta, velocity = search.initial(units)
-    drawn = _curves(model, columns, rows) if checks.flag("curves", curves) else None
+    drawn = None
+    if checks.flag("curves", curves):
+        first, progress = _halves(progress)
+        drawn = _curves(model, columns, rows, first)
     began = time.perf_counter()
     try:
         raw = _core.parameter_map(
@@ -215,8 +223,31 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
     return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
 
 
-def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
+def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
+    """Return what two parts of a computation report to; the first may begin again, and waits then.
+
+    Each part counts as half of all.
+    """
+    if progress is None:
+        return None, None
+    furthest = 0.0
+
+    def part(number: int) -> Progress:
+        def report(done: int, total: int) -> None:
+            nonlocal furthest
+            furthest = max(furthest, (number + done / max(total, 1)) / 2)
+            progress(round(_STEPS * furthest), _STEPS)
+
+        return report
+
+    return part(0), part(1)
+
+
+def _curves(
+    model: Pendulum | Rig, columns: Varied, rows: Varied, progress: Progress | None
+) -> dict[str, Any]:
     """Return the critical curves between the ends of the axes, before anything else is computed."""
+    axes = (columns, rows)
     by_name = {axis.name.lower(): axis for axis in axes}
     if set(by_name) != {"p", "omega"}:
         given = " and ".join(axis.name for axis in axes)
@@ -230,7 +261,7 @@ def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
     above = p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0)
     p_max = max(float(p.bare[-1]), min(float(above), MOST_P))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
-    found = tongues(model, frequency, p_max, refine=True)
+    found = tongues(model, frequency, p_max, refine=True, progress=progress)
     scale = omega.values[-1] / omega.bare[-1]
     return {
         "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
@@ -274,10 +305,11 @@ def chaos(attributes: Mapping[str, Any]) -> list[str]:
     periods = attributes["chaos_periods"]
     if not periods:
         return []
-    return [
+    line = (
         f"Chaos: nothing captured it within {counted(periods, 'period')} (the least of all; "
         "chaos_periods holds each); a longer transient looks the same."
-    ]
+    )
+    return [line]
 
 
 def undecided(attributes: Mapping[str, Any]) -> list[str]:

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-import shutil
-import uuid
+import json
+import math
+import os
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+import numpy as np
 import xarray as xr
 
 from pendmap.errors import InputError
-from pendmap.files import held_interrupts, whole_file
+from pendmap.files import check_regular, whole_file, whole_folder
 
-if TYPE_CHECKING:
-    import os
-
-__all__ = ["FORMAT_VERSION", "SUFFIXES", "load", "save"]
+__all__ = ["FORMAT_VERSION", "SUFFIXES", "check_replaceable", "load", "save"]
 
 FORMAT_VERSION: Final = 1
 """Version of the layout of the datasets, in their attribute ``format_version``."""
 SUFFIXES: Final = (".nc", ".zarr")
 """The kinds of file a result is stored in."""
+_MARKS: Final = frozenset(("format_version", "kind"))
+"""Attributes by which a dataset says that it is a result."""
 _LARGE: Final = 4096
+_ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
+"""Names of the files of a stored result: descriptions and chunks."""
 
 
 def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -61,7 +65,7 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def _is_result(dataset: xr.Dataset) -> bool:
-    return {"format_version", "kind"} <= set(dataset.attrs)
+    return set(dataset.attrs) >= _MARKS
 
 
 def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
@@ -77,20 +81,44 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
         raise InputError(
             f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works"
         ) from None
-    if not target.parent.is_dir():
-        raise FileNotFoundError(2, "the folder does not exist", str(target.parent))
-    part = target.with_name(f".{target.stem}-{uuid.uuid4().hex[:8]}.part.zarr")
-    old = part.with_suffix(".old")
-    with held_interrupts():
-        try:
-            dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
-            if target.exists():
-                target.rename(old)
-            part.rename(target)
-        finally:
-            for leftover in (part, old):
-                shutil.rmtree(leftover, ignore_errors=True)
+    check_replaceable(target)
+    with whole_folder(target) as part:
+        dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
     return target
+
+
+def check_replaceable(path: str | os.PathLike[str]) -> None:
+    """Refuse to replace what is not a stored result and nothing else.
+
+    A folder is a result if it says so and each file in it has a name that :func:`save` gives.
+
+    Parameters
+    ----------
+    path : str or path
+        Where a result shall be stored as .zarr; it need not exist.
+
+    Raises
+    ------
+    InputError
+        If it is a file, or a folder with anything else in it.
+    OSError
+        If it cannot be read.
+    """
+    target = Path(path)
+    allowed = "allowed is a new folder, or a result of pendmap, which is replaced"
+    if target.exists() and not target.is_dir():
+        raise InputError(f"{target}: is a file: {allowed}")
+    if not target.exists() or not any(target.iterdir()):
+        return
+    try:
+        said = json.loads((target / ".zattrs").read_bytes())
+    except (FileNotFoundError, ValueError):
+        said = {}
+    if not isinstance(said, dict) or not said.keys() >= _MARKS:
+        raise InputError(f"{target}: is a folder of something else: {allowed}")
+    for entry in target.rglob("*"):
+        if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):
+            raise InputError(f"{target}: holds {entry.name!r}, no part of a result: {allowed}")
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -113,17 +141,42 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         raise FileNotFoundError(2, "no such file", str(source))
     if source.suffix.lower() not in SUFFIXES:
         raise InputError(f"{source}: suffix {source.suffix!r}: allowed are {', '.join(SUFFIXES)}")
+    zarr = source.suffix.lower() == ".zarr"
+    if not (zarr and source.is_dir()):
+        check_regular(source)
     try:
-        if source.suffix.lower() == ".zarr":
-            dataset: xr.Dataset = xr.open_zarr(source, consolidated=True).load()
-        else:
-            dataset = xr.load_dataset(source, engine="netcdf4")
-    except (OSError, ValueError, KeyError) as error:
+        dataset: xr.Dataset = (
+            xr.open_zarr(source, consolidated=True)
+            if zarr
+            else xr.open_dataset(source, engine="netcdf4")
+        )
+        with dataset:
+            _check_result(dataset, source)
+            return dataset.load()
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of the reader
         raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+
+
+def _check_result(dataset: xr.Dataset, source: Path) -> None:
     if not _is_result(dataset):
         raise InputError(f"{source}: is not a result of pendmap")
-    version = dataset.attrs["format_version"]
-    if int(version) > FORMAT_VERSION:
+    version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
+    if not isinstance(version, int | np.integer) or not 1 <= version <= FORMAT_VERSION:
         known = f"this pendmap reads format {FORMAT_VERSION}"
         raise InputError(f"{source}: has format {version}, {known}")
-    return dataset
+    if not isinstance(kind, str):
+        raise InputError(f"{source}: has kind {kind}, which is no text")
+    # What is lazily opened has a size, but takes no memory yet.
+    if dataset.nbytes > _memory() / 2:
+        size = f"{dataset.nbytes / 2**20:.0f} MiB"
+        raise InputError(f"{source}: unpacks to {size}: allowed is half of this memory")
+
+
+def _memory() -> float:
+    """Bytes of memory of this machine; without bound where it does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return math.inf

@@ -136,10 +136,10 @@ def _conservative(dataset: xr.Dataset) -> str:
 def most_missed(starts: int) -> float:
     """Return the largest share of starts that ``starts`` drawn at random all miss, at 95 %.
 
-    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none out of ``starts``
-    (Clopper & Pearson 1934, Biometrika 26, 404; one-sided).
+    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none out of
+    ``starts`` (Clopper & Pearson 1934, Biometrika 26, 404; one-sided).
     """
-    return 1 - 0.05 ** (1 / starts)
+    return 1 - math.pow(0.05, 1 / starts)
 
 
 def _only_chaos(dataset: xr.Dataset) -> str:

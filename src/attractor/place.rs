@@ -37,13 +37,12 @@ impl Catalogue {
         let place = |track: &Vec<State>| {
             let nearest = nearest_return(track, longest);
             let orbit = nearest.and_then(|(_, start, n)| newton::find(&map, start, n, REACH));
-            let known = orbit.and_then(|orbit| {
+            orbit.and_then(|orbit| {
                 let own = |a: &Attractor| {
                     a.n.is_some() && a.points.iter().any(|p| orbit.contains(*p, SAME))
                 };
                 self.attractors.iter().position(own)
-            });
-            known
+            })
         };
         let tracks = tracks(strobe, states, longest);
         let homes = self.homes(strobe, states).into_iter();

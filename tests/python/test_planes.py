@@ -302,3 +302,17 @@ def test_both_halves_of_the_exponents_scale_have_ticks() -> None:
 def test_one_value_has_one_bound() -> None:
     with pytest.raises(pendmap.InputError, match="p is 0 to 1: one value has one bound"):
         pendmap.parameter_map(Pendulum(), {"p": (0.0, 1.0, 1), "omega": (1.0, 2.0, 2)})
+
+
+def test_curves_and_cells_move_one_progress() -> None:
+    seen: list[tuple[int, int]] = []
+    pendmap.parameter_map(
+        Pendulum(),
+        {"p": (0.5, 1.0, 3), "omega": (1.8, 2.2, 3)},
+        curves=True,
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    shares = [done / total for done, total in seen]
+    assert shares == sorted(shares)
+    assert any(0 < share < 0.5 for share in shares)  # while curves are computed
+    assert shares[-1] <= 1

@@ -193,7 +193,11 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path, moment: str) -> None
     with started(words, cwd=tmp_path, stderr=subprocess.PIPE) as process:
         if moment == "computing":
             time.sleep(1.2)
-        while moment == "writing" and process.poll() is None and not list(tmp_path.glob(".lab*")):
+        while (
+            moment == "writing"
+            and process.poll() is None
+            and not list(tmp_path.glob(".pendmap-*/new/*"))
+        ):
             time.sleep(0.001)
         process.send_signal(signal.SIGINT)
         _, stderr = process.communicate(timeout=30)

@@ -69,6 +69,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     grid = Grid(
         Axis(*theta) if theta else usual.theta, Axis(*velocity) if velocity else usual.velocity
     )
+    outputs.check_room(grid.theta.count * grid.velocity.count)
     if outputs.shows_progress:  # the summary says it too, after all periods have passed
         for line in unlimited_rotation(without_dimensions(model)[0]):
             click.echo(line, err=True)

@@ -12,7 +12,7 @@ import click
 from pendmap.checks import MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.show import plain, progress_bar, write_all, write_table
+from pendmap.cli.show import Written, plain, progress_bar, write_all, write_table
 from pendmap.cli.types import NUMBER, OutputFile, Whole
 
 __all__ = ["command"]
@@ -73,7 +73,7 @@ def command(  # noqa: PLR0913 (an option each)
     with progress_bar("compare", shown=sys.stderr.isatty() and not quiet) as progress:
         experiment = read_experiment(path)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
-    written: list[str] = []
+    written = Written()
     if plot is not None:
         from pendmap import figures
 
@@ -90,4 +90,5 @@ def command(  # noqa: PLR0913 (an option each)
             if line not in doubts:
                 click.echo(line)
         if written:
-            click.echo("Written: " + ", ".join(written))
+            click.echo(written.line())
+    written.check()

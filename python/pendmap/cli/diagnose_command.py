@@ -142,10 +142,12 @@ def command(  # noqa: PLR0913 (an option each)
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 
-        click.echo(json.dumps(plain(fields(found) | {"model": written[0]}), allow_nan=False))
+        model_file = {"model": written.name(outputs[0])}
+        click.echo(json.dumps(plain(fields(found) | model_file), allow_nan=False))
     elif not quiet:
         _say(found)
-        click.echo("Written: " + ", ".join(written))
+        click.echo(written.line())
+    written.check()
     if view and rerun is not None:
         open_recording(rerun)
 

@@ -71,9 +71,10 @@ def command(
         raise
     with progress_bar("write", shown=outputs.shows_progress):
         written = write_all(_files(outputs, report, model))
-    _show(report, outputs, outputs.out)
+    _show(report, outputs, written.name(outputs.out))
     if written and not outputs.as_json and not outputs.quiet:
-        click.echo("Written: " + ", ".join(written))
+        click.echo(written.line())
+    written.check()
     open_viewer(outputs)
 
 
@@ -94,11 +95,11 @@ def _files(
         yield functools.partial(viewer.record_identification, report), outputs.rerun
 
 
-def _show(report: IdentificationReport, outputs: Outputs, model: Path | None = None) -> None:
+def _show(report: IdentificationReport, outputs: Outputs, model: str | None = None) -> None:
     if outputs.as_json:
         from pendmap.identification.summary import as_json
 
-        fields = as_json(report) | {"model": None if model is None else str(model)}
+        fields = as_json(report) | {"model": model}
         click.echo(json.dumps(plain(fields), allow_nan=False))
     elif not outputs.quiet:
         _say(report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import sys
 from pathlib import Path
@@ -9,9 +10,8 @@ from pathlib import Path
 import click
 
 from pendmap.cli.inputs import keep_inputs
-from pendmap.cli.show import plain, progress_bar
+from pendmap.cli.show import Written, plain, progress_bar, write_all
 from pendmap.cli.types import OutputFile
-from pendmap.files import held_interrupts
 
 __all__ = ["command"]
 
@@ -35,14 +35,15 @@ def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> Non
     keep_inputs(files_of(path), {"--plot": [plot]})
     with progress_bar("read", shown=sys.stderr.isatty() and not quiet):
         experiment = read_experiment(path)
+    written = Written()
     if plot is not None:
         from pendmap import figures
 
-        with held_interrupts():
-            figures.draw_record(experiment, plot)
+        written = write_all([(functools.partial(figures.draw_record, experiment), plot)])
     if as_json:
         click.echo(json.dumps(plain(fields(experiment)), allow_nan=False))
     elif not quiet:
         click.echo(as_text(experiment))
-        if plot is not None:
-            click.echo(f"Written: {plot}")
+        if written:
+            click.echo(written.line())
+    written.check()

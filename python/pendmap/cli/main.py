@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import atexit
+import contextlib
+import errno
 import importlib
 import os
 import re
 import signal
 import sys
-from typing import Any
+import threading
+import warnings
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, NotWrittenError, one_line
+from pendmap.files import STOPS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from types import FrameType
 
 __all__ = ["command", "run"]
 
+FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
+_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+"""What a disk says that was asked for nothing wrong."""
 
 _COMMANDS = {
     "info": "Show the version, the instruction set used, the threads.",
@@ -92,11 +105,71 @@ def command() -> None:
 
 
 def run() -> None:
-    """Run the command line and exit: 0 done, 2 bad input, 130 interrupted."""
-    sys.exit(_exit_code())
+    """Run the command line and exit: 0 done, 1 not all of it, 2 bad input, 130 interrupted.
+
+    What terminals and schedulers ask to stop with (SIGTERM, SIGHUP) stops it as Ctrl-C does.
+    """
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # libraries' words to programmers
+    os.environ["MPLBACKEND"] = "agg"  # figures go to files: no window of the user's is needed
+    stops: list[int] = []
+    try:
+        with _stoppable(stops):
+            code = _exit_code(stops)
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    sys.exit(code)
 
 
-def _exit_code() -> int:  # noqa: PLR0911 (one for each way to end)
+@contextlib.contextmanager
+def _stoppable(stops: list[int]) -> Iterator[None]:
+    """Make every signal that asks to stop a KeyboardInterrupt, and list it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, _: FrameType | None) -> None:
+        stops.append(number)
+        raise KeyboardInterrupt
+
+    def again(ignored: sys.UnraisableHookArgs) -> None:
+        # Python drops what is raised while an object is removed: the interrupt comes once more.
+        if isinstance(ignored.exc_value, KeyboardInterrupt) and hasattr(signal, "setitimer"):
+            signal.signal(signal.SIGALRM, stop)
+            signal.setitimer(signal.ITIMER_REAL, 0.01)
+        else:
+            sys.__unraisablehook__(ignored)
+
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    before = {n: signal.getsignal(n) for n in STOPS if signal.getsignal(n) in usual}
+    for number in before:
+        signal.signal(number, stop)
+    hook, sys.unraisablehook = sys.unraisablehook, again
+    # At the very end nothing is left to interrupt.
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _exit_code(stops: Sequence[int]) -> int:
+    try:
+        return _ended()
+    except (click.Abort, KeyboardInterrupt) as stop:
+        # click makes an Abort of the interrupt that names what is complete.
+        files = (stop.__cause__ or stop.__context__ or stop).args
+    except Exception:
+        if not stops:
+            raise
+        files = ()  # a library made an error of its own of the interrupt
+    _say(f"interrupted, {', '.join(files) or 'nothing was'} written")
+    return INTERRUPTED
+
+
+def _ended() -> int:  # noqa: PLR0911 (one for each way to end)
     try:
         result = command.main(prog_name="pendmap", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
@@ -106,23 +179,26 @@ def _exit_code() -> int:  # noqa: PLR0911 (one for each way to end)
         return _refuse(error.format_message())
     except InputError as error:
         return _refuse(str(error))
-    except (click.Abort, KeyboardInterrupt) as stop:
-        # click makes an Abort of the interrupt that names what is complete.
-        files = (stop.__cause__ or stop.__context__ or stop).args
-        click.echo(f"pendmap: interrupted, {', '.join(files) or 'nothing was'} written", err=True)
-        return INTERRUPTED
     except _ReaderGone:
         # No message, and none from the interpreter at the end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except MemoryError:
         return _refuse("not enough memory: choose a smaller grid")
+    except NotWrittenError as error:
+        _say(str(error))
+        return FAILED
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        return _refuse(f"{where}{error.strerror or error}")
+        _say(f"{where}{error.strerror or error}")
+        return FAILED if error.errno in _FULL else BAD_INPUT
     return result if isinstance(result, int) else 0
 
 
 def _refuse(message: str) -> int:
-    click.echo(f"pendmap: {' '.join(message.split())}", err=True)
+    _say(message)
     return BAD_INPUT
+
+
+def _say(message: str) -> None:
+    click.echo(f"pendmap: {one_line(message)}", err=True)

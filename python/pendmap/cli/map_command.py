@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -39,6 +40,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
     from pendmap.planes import parameter_map
 
+    outputs.check_room(math.prod(span.cells for span in ranges.values()))
     with progress_bar("map", shown=outputs.shows_progress) as progress:
         dataset = parameter_map(model, ranges, progress=progress, **given)
     show(dataset, outputs, fields)

@@ -11,6 +11,7 @@ import click
 from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.types import NUMBER, OutputFile, Whole
+from pendmap.files import check_room
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -141,6 +142,15 @@ class Outputs:
         if outputs.view:
             check_view()
         return outputs
+
+    def check_room(self, cells: int) -> None:
+        """Refuse a map before it is computed where the disk has no space for its cells.
+
+        No map compresses to less than half a byte a cell; the smoothest ones take 0.7.
+        """
+        for path in (self.out, self.rerun):
+            if path is not None:
+                check_room(path, cells // 2)
 
     @property
     def draws(self) -> bool:

@@ -77,7 +77,8 @@ def command(  # noqa: PLR0913 (an option each)
     elif not quiet:
         if paper_figures.TABLE in keys:
             _say(paper_figures.report(seed))
-        click.echo("Written: " + ", ".join(written))
+        click.echo(written.line())
+    written.check()
 
 
 def _files(

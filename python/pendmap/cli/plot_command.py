@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import click
 
+from pendmap.cli.inputs import keep_inputs
+from pendmap.cli.show import write_all
 from pendmap.cli.types import OutputFile
+from pendmap.errors import InputError
 
 __all__ = ["command"]
 
@@ -45,17 +49,27 @@ def command(  # noqa: PLR0913 (the options above)
     if not file.name:
         raise click.UsageError(f"{str(file)!r}: is a folder: allowed is a result, .nc or .zarr")
     target = out or OutputFile([".png"]).convert(file.with_suffix(".png"), None, None)
+    keep_inputs([file], {"--out": [target]})
 
     from pendmap import figures
     from pendmap.store import load
 
-    dataset = load(file)
+    draw = functools.partial(
+        figures.draw, load(file), layer=layer, size=inches, dpi=dpi, colormap=colormap
+    )
     try:
-        figures.draw(dataset, target, layer=layer, size=inches, dpi=dpi, colormap=colormap)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from error
-    if not quiet:
-        click.echo(f"Written: {target}")
+        written = write_all([(draw, target)])
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:
+        # Nobody but the file says what is drawn: numbers that no result has end anywhere.
+        raise InputError(
+            f"{file}: cannot be drawn: its content is not a result's: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+    if written and not quiet:
+        click.echo(written.line())
+    written.check()
 
 
 def _size(text: str | None) -> tuple[float, float] | None:

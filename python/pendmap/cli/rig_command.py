@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.cli.show import write_all
 from pendmap.cli.types import NUMBER, OutputFile
-from pendmap.files import held_interrupts
 from pendmap.words import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from pendmap import virtual_rig
 
 __all__ = ["command"]
@@ -89,25 +92,39 @@ def command(  # noqa: PLR0913 (an option each)
     request = virtual_rig.Request(name, **given)
     where = virtual_rig.places(out, replace=replace)
     experiment = virtual_rig.make(request)
-    written: list[str] = []
-    try:
-        with held_interrupts():
-            virtual_rig.write(experiment, where)
-            written += [str(where.experiment), str(where.truth)]
-        if plot is not None:
-            with held_interrupts():
-                written.append(str(_draw(experiment, where.experiment.name, plot)))
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(*written) from None
+    written = write_all(_files(experiment, where, plot))
+    whole = _names(where) in written
     if as_json:
-        names = ("experiment", "truth", "plot")
-        click.echo(json.dumps(dict(zip(names, written, strict=False))))
+        places = {"experiment": where.experiment, "truth": where.truth} if whole else {}
+        places |= {"plot": plot} if plot is not None and str(plot) in written else {}
+        click.echo(json.dumps({name: str(path) for name, path in places.items()}))
     elif not quiet:
-        seconds = sum(run.plan.duration for run in experiment.runs)
-        click.echo(f"Written: {written[0]} ({len(experiment.runs)} runs, {seconds:.0f} s)")
-        click.echo(f"The truth: {written[1]}")
-        if plot is not None:
+        if whole:
+            seconds = sum(run.plan.duration for run in experiment.runs)
+            runs = counted(len(experiment.runs), "run")
+            click.echo(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
+            click.echo(f"The truth: {where.truth}")
+        if plot is not None and str(plot) in written:
             click.echo(f"The records: {plot}")
+    written.check()
+
+
+def _files(
+    experiment: virtual_rig.Experiment, where: virtual_rig.Places, plot: Path | None
+) -> Iterator[tuple[Callable[[Path], Path | str], Path]]:
+    from pendmap import virtual_rig
+
+    def both(_: Path) -> str:
+        virtual_rig.write(experiment, where)
+        return _names(where)
+
+    yield both, where.experiment
+    if plot is not None:
+        yield functools.partial(_draw, experiment, where.experiment.name), plot
+
+
+def _names(where: virtual_rig.Places) -> str:
+    return f"{where.experiment}, {where.truth}"
 
 
 def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:

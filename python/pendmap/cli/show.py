@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.errors import NotWrittenError, one_line
 from pendmap.files import held_interrupts
 from pendmap.notebook import columns
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pendmap.cli.options import Outputs
 
 __all__ = [
+    "Written",
     "open_recording",
     "open_viewer",
     "plain",
@@ -66,20 +68,53 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
         click.echo(dataset.attrs["title"])
         click.echo(dataset.attrs["summary"])
         if written:
-            click.echo("Written: " + ", ".join(written))
+            click.echo(written.line())
+    written.check()
     open_viewer(outputs)
 
 
-def write_all(files: Iterable[tuple[Callable[[Path], Path], Path]]) -> list[str]:
+class Written(list[str]):
+    """Names of the files that are complete, and why others are not."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.missed: list[str] = []
+
+    def name(self, path: Path | None) -> str | None:
+        """Return the name of a file that is complete, none of another."""
+        return str(path) if str(path) in self else None
+
+    def line(self) -> str:
+        """Return what is said of the files that are complete."""
+        return "Written: " + ", ".join(map(one_line, self))
+
+    def check(self) -> None:
+        """End the command, after all else is said, where a file could not be written.
+
+        Raises
+        ------
+        NotWrittenError
+            If that is so.
+        """
+        if self.missed:
+            complete = ", ".join(self) or "nothing"
+            raise NotWrittenError(f"{'; '.join(self.missed)}; written: {complete}")
+
+
+def write_all(files: Iterable[tuple[Callable[[Path], Path | str], Path]]) -> Written:
     """Write files one after the other and return their names.
 
-    An interrupt takes effect between two files and names those that are complete.
+    Where the disk takes one of them no more, the others are tried all the same. An interrupt takes
+    effect between two files and names those that are complete.
     """
-    written: list[str] = []
+    written = Written()
     try:
         for write, path in files:
             with held_interrupts():
-                written.append(str(write(path)))
+                try:
+                    written.append(str(write(path)))
+                except OSError as error:
+                    written.missed.append(f"cannot write {path}: {error.strerror or error}")
     except KeyboardInterrupt:
         raise KeyboardInterrupt(*written) from None
     return written

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import re
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from pendmap.checks import MOST_CELLS, shown
+from pendmap.errors import InputError
+from pendmap.files import check_room
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -179,8 +182,14 @@ class OutputFile(click.ParamType[Path]):
             self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
         if path.is_dir() and path.suffix.lower() != ".zarr":
             self.fail(f"{str(path)!r}: is a folder", param, ctx)
-        if not _writable(path):
-            self.fail(f"{str(path)!r}: cannot be written there", param, ctx)
+        try:
+            _library(path)
+            check_room(path)
+        except OSError as error:
+            why = error.strerror or error
+            self.fail(f"{str(path)!r}: cannot be written there: {why}", param, ctx)
+        except InputError as error:
+            self.fail(str(error), param, ctx)
         return path
 
 
@@ -201,20 +210,43 @@ class ReportFile(OutputFile):
             self.fail(f"{str(path)!r}: is a file: allowed is a folder, .html or .md", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
-        if not _writable(path / "report.html" if path.is_dir() else path):
-            self.fail(f"{str(path)!r}: cannot be written there", param, ctx)
+        inside = path / "report.html" if path.is_dir() else path.with_suffix(".html")
+        super().convert(inside, param, ctx)
         return path
 
 
-def _writable(path: Path) -> bool:
-    """Whether a new file can be made beside ``path``."""
-    probe = path.with_name(f".{path.name}.probe")
+def _library(path: Path) -> None:
+    """Refuse a file that needs what is not installed, or cannot be imported.
+
+    Raises
+    ------
+    InputError
+        If that is so, or a .zarr stands there that may not be replaced.
+    OSError
+        If that cannot be read.
+    """
+    suffix = path.suffix.lower()
+    module, extra = _LIBRARIES.get(suffix, ("pendmap.files", ""))
     try:
-        probe.touch(exist_ok=True)
-        probe.unlink()
-    except OSError:
-        return False
-    return True
+        importlib.import_module(module)
+    except Exception as error:
+        raise InputError(
+            f"{str(path)!r}: {suffix} needs {extra}, which cannot be imported "
+            f"({type(error).__name__}: {error}): allowed is to install it, or another output"
+        ) from error
+    if suffix == ".zarr":
+        from pendmap.store import check_replaceable
+
+        check_replaceable(path)
+
+
+_LIBRARIES = {
+    **dict.fromkeys((".png", ".svg", ".pdf", ".html", ".md"), ("pendmap.figures", "matplotlib")),
+    ".rrd": ("pendmap.viewer", "rerun-sdk"),
+    ".nc": ("netCDF4", "netcdf4"),
+    ".zarr": ("zarr", "the extra pendmap[zarr]"),
+}
+"""What is imported before anything is computed, by suffix, and what brings it."""
 
 
 NUMBER = _Number()

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import difflib
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.files import toml_text, whole_file
+from pendmap.files import read_toml, toml_text, whole_file
 from pendmap.model import quantities
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula, formulas_of
@@ -66,7 +65,7 @@ def load_model(
     OSError
         If it cannot be read.
     """
-    content = _content(path)
+    content = read_toml(path)
     typed = dict(typed or {})
     try:
         _check_top(content)
@@ -121,14 +120,6 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
     with whole_file(path, (".toml",)) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
     return Path(path)
-
-
-def _content(path: str | os.PathLike[str]) -> dict[str, Any]:
-    try:
-        # Editors on Windows put a mark before the text that is none of it.
-        return tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{os.fspath(path)}: not a TOML file: {error}") from None
 
 
 def _pendulum_table(content: dict[str, Any]) -> dict[str, Any]:

@@ -6,13 +6,12 @@ import dataclasses
 import math
 import os
 import re
-import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.files import read_toml
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -242,10 +241,7 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
         If it cannot be read.
     """
     shown = os.fspath(path)
-    try:
-        content = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{shown}: not a TOML file: {error}") from None
+    content = read_toml(path)
     if "pendulum" not in content:
         unknown = [key for key in content if key not in ("formula", "format_version")]
         if unknown:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import tomllib
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.files import read_toml
 from pendmap.records.accelerometer import Place, place_of
 from pendmap.records.units import CHANNELS, PIVOT_UNITS
 
@@ -111,10 +111,7 @@ def read_description(path: Path) -> Description:
     OSError
         If it cannot be read.
     """
-    try:
-        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not a TOML file: {' '.join(str(error).split())}") from None
+    content = read_toml(path)
     try:
         return _description(content)
     except InputError as error:

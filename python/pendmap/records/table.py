@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.records.text import Table, decoded, parsed
+from pendmap.files import read_whole
+from pendmap.records.text import MOST_COLUMNS, Table, decoded, parsed
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from pendmap.records.description import Reader
 
 __all__ = ["read_table"]
 
 MOST_BYTES: Final = 2**30
-"""Largest file that is read: an hour at 100 kHz."""
+"""Largest file that is read, and bytes that its numbers may take: an hour at 10 kHz."""
 
 HUGEST: Final = 1e18
 """Largest number that can be a reading: nanoseconds since 1970 are 2e18, all else is less."""
@@ -46,13 +49,7 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
         If it cannot be read.
     """
     where = str(path)
-    if path.is_dir():
-        raise InputError(f"{where}: is a folder: allowed is a file")
-    if not path.is_file() and path.exists():
-        raise InputError(f"{where}: is no file")
-    if path.stat().st_size > MOST_BYTES:
-        raise InputError(f"{where}: is larger than 1 GiB: allowed are smaller files")
-    data = path.read_bytes()
+    data = read_whole(path, MOST_BYTES)
     digest = hashlib.sha256(data).hexdigest()
     for mark, what in _KNOWN.items():
         if data.startswith(mark):
@@ -70,28 +67,52 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
 
 
 def _parquet(data: bytes, where: str) -> Table:
-    import pandas as pd
-
     try:
-        frame = pd.read_parquet(io.BytesIO(data))
+        names, columns = _columns(data, where)
+    except InputError:
+        raise
     except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        reason = " ".join(str(error).split())[:100]
-        raise InputError(f"{where}: is no Parquet file that can be read: {reason}") from None
-    if frame.shape[0] == 0 or frame.shape[1] == 0:
+        raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None
+    if not columns or columns[0].size == 0:
         raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
+    values = np.column_stack(columns)
+    values[~np.isfinite(values)] = np.nan
+    if values.shape[1] < 2:
+        raise InputError(f"{where}: has one column: allowed are a time and an angle")
+    return Table(names, values, np.arange(1, values.shape[0] + 1))
+
+
+def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
+    """Unpack the columns of a Parquet file, as far as the file says that they are no more."""
+    import pandas as pd
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    file = parquet.ParquetFile(io.BytesIO(data))
+    groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
+    parts = [group.column(k) for group in groups for k in range(group.num_columns)]
+    size = sum(max(8 * part.num_values, part.total_uncompressed_size) for part in parts)
+    if file.metadata.num_columns > MOST_COLUMNS:
+        count = file.metadata.num_columns
+        raise InputError(f"{where}: has {count} columns: allowed are up to {MOST_COLUMNS}")
+    if size > MOST_BYTES:
+        raise InputError(f"{where}: unpacks to {size / 2**20:.0f} MiB: allowed are 1024 MiB")
+    # A text is unpacked once, however many rows have it.
+    kinds = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary)
+    texts = [field.name for field in file.schema_arrow if any(kind(field.type) for kind in kinds)]
+    frame = parquet.read_table(io.BytesIO(data), read_dictionary=texts).to_pandas()
     frame = frame.reset_index() if frame.index.name else frame
     columns = []
     for k in range(frame.shape[1]):
         column = frame.iloc[:, k]
         if pd.api.types.is_datetime64_any_dtype(column):
-            seconds = (column - column.iloc[0]).dt.total_seconds()
-            columns.append(seconds.to_numpy(dtype=float))
+            column = (column - column.iloc[0]).dt.total_seconds() if len(column) else column
         elif pd.api.types.is_timedelta64_dtype(column):
-            columns.append(column.dt.total_seconds().to_numpy(dtype=float))
+            column = column.dt.total_seconds()
+        elif isinstance(column.dtype, pd.CategoricalDtype):
+            known = pd.to_numeric(pd.Series(column.cat.categories), errors="coerce")
+            column = pd.Series(np.append(known.to_numpy(dtype=float), np.nan)[column.cat.codes])
         else:
-            columns.append(pd.to_numeric(column, errors="coerce").to_numpy(dtype=float))
-    values = np.column_stack(columns)
-    values[~np.isfinite(values)] = np.nan
-    if values.shape[1] < 2:
-        raise InputError(f"{where}: has one column: allowed are a time and an angle")
-    return Table(tuple(map(str, frame.columns)), values, np.arange(1, values.shape[0] + 1))
+            column = pd.to_numeric(column, errors="coerce")
+        columns.append(column.to_numpy(dtype=float))
+    return tuple(map(str, frame.columns)), columns

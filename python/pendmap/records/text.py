@@ -20,7 +20,13 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import Reader
 
-__all__ = ["Table", "decoded", "parsed"]
+__all__ = ["MOST_COLUMNS", "Table", "decoded", "parsed"]
+
+MOST_COLUMNS: Final = 1000
+"""Columns that a table may have: a logger of a hundred channels with ten numbers each."""
+
+LONGEST: Final = 40 * MOST_COLUMNS
+"""Characters of the longest line that may be a row of so many numbers."""
 
 LOOKED_AT: Final = 400
 """Lines, from all over a file, that its separators are found from."""
@@ -123,6 +129,14 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     lines = [(k, line) for k, line in lines if k > reader.skip_rows]
     if not lines:
         raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
+    long = sum(len(line) > LONGEST for _, line in lines)
+    if long > ENOUGH * len(lines):
+        raise InputError(
+            f"{where}: has lines of more than {LONGEST} characters: allowed are tables of up to "
+            f"{MOST_COLUMNS} columns"
+        )
+    # A line without a number is left out with those that cannot be read.
+    lines = [(k, line if len(line) <= LONGEST else "?") for k, line in lines] if long else lines
     delimiter, decimal, width = _way(lines, reader, where)
     fits = [_fits(line, delimiter, decimal, width) for _, line in lines]
     first = fits.index(True)
@@ -188,7 +202,7 @@ def _split(line: str, delimiter: str) -> list[str]:
 def _is_row(parts: list[str], decimal: str) -> int:
     """Return how many numbers a line has; 0 if anything in it is neither number nor nothing."""
     numbers = 0
-    for part in parts:
+    for part in parts if len(parts) <= MOST_COLUMNS else ():
         text = part if decimal == "." else part.replace(decimal, ".", 1) if "." not in part else "?"
         if _NUMBER.fullmatch(text):
             numbers += 1

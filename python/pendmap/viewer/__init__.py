@@ -138,13 +138,11 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         raise InputError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
     refuse_lists(dataset)
     layout, log = _KINDS[kind]
-    with whole_file(path, SUFFIXES) as part, frame.strict():
-        recording = frame.recording(dataset)
-        try:
-            with recording:
-                recording.save(part, default_blueprint=layout(dataset))
-                frame.describe(recording, dataset)
-                log(recording, dataset)
-        finally:
-            recording.disconnect()
+    with (
+        whole_file(path, SUFFIXES) as part,
+        frame.strict(),
+        frame.written(frame.recording(dataset), layout(dataset), part) as recording,
+    ):
+        frame.describe(recording, dataset)
+        log(recording, dataset)
     return Path(path)

@@ -75,19 +75,15 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
         content = _content(found, shown)
         # A layout holds for all recordings of an application, and this one has runs of its own.
         recording = frame.identified(content, f"pendmap diagnosis {content[:6]}")
-        try:
-            with recording:
-                recording.save(part, default_blueprint=_blueprint(shown, larger, panels))
-                _describe(recording, found, larger)
-                frame.text(recording, "summary", report.as_markdown(report.diagnosis(found), {}))
-                for number, one in enumerate(shown, 1):
-                    beside.log(recording, f"run_{number}", one, larger)
-                for root, (panel, _) in panels.items():
-                    panel.log(recording, root)
-                _torques(recording, found, panels)
-                _forecasts(recording, found, panels)
-        finally:
-            recording.disconnect()
+        with frame.written(recording, _blueprint(shown, larger, panels), part):
+            _describe(recording, found, larger)
+            frame.text(recording, "summary", report.as_markdown(report.diagnosis(found), {}))
+            for number, one in enumerate(shown, 1):
+                beside.log(recording, f"run_{number}", one, larger)
+            for root, (panel, _) in panels.items():
+                panel.log(recording, root)
+            _torques(recording, found, panels)
+            _forecasts(recording, found, panels)
     return Path(path)
 
 

@@ -16,6 +16,7 @@ from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
 
     import numpy.typing as npt
     import xarray as xr
@@ -32,6 +33,7 @@ __all__ = [
     "summary",
     "text",
     "write",
+    "written",
 ]
 
 INK = (150, 150, 150)
@@ -89,6 +91,25 @@ def strict() -> Iterator[None]:
         yield
     finally:
         rr.set_strict_mode(before)
+
+
+@contextlib.contextmanager
+def written(
+    stream: rr.RecordingStream, layout: rrb.BlueprintLike, path: Path
+) -> Iterator[rr.RecordingStream]:
+    """Collect what is logged in the block in memory, with its layout, and write it at the end.
+
+    The library's own way to a file waits for ever where the disk takes no more.
+    """
+    try:
+        with stream:
+            memory = stream.memory_recording()
+            stream.send_blueprint(layout, make_active=False, make_default=True)
+            yield stream
+            stream.flush()
+            path.write_bytes(memory.drain_as_bytes())
+    finally:
+        stream.disconnect()
 
 
 def describe(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:

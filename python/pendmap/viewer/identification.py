@@ -68,15 +68,11 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
         content = _content(report, shown)
         # A layout holds for all recordings of an application, and this one has axes of its own.
         recording = frame.identified(content, f"pendmap identification {content[:6]}")
-        try:
-            with recording:
-                recording.save(part, default_blueprint=_blueprint(shown, w0))
-                _describe(recording, report)
-                frame.text(recording, "summary", found.page(report))
-                for number, one in enumerate(shown, 1):
-                    decay.log(recording, f"run_{number}", one, w0)
-        finally:
-            recording.disconnect()
+        with frame.written(recording, _blueprint(shown, w0), part):
+            _describe(recording, report)
+            frame.text(recording, "summary", found.page(report))
+            for number, one in enumerate(shown, 1):
+                decay.log(recording, f"run_{number}", one, w0)
     return Path(path)
 
 

@@ -102,6 +102,8 @@ def _checked(file: Path) -> Path:
         raise RecordingNotFoundError(f"{str(file)!r} does not exist")
     if file.is_dir():
         raise NotARecordingError(f"{str(file)!r} is a folder, not an .rrd recording")
+    if not file.is_file():
+        raise NotARecordingError(f"{str(file)!r} is a pipe or a device, not an .rrd recording")
     with file.open("rb") as stream:
         if stream.read(len(MAGIC)) != MAGIC:
             raise NotARecordingError(f"{str(file)!r} is not an .rrd recording")

@@ -6,13 +6,12 @@ import dataclasses
 import errno
 import importlib.metadata
 import math
-import shutil
-import uuid
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
-from pendmap.files import held_interrupts, toml_text
+from pendmap.files import check_room, toml_text, whole_file, whole_folder
 
 if TYPE_CHECKING:
     import os
@@ -25,6 +24,8 @@ __all__ = ["FORMAT_VERSION", "Places", "held_out", "places", "write"]
 FORMAT_VERSION: Final = 1
 """Version of the layout of the truth file."""
 
+_FILES: Final = re.compile(r"experiment\.toml|run_\d+\.csv")
+"""Names of the files of an experiment."""
 _GRAVITY: Final = 9.81
 _ENOUGH: Final = 3
 """Runs of a kind from which on one is held out."""
@@ -54,8 +55,8 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
     InputError
         If the folder is not empty, or there is a truth already, and they may not be replaced; or
         if the folder is not an experiment and shall be replaced.
-    FileNotFoundError, NotADirectoryError
-        If the folder above does not exist, or the path is a file.
+    OSError
+        If the folder above does not exist, the path is a file, or nothing may be written there.
     """
     folder = Path(out)
     if not folder.name or folder.name == "..":
@@ -68,52 +69,36 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
     full = folder.is_dir() and any(folder.iterdir())
     if full and not replace:
         raise InputError(f"{folder}: is not empty: allowed is a new or empty folder, or --replace")
-    if full and not (folder / "experiment.toml").is_file():
-        raise InputError(f"{folder}: is not an experiment: --replace replaces nothing else")
+    if full and not (truth.is_file() and all(_FILES.fullmatch(f.name) for f in folder.iterdir())):
+        raise InputError(
+            f"{folder}: is not an experiment of the virtual rig alone, with its truth beside it: "
+            "--replace replaces nothing else"
+        )
     if truth.exists() and not replace:
         raise InputError(f"{truth}: exists: allowed is another folder, or --replace")
+    check_room(truth)
     return Places(folder, truth)
 
 
 def write(experiment: Experiment, where: Places) -> None:
     """Write the folder and the truth: both complete, or neither.
 
-    They are written beside their places under hidden names and renamed at the end; an interrupt
-    waits until then.
+    They are written beside their places and renamed at the end; an interrupt waits until then.
 
     Raises
     ------
     OSError
         If they cannot be written.
     """
-    mark = uuid.uuid4().hex[:8]
-    folder, truth = where.experiment, where.truth
-    part = folder.with_name(f".{folder.name}-{mark}.part")
-    truth_part = part.with_suffix(".part.toml")
-    old = part.with_suffix(".old")
-    with held_interrupts():
-        try:
-            try:
-                part.mkdir()
-            except OSError as error:
-                raise type(error)(error.errno, error.strerror, str(folder)) from error
-            for k, run in enumerate(experiment.runs):
-                _write_run(part / _file(k), run)
-            _write_toml(part / "experiment.toml", _description(experiment))
-            _write_toml(truth_part, _truth(experiment))
-            if folder.exists():
-                folder.rename(old)
-            try:
-                part.rename(folder)
-            except OSError:
-                if old.exists():
-                    old.rename(folder)
-                raise
-            truth_part.replace(truth)
-        finally:
-            for leftover in (part, old):
-                shutil.rmtree(leftover, ignore_errors=True)
-            truth_part.unlink(missing_ok=True)
+    with (
+        whole_file(where.truth, [".toml"]) as truth,
+        whole_folder(where.experiment) as folder,
+    ):
+        folder.mkdir()
+        for k, run in enumerate(experiment.runs):
+            _write_run(folder / _file(k), run)
+        _write_toml(folder / "experiment.toml", _description(experiment))
+        _write_toml(truth, _truth(experiment))
 
 
 def _file(k: int) -> str:

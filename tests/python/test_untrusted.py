@@ -1,0 +1,150 @@
+"""Files that nobody vouches for: pipes, devices, bombs, damage; refused at once, on one line."""
+
+from __future__ import annotations
+
+import os
+import time
+import unicodedata
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyarrow import parquet
+
+import pendmap
+from pendmap import InputError, viewer
+from pendmap.errors import one_line
+from pendmap.records.text import MOST_COLUMNS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+READERS = {
+    ".csv": pendmap.read_experiment,
+    ".parquet": pendmap.read_experiment,
+    ".toml": pendmap.load_model,
+    ".nc": pendmap.load,
+    ".zarr": pendmap.load,
+    ".rrd": viewer.open_viewer,
+}
+
+
+@pytest.mark.parametrize("suffix", READERS)
+@pytest.mark.parametrize("kind", ["pipe", "endless", "folder"])
+def test_what_is_no_file_is_refused_without_waiting(tmp_path: Path, suffix: str, kind: str) -> None:
+    source = tmp_path / f"x{suffix}"
+    if kind == "pipe":
+        os.mkfifo(source)
+    elif kind == "folder":
+        source.mkdir()
+    else:
+        source.symlink_to("/dev/zero")
+    with pytest.raises(InputError):
+        READERS[suffix](source)
+
+
+def test_formulas_and_descriptions_are_files_too(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "experiment.toml")
+    with pytest.raises(InputError):
+        pendmap.read_experiment(tmp_path)
+    with pytest.raises(InputError, match="pipe"):
+        pendmap.load_formulas(tmp_path / "experiment.toml")
+    (tmp_path / "large.toml").write_bytes(b"#" * (2**22 + 1))
+    with pytest.raises(InputError, match="larger than 4 MiB"):
+        pendmap.load_model(tmp_path / "large.toml")
+
+
+@pytest.mark.parametrize("columns", [MOST_COLUMNS + 1, 20_000, 1_000_000])
+@pytest.mark.parametrize("cell", ["0.5", ""])
+def test_a_table_has_no_more_columns_than_are_read(tmp_path: Path, columns: int, cell: str) -> None:
+    row = ",".join([cell or "1.5", *[cell] * (columns - 1)])
+    file = tmp_path / "wide.csv"
+    file.write_text("\n".join([row] * max(3_000_000 // columns, 3)))
+    begin = time.process_time()
+    with pytest.raises(InputError, match=r"wide\.csv: has (no rows|lines of more)"):
+        pendmap.read_experiment(file)
+    assert time.process_time() - begin < 10
+
+
+def test_as_many_columns_as_are_allowed_are_read(tmp_path: Path) -> None:
+    t = np.arange(300) * 0.03
+    x = 2 * np.exp(-0.05 * t) * np.cos(6 * t)
+    rest = ",0.25" * (MOST_COLUMNS - 2)
+    names = ["t_s", "theta_rad", *(f"c{k}" for k in range(MOST_COLUMNS - 2))]
+    lines = [",".join(names), *(f"{a:.4f},{b:.6f}{rest}" for a, b in zip(t, x, strict=True))]
+    lines[150:150] = ["9," * 10**6]  # a line that broke is left out, however long
+    (tmp_path / "wide.csv").write_text("\n".join(lines))
+    experiment = pendmap.read_experiment(tmp_path / "wide.csv")
+    assert experiment.runs[0].theta == pytest.approx(x, abs=1e-6)
+    assert "unreadable-lines" in {found.what for found in experiment.runs[0].findings}
+
+
+def test_a_small_parquet_does_not_unpack_to_gigabytes(tmp_path: Path) -> None:
+    file = tmp_path / "bomb.parquet"
+    rows = pa.array(np.zeros(10**6))
+    schema = pa.schema([("t_s", pa.float64()), ("theta_rad", pa.float64())])
+    with parquet.ParquetWriter(file, schema) as writer:
+        for _ in range(80):
+            writer.write_table(pa.table([rows, rows], schema=schema))
+    assert file.stat().st_size < 2**20
+    with pytest.raises(InputError, match="unpacks to 1221 MiB"):
+        pendmap.read_experiment(file)
+
+
+def test_texts_of_a_parquet_are_unpacked_once(tmp_path: Path) -> None:
+    t = np.arange(1000) * 0.01
+    long = pa.DictionaryArray.from_arrays(pa.array([0] * 1000), pa.array(["9" * 10**5]))
+    columns = {"t_s": t, "theta_rad": 2 * np.exp(-0.05 * t) * np.cos(6 * t)}
+    table = pa.table(columns | {"note": long.cast(pa.string()), "as_text": [f"{v}" for v in t]})
+    parquet.write_table(table, tmp_path / "run.parquet")
+    run = pendmap.read_experiment(tmp_path / "run.parquet").runs[0]
+    assert run.theta == pytest.approx(columns["theta_rad"])
+
+
+def test_a_small_result_does_not_unpack_to_more_than_the_memory(tmp_path: Path) -> None:
+    import netCDF4  # noqa: PLC0415 (the library itself: xarray would make the array)
+
+    file = tmp_path / "bomb.nc"
+    with netCDF4.Dataset(file, "w") as made:
+        made.setncatts({"format_version": 1, "kind": "basins"})
+        made.createDimension("theta", 2**40)
+        made.createVariable("label", "f8", ("theta",), zlib=True)
+    assert file.stat().st_size < 2**16
+    with pytest.raises(InputError, match="unpacks to"):
+        pendmap.load(file)
+
+
+@pytest.mark.parametrize("version", [0, 2, 1.5, "1", "x", float("nan"), [1, 2]])
+def test_a_format_that_is_none_is_refused(tmp_path: Path, version: object) -> None:
+    attrs = {"format_version": version, "kind": "basins"}
+    xr.Dataset({"x": ("t", [1.0])}, attrs=attrs).to_netcdf(tmp_path / "r.nc", engine="netcdf4")
+    with pytest.raises(InputError, match="has format"):
+        pendmap.load(tmp_path / "r.nc")
+
+
+def test_a_foreign_result_is_not_drawn(pendmap_command: Run, tmp_path: Path) -> None:
+    attrs = {"format_version": 1, "kind": "tongues", "title": "\x1b[31mred\x07" + "x" * 5000}
+    foreign = xr.Dataset({"x": ("t", [1.0])}, attrs=attrs)
+    foreign.to_netcdf(tmp_path / "r.nc", engine="netcdf4")
+    run = pendmap_command("plot", "r.nc")
+    assert run.returncode == 2
+    assert len(run.stderr.splitlines()) == 1
+    assert run.stderr.startswith("pendmap: r.nc: cannot be drawn")
+    assert "\x1b" not in run.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["r.nc"]
+
+
+@settings(max_examples=200)
+@given(st.text(st.characters(), max_size=2000))
+def test_messages_are_short_and_shown_as_they_are(text: str) -> None:
+    for message in (one_line(text), str(InputError(text))):
+        assert len(message) <= 500
+        assert not [c for c in message if unicodedata.category(c)[0] == "C"]
+    if len(text) <= 500 and text.isprintable() and "  " not in text:
+        assert one_line(text) == text.strip()
