@@ -6,14 +6,18 @@ import functools
 import json
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from pendmap.checks import MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.show import plain, progress_bar, write_all, write_table
+from pendmap.cli.show import plain, progress_bar, refuse, say_written, write_all, write_table
 from pendmap.cli.types import NUMBER, OutputFile, Whole
+
+if TYPE_CHECKING:
+    from pendmap.errors import InputError
 
 __all__ = ["command"]
 
@@ -74,10 +78,12 @@ def command(  # noqa: PLR0913 (an option each)
         experiment = read_experiment(path)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written: list[str] = []
+    refused: list[InputError] = []
     if plot is not None:
         from pendmap import figures
 
-        written = write_all([(functools.partial(figures.draw_comparison, comparison), plot)])
+        draw = functools.partial(figures.draw_comparison, comparison)
+        written = write_all([(draw, plot)], refused)
     if as_json:
         click.echo(json.dumps(plain(fields(comparison) | {"model": str(model)}), allow_nan=False))
     elif not quiet:
@@ -89,5 +95,5 @@ def command(  # noqa: PLR0913 (an option each)
         for line in as_text(comparison):
             if line not in doubts:
                 click.echo(line)
-        if written:
-            click.echo("Written: " + ", ".join(written))
+        say_written(written)
+    refuse(refused)

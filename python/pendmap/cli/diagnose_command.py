@@ -16,7 +16,15 @@ import click
 from pendmap.cli.inputs import keep_inputs, report_files
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import check_view
-from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
+from pendmap.cli.show import (
+    open_recording,
+    plain,
+    progress_bar,
+    refuse,
+    say_written,
+    write_all,
+    write_table,
+)
 from pendmap.cli.types import OutputFile, ReportFile, Whole
 from pendmap.errors import InputError
 
@@ -138,14 +146,19 @@ def command(  # noqa: PLR0913 (an option each)
             progress=progress,
         )
     with progress_bar("write", shown=shown):
-        written = write_all(_files(found, outputs, "pendmap " + shlex.join(sys.argv[1:])))
+        refused: list[InputError] = []
+        line = "pendmap " + shlex.join(sys.argv[1:])
+        written = write_all(_files(found, outputs, line), refused)
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 
-        click.echo(json.dumps(plain(fields(found) | {"model": written[0]}), allow_nan=False))
+        model_file = str(outputs[0])
+        content = fields(found) | {"model": model_file if model_file in written else None}
+        click.echo(json.dumps(plain(content), allow_nan=False))
     elif not quiet:
         _say(found)
-        click.echo("Written: " + ", ".join(written))
+        say_written(written)
+    refuse(refused)
     if view and rerun is not None:
         open_recording(rerun)
 
@@ -185,7 +198,7 @@ def _files(
     from pendmap.model import save_model
 
     out, plot, report, rerun = outputs
-    yield functools.partial(save_model, diagnosed_model(found, line)), out
+    yield lambda path: save_model(diagnosed_model(found, line), path), out
     if plot is not None:
         from pendmap import figures
 

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.options import Outputs, output_options
-from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
+from pendmap.cli.show import (
+    open_viewer,
+    plain,
+    progress_bar,
+    refuse,
+    say_written,
+    write_all,
+    write_table,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -69,11 +77,13 @@ def command(
     except InputError:
         _show(report, outputs)
         raise
+    refused: list[InputError] = []
     with progress_bar("write", shown=outputs.shows_progress):
-        written = write_all(_files(outputs, report, model))
-    _show(report, outputs, outputs.out)
-    if written and not outputs.as_json and not outputs.quiet:
-        click.echo("Written: " + ", ".join(written))
+        written = write_all(_files(outputs, report, model), refused)
+    _show(report, outputs, outputs.out if str(outputs.out) in written else None)
+    if not outputs.as_json and not outputs.quiet:
+        say_written(written)
+    refuse(refused)
     open_viewer(outputs)
 
 

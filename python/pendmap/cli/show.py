@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.errors import InputError
 from pendmap.files import held_interrupts
 from pendmap.notebook import columns
 
@@ -26,6 +27,8 @@ __all__ = [
     "open_viewer",
     "plain",
     "progress_bar",
+    "refuse",
+    "say_written",
     "show",
     "write_all",
     "write_table",
@@ -65,24 +68,43 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
     elif not outputs.quiet:
         click.echo(dataset.attrs["title"])
         click.echo(dataset.attrs["summary"])
-        if written:
-            click.echo("Written: " + ", ".join(written))
+        say_written(written)
     open_viewer(outputs)
 
 
-def write_all(files: Iterable[tuple[Callable[[Path], Path], Path]]) -> list[str]:
+def write_all(
+    files: Iterable[tuple[Callable[[Path], Path], Path]], refused: list[InputError] | None = None
+) -> list[str]:
     """Write files one after the other and return their names.
 
-    An interrupt takes effect between two files and names those that are complete.
+    An interrupt takes effect between two files and names those that are complete. What cannot be
+    put into a file is raised, or where there is a list for it kept there: the others are written.
     """
     written: list[str] = []
     try:
         for write, path in files:
-            with held_interrupts():
-                written.append(str(write(path)))
+            try:
+                with held_interrupts():
+                    written.append(str(write(path)))
+            except InputError as error:
+                if refused is None:
+                    raise
+                refused.append(error)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(*written) from None
     return written
+
+
+def say_written(written: Sequence[str]) -> None:
+    """Say which files were written, if any were."""
+    if written:
+        click.echo("Written: " + ", ".join(written))
+
+
+def refuse(refused: Sequence[InputError]) -> None:
+    """Raise the first of what could not be put into files."""
+    if refused:
+        raise refused[0]
 
 
 def open_viewer(outputs: Outputs) -> None:

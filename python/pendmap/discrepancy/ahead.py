@@ -49,6 +49,11 @@ class Prospects:
         What might be recorded; one in which the model is lost is left out.
     candidates : sequence of Candidate
         Effects beside those of the model.
+
+    Raises
+    ------
+    InputError
+        If the model is lost in all of the menu.
     """
 
     def __init__(
@@ -68,6 +73,8 @@ class Prospects:
             longest[planned.start] = max(longest.get(planned.start, 0.0), planned.seconds)
         self._starts, runs, windows = _simulated(evidence, found, longest)
         self.menu = [p for p in menu if all(start in self._starts for start in p.starts)]
+        if menu and not self.menu:
+            raise InputError("the model leaves the range of numbers in every run that is proposed")
         self._step = _step(evidence, fit.model.w0)
         ahead = dataclasses.replace(
             fit,

@@ -54,7 +54,7 @@ def _run(one: RunComparison) -> dict[str, Any]:
             }
             for row in one.table.rows
         ],
-        "table1_left_out": one.table.left_out or None,
+        "table1_left_out": one.table.left_out or next(iter(one.table.lost.values()), None),
         "periods": _pairs(errors and errors.period_time, errors and errors.period_error),
         "peaks": _pairs(errors and errors.peak, errors and errors.peak_error),
         "findings": [found.text for found in one.run.findings],
@@ -113,6 +113,8 @@ def as_text(comparison: Comparison) -> Iterator[str]:
             yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {said}"
         if one.table.left_out:
             yield f"{one.run.name}: {one.table.left_out}"
+        for reason in one.table.lost.values():
+            yield f"{one.run.name}: periods and peaks are not compared: {reason}"
         if one.rms > FITS * one.sigma:
             yield (
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "

@@ -226,5 +226,10 @@ def _best(
         joint = fit_together(runs, start=start, known=known, effects=effects)
     except TooShortError as error:
         return None, Identification(BEST, warnings=(str(error),), applicable=False)
+    except InputError as error:
+        if start is not None or effects:
+            raise
+        # No other method can stand in for what was asked for by name; without that they can.
+        return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
     part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
     return joint, identification_of(joint.fit, joint.readings, part)

@@ -50,6 +50,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
             for r in report.table.rows
         ],
         "table1_left_out": report.table.left_out or None,
+        "not_simulated": dict(report.table.lost),
         "rms": None if report.joint is None else report.joint.fit.rms,
         "findings": [
             found.text
@@ -122,6 +123,8 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
     for name, found in report.methods.items():
         for warning in found.warnings:
             yield f"{name}: {warning}"
+        if name in report.table.lost:
+            yield f"{name}: not simulated from the first peak: {report.table.lost[name]}"
     yield from findings_said(report.experiment, *report.runs)
 
 
