@@ -86,10 +86,10 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
 
     def proposed() -> Outlook | None:
         if judgement.verdict == "ambiguous":
-            return separated(evidence, nearest, judgement.standings, level)
+            return separated(evidence, nearest, judgement.standings, level, reasons)
         if judgement.verdict == "named":
-            return tightened(evidence, best, level)
-        return seen(evidence, best, scores)
+            return tightened(evidence, best, level, reasons)
+        return seen(evidence, best, scores, reasons)
 
     outlook = attempted(reasons, "proposals", proposed, None)
     said = _sentences(judgement, outlook, evidence.forced)
