@@ -212,6 +212,8 @@ def why_not(model: Rig, run: Run) -> str:
     """Return why a run cannot be compared with a model; empty where it can."""
     if run.peaks_only:
         return "it holds peaks alone"
+    if run.copied:
+        return "it is a copy of another run"
     if not run.moves:
         return "nothing moves in it"
     if run.kind != "forced":
