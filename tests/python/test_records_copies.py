@@ -10,6 +10,7 @@ import pytest
 
 import pendmap
 import recorded
+from pendmap.identification import compare, identify_experiment
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -110,11 +111,11 @@ def test_a_copy_held_out_tests_nothing(tmp_path: Path) -> None:
     assert found.mended
     assert "copy is a copy of one" in found.text
     assert "test nothing" in found.text
-    report = pendmap.identify_experiment(read)
+    report = identify_experiment(read)
     assert [run.name for run in report.runs] == ["one", "two"]
     assert any("copies another" in line for line in report.said()[1])
     model = pendmap.Rig(w0=recorded.W0, c_over_m=recorded.C, Tr=recorded.TR)
-    compared = pendmap.identification.compare(model, read)
+    compared = compare(model, read)
     assert compared.left_out == (("copy", "it is a copy of another run"),)
 
 
@@ -127,7 +128,7 @@ def test_runs_of_several_pendulums_are_told_before_any_number(tmp_path: Path) ->
     read = experiment(tmp_path, files)
     assert [found.what for found in read.findings] == ["rigs-differ"]
     with pytest.raises(pendmap.InputError, match="no model follows these records"):
-        pendmap.identify_experiment(read)
+        identify_experiment(read)
     # Of one pendulum: nothing is said, and the periods are those of the small swing.
     same = experiment(
         tmp_path / "same",
@@ -154,3 +155,22 @@ def test_a_drive_is_resolved_by_two_readings_a_period(rate: float, tmp_path: Pat
     if rate == 3.0:
         assert "1.75 Hz is read at 3 Hz" in said[0]
         assert "1.25 Hz" in said[0]
+
+
+def test_a_record_of_which_little_can_be_used_is_told_before_any_number(tmp_path: Path) -> None:
+    """A motion that gains energy all the time is carried by something."""
+    time = np.arange(0, 30, 0.01)
+    growing = 0.1 * np.exp(0.05 * time) * np.cos(6 * time)
+    path = tmp_path / "run.csv"
+    path.write_text(recorded.text((time, recorded.noisy(growing))))
+    (run,) = pendmap.read_experiment(path).runs
+    (said,) = (f.text for f in run.findings if f.what == "few-used")
+    assert f"only {run.trusted.sum()} of 3000 readings" in said
+    # A long rest is no reason: nothing moves there.
+    time, theta, _ = recorded.motion(1.0, duration=20.0)
+    long = np.arange(0, 500, 0.01)
+    rest = np.interp(long, time, theta * np.maximum(1 - time / 18, 0))
+    path.write_text(recorded.text((long, recorded.noisy(rest, 0.0002, 0.0))))
+    (run,) = pendmap.read_experiment(path).runs
+    assert run.trusted.sum() < 0.1 * long.size
+    assert "few-used" not in {f.what for f in run.findings}

@@ -115,10 +115,9 @@ def _show(report: IdentificationReport, outputs: Outputs, model: Path | None = N
 
 
 def _say(report: IdentificationReport) -> None:
-    from pendmap.identification.summary import as_text, methods_table, table1_table
-    from pendmap.records.summary import doubts_said
+    from pendmap.identification.summary import as_text, foremost, methods_table, table1_table
 
-    doubts = list(doubts_said(report.experiment, *report.runs))
+    doubts = list(foremost(report))
     for line in doubts:
         click.echo(line)
     for head, rows in (methods_table(report), table1_table(report)):

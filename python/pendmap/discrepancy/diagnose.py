@@ -24,6 +24,7 @@ from pendmap.discrepancy.select import Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
 from pendmap.errors import InputError
+from pendmap.identification.astray import refuse_astray
 from pendmap.model.effects import definition
 from pendmap.notebook import Readable
 
@@ -229,8 +230,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     Raises
     ------
     InputError
-        If there is no run with samples, no start can be found, or an effect of your own cannot be a
-        candidate.
+        If there is no run with samples, no start can be found, an effect of your own cannot be a
+        candidate, or no model follows the records.
     """
     functions, others = divided(effects)
     own = checked_own(others)
@@ -246,6 +247,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         evidence, begin, max_effects, without, lambda done: report(1 + done, steps), own=own
     )
     nearest = search.run()
+    refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial)
     try:

@@ -10,7 +10,7 @@ from pendmap.discrepancy.cycles import AFTER, BEFORE
 from pendmap.discrepancy.given_out import confined, feeding, given_out
 from pendmap.discrepancy.physical import unphysical
 from pendmap.model.unit_names import unit_of
-from pendmap.records.summary import doubts_said, findings_said
+from pendmap.records.summary import doubts, doubts_said, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -57,6 +57,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
     wider = math.sqrt(found.best.trial.widening)
     return {
         "experiment": str(found.evidence.experiment.path),
+        "doubts": doubts(found.evidence.experiment, *found.evidence.runs),
         "verdict": found.verdict,
         "effects": [
             {

@@ -24,6 +24,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     """Return the JSON object of ``pendmap compare``."""
     return {
         "experiment": str(comparison.experiment.path),
+        "doubts": list(doubts_said(comparison.experiment, *(one.run for one in comparison.every))),
         "runs": [
             *(_run(run) for run in comparison.runs),
             *(forced_said.as_json(run) for run in comparison.forced),

@@ -20,6 +20,7 @@ __all__ = [
     "COLUMNS",
     "as_json",
     "as_text",
+    "foremost",
     "methods_table",
     "table1_table",
 ]
@@ -44,6 +45,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "runs": _runs(report),
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
+        "doubts": list(foremost(report)),
         "methods": {name: _method(found) for name, found in report.methods.items()},
         "table1": [
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
@@ -104,17 +106,15 @@ def _method(found: Identification) -> dict[str, Any]:
 def as_text(report: IdentificationReport) -> Iterator[str]:
     """Yield the lines beside the tables: intervals, warnings, what was found in the record.
 
-    Doubts about a unit come first.
+    What a reader must know before any number comes first.
     """
-    yield from doubts_said(report.experiment, *report.runs)
+    yield from foremost(report)
     best = _best(report)
     if best is not None:
         yield f"{best.method}: {best.used}"
         for name, estimate in {**best.estimates, **best.derived}.items():
             if estimate.ci95 is not None:
                 yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
-        if report.passed_over:
-            yield report.passed_over
     if report.table.left_out:
         yield f"{report.run.name}: {report.table.left_out}"
     said = left_out(report.experiment, report.runs)
@@ -126,6 +126,13 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
         if name in report.table.lost:
             yield f"{name}: not simulated from the first peak: {report.table.lost[name]}"
     yield from findings_said(report.experiment, *report.runs)
+
+
+def foremost(report: IdentificationReport) -> Iterator[str]:
+    """Yield doubts about the records, and which method another stands in for."""
+    yield from doubts_said(report.experiment, *report.runs)
+    if report.passed_over:
+        yield f"Warning: {report.passed_over}"
 
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:

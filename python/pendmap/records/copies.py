@@ -161,7 +161,8 @@ def _without(run: Run, other: Run, first: int, count: int) -> Run:
     )
     if run.hold_out and not trusted.any():
         text += ": held out, it would test nothing"
-    span = float(run.time[first]), float(run.time[first + count - 1])
+    low, high = float(run.time[first]), float(run.time[first + count - 1])
+    found = Finding(COPIED, text, mended=True, where=run.name, from_s=low, to_s=high)
     segments = run.segments
     if not trusted.any():
         segments = tuple(dataclasses.replace(part, used=False) for part in segments)
@@ -169,5 +170,5 @@ def _without(run: Run, other: Run, first: int, count: int) -> Run:
         run,
         trusted=trusted,
         segments=segments,
-        findings=(*run.findings, Finding(COPIED, text, mended=True, where=run.name, from_s=span[0], to_s=span[1])),
+        findings=(*run.findings, found),
     )

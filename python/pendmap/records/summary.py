@@ -22,6 +22,7 @@ __all__ = [
     "as_json",
     "as_text",
     "doubted",
+    "doubts",
     "doubts_said",
     "findings_said",
     "noise_said",
@@ -150,11 +151,16 @@ def _line(found: Finding) -> str:
     return f"- {mark}{found.text}{where}  [{found.what}]"
 
 
+def doubts(experiment: Experiment, *runs: Run) -> list[str]:
+    """Return each doubt about a unit or the records: to be read before any result."""
+    said = _said_of(experiment, runs)
+    return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
+
+
 def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
-    """Yield a warning for each doubt about a unit or the records: to be read before any result."""
-    for where, found in _said_of(experiment, runs):
-        if _doubted(found):
-            yield f"Warning: {where}: {found.text}"
+    """Yield a warning for each of :func:`doubts`."""
+    for text in doubts(experiment, *runs):
+        yield f"Warning: {text}"
 
 
 def doubted(experiment: Experiment, *runs: Run) -> bool:
