@@ -117,7 +117,7 @@ def _show(report: IdentificationReport, outputs: Outputs, model: Path | None = N
 def _say(report: IdentificationReport) -> None:
     from pendmap.identification.summary import as_text, foremost, methods_table, table1_table
 
-    doubts = list(foremost(report))
+    doubts = [f"Warning: {text}" for text in foremost(report)]
     for line in doubts:
         click.echo(line)
     for head, rows in (methods_table(report), table1_table(report)):

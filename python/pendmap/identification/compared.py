@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.identification import forced_said
-from pendmap.records.summary import doubts_said, findings_said
+from pendmap.records.summary import doubts, doubts_said, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,7 +24,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     """Return the JSON object of ``pendmap compare``."""
     return {
         "experiment": str(comparison.experiment.path),
-        "doubts": list(doubts_said(comparison.experiment, *(one.run for one in comparison.every))),
+        "doubts": doubts(comparison.experiment, *(one.run for one in comparison.every)),
         "runs": [
             *(_run(run) for run in comparison.runs),
             *(forced_said.as_json(run) for run in comparison.forced),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.errors import InputError
 from pendmap.identification.digits import interval, with_error
 from pendmap.identification.left_out import left_out
-from pendmap.records.summary import doubts_said, findings_said
+from pendmap.records.summary import doubts, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +45,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "runs": _runs(report),
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
-        "doubts": list(foremost(report)),
+        "doubts": foremost(report),
         "methods": {name: _method(found) for name, found in report.methods.items()},
         "table1": [
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
@@ -108,7 +108,8 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
 
     What a reader must know before any number comes first.
     """
-    yield from foremost(report)
+    for text in foremost(report):
+        yield f"Warning: {text}"
     best = _best(report)
     if best is not None:
         yield f"{best.method}: {best.used}"
@@ -128,11 +129,10 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
     yield from findings_said(report.experiment, *report.runs)
 
 
-def foremost(report: IdentificationReport) -> Iterator[str]:
-    """Yield doubts about the records, and which method another stands in for."""
-    yield from doubts_said(report.experiment, *report.runs)
-    if report.passed_over:
-        yield f"Warning: {report.passed_over}"
+def foremost(report: IdentificationReport) -> list[str]:
+    """Return doubts about the records, and which method another stands in for."""
+    first = doubts(report.experiment, *report.runs)
+    return [*first, report.passed_over] if report.passed_over else first
 
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
