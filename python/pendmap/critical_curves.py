@@ -120,6 +120,11 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(f"plane is {checks.shown(plane)}: allowed are {', '.join(PLANES)}")
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     refine = checks.flag("refine", refine)
+    if pendulum.theta_r > 0:
+        raise InputError(
+            f"theta_r is {pendulum.theta_r:g}: friction holds hanging rest whatever the drive, and "
+            "it never loses its stability: allowed is 0"
+        )
     began = time.perf_counter()
 
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None

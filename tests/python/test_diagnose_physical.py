@@ -108,7 +108,7 @@ def test_a_drift_that_takes_friction_below_0_is_told_with_its_time(
         ),
     )
     trial = fitted(evidence, model, ["w0", "c_over_m", "Tr"], steps=0)
-    told = below_zero(evidence, Found(trial, Held(trial.chi2, 1, trial.fit)))
+    told = below_zero(evidence, Found(trial, Held(trial.chi2, 1, trial.fit)), {})
     if rate > 0:
         assert told == {}
     else:

@@ -73,7 +73,6 @@ def test_a_replay_falls_freely_where_nothing_else_acts() -> None:
 
 def test_the_strength_of_a_drag_is_its_torque(found: Discrepancy) -> None:
     strength = strength_of(found.evidence, found.best, "quadratic_drag")
-    assert strength is not None
     q = found.effects[0].parameters["q"]
     speeds = np.concatenate([curve[1] for curve in found.best.trial.fit.curves])
     speeds = speeds[np.isfinite(speeds)]
@@ -86,7 +85,7 @@ def test_forecasts_do_not_depend_on_where_clocks_begin(found: Discrepancy) -> No
     for begin in np.random.default_rng(1).uniform(0.0, 1000.0, 3):
         held = tuple(_later(run, float(begin)) for run in found.evidence.held)
         evidence = dataclasses.replace(found.evidence, held=held)
-        moved = forecasts_of(evidence, found.base, found.best)
+        moved = forecasts_of(evidence, found.base, found.best, {})
         for forecast, usual in zip(moved, found.forecasts, strict=True):
             np.testing.assert_allclose(forecast.after, usual.after, rtol=0.1)
 

@@ -26,7 +26,7 @@ def test_a_search_that_did_not_converge_gives_no_model() -> None:
     lost = dataclasses.replace(report.best, converged=False)
     other = dataclasses.replace(report, methods=report.methods | {"trajectory": lost})
     assert other.best.method == "combined_repaired"
-    line = "trajectory did not converge: the model is that of combined_repaired"
+    line = "Warning: trajectory did not converge: the model is that of combined_repaired"
     assert line in list(as_text(other))
     model = identified_model(other)
     assert model.w0 == report.methods["combined_repaired"]["w0"]

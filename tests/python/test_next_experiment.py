@@ -116,7 +116,7 @@ def test_a_proposal_says_what_its_record_says(what: str) -> None:
     evidence = found.evidence
     menu = menu_of(evidence, found.base.trial.fit.model.w0)
     proposal = next(p for p in menu if len(p.runs) == 1 and what in p.what)
-    ahead = Prospects(evidence, found.base, [proposal], [])
+    ahead = Prospects(evidence, found.base, [proposal], [], {})
     predicted = ahead.after(proposal).matrix - ahead.old.matrix
     (run,) = done(request, proposal)
     reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)

@@ -138,7 +138,8 @@ def test_added_damping_is_damping_and_effects_count() -> None:
 @pytest.mark.parametrize(
     ("given", "match"),
     [
-        ({"theta_r": 0.05}, "friction holds it"),
+        ({"theta_r": 0.05}, "theta_r is 0.05: friction holds .*: allowed is 0"),
+        ({"effects": (Effect("coulomb_friction", {"theta_r": 0.05}),)}, "friction holds"),
         ({"torque": 0.1}, "a torque or a sideways drive moves it"),
         ({"effects": (Effect("drive_chirp", {"r": 0.001}),)}, "drive_chirp"),
     ],

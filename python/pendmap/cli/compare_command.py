@@ -6,7 +6,6 @@ import functools
 import json
 import sys
 from pathlib import Path
-
 import click
 
 from pendmap.checks import MOST_SEED, MOST_THREADS
@@ -77,7 +76,8 @@ def command(  # noqa: PLR0913 (an option each)
     if plot is not None:
         from pendmap import figures
 
-        written = write_all([(functools.partial(figures.draw_comparison, comparison), plot)])
+        draw = functools.partial(figures.draw_comparison, comparison)
+        written = write_all([(draw, plot)])
     if as_json:
         click.echo(json.dumps(plain(fields(comparison) | {"model": str(model)}), allow_nan=False))
     elif not quiet:
@@ -89,6 +89,5 @@ def command(  # noqa: PLR0913 (an option each)
         for line in as_text(comparison):
             if line not in doubts:
                 click.echo(line)
-        if written:
-            click.echo(written.line())
+        written.say()
     written.check()

@@ -16,7 +16,13 @@ import click
 from pendmap.cli.inputs import keep_inputs, report_files
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import check_view
-from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
+from pendmap.cli.show import (
+    open_recording,
+    plain,
+    progress_bar,
+    write_all,
+    write_table,
+)
 from pendmap.cli.types import OutputFile, ReportFile, Whole
 from pendmap.errors import InputError
 
@@ -138,7 +144,8 @@ def command(  # noqa: PLR0913 (an option each)
             progress=progress,
         )
     with progress_bar("write", shown=shown):
-        written = write_all(_files(found, outputs, "pendmap " + shlex.join(sys.argv[1:])))
+        line = "pendmap " + shlex.join(sys.argv[1:])
+        written = write_all(_files(found, outputs, line))
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 
@@ -146,7 +153,7 @@ def command(  # noqa: PLR0913 (an option each)
         click.echo(json.dumps(plain(fields(found) | model_file), allow_nan=False))
     elif not quiet:
         _say(found)
-        click.echo(written.line())
+        written.say()
     written.check()
     if view and rerun is not None:
         open_recording(rerun)
@@ -187,7 +194,7 @@ def _files(
     from pendmap.model import save_model
 
     out, plot, report, rerun = outputs
-    yield functools.partial(save_model, diagnosed_model(found, line)), out
+    yield lambda path: save_model(diagnosed_model(found, line), path), out
     if plot is not None:
         from pendmap import figures
 

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.options import Outputs, output_options
-from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
+from pendmap.cli.show import (
+    open_viewer,
+    plain,
+    progress_bar,
+    write_all,
+    write_table,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -72,8 +78,8 @@ def command(
     with progress_bar("write", shown=outputs.shows_progress):
         written = write_all(_files(outputs, report, model))
     _show(report, outputs, written.name(outputs.out))
-    if written and not outputs.as_json and not outputs.quiet:
-        click.echo(written.line())
+    if not outputs.as_json and not outputs.quiet:
+        written.say()
     written.check()
     open_viewer(outputs)
 
@@ -106,10 +112,9 @@ def _show(report: IdentificationReport, outputs: Outputs, model: str | None = No
 
 
 def _say(report: IdentificationReport) -> None:
-    from pendmap.identification.summary import as_text, methods_table, table1_table
-    from pendmap.records.summary import doubts_said
+    from pendmap.identification.summary import as_text, foremost, methods_table, table1_table
 
-    doubts = list(doubts_said(report.experiment, *report.runs))
+    doubts = [f"Warning: {text}" for text in foremost(report)]
     for line in doubts:
         click.echo(line)
     for head, rows in (methods_table(report), table1_table(report)):

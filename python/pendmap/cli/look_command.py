@@ -44,6 +44,5 @@ def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> Non
         click.echo(json.dumps(plain(fields(experiment)), allow_nan=False))
     elif not quiet:
         click.echo(as_text(experiment))
-        if written:
-            click.echo(written.line())
+        written.say()
     written.check()

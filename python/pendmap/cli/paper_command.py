@@ -77,7 +77,7 @@ def command(  # noqa: PLR0913 (an option each)
     elif not quiet:
         if paper_figures.TABLE in keys:
             _say(paper_figures.report(seed))
-        click.echo(written.line())
+        written.say()
     written.check()
 
 

@@ -68,7 +68,7 @@ def command(  # noqa: PLR0913 (the options above)
             f"{type(error).__name__}: {error}"
         ) from error
     if written and not quiet:
-        click.echo(written.line())
+        written.say()
     written.check()
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.errors import NotWrittenError, one_line
+from pendmap.errors import InputError, NotWrittenError, one_line
 from pendmap.files import held_interrupts
 from pendmap.notebook import columns
 
@@ -67,8 +67,7 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
     elif not outputs.quiet:
         click.echo(dataset.attrs["title"])
         click.echo(dataset.attrs["summary"])
-        if written:
-            click.echo(written.line())
+        written.say()
     written.check()
     open_viewer(outputs)
 
@@ -79,23 +78,29 @@ class Written(list[str]):
     def __init__(self) -> None:
         super().__init__()
         self.missed: list[str] = []
+        self.refused: list[InputError] = []
 
     def name(self, path: Path | None) -> str | None:
         """Return the name of a file that is complete, none of another."""
         return str(path) if str(path) in self else None
 
-    def line(self) -> str:
-        """Return what is said of the files that are complete."""
-        return "Written: " + ", ".join(map(one_line, self))
+    def say(self) -> None:
+        """Say which files are complete, if any are."""
+        if self:
+            click.echo("Written: " + ", ".join(map(one_line, self)))
 
     def check(self) -> None:
         """End the command, after all else is said, where a file could not be written.
 
         Raises
         ------
+        InputError
+            If something cannot be put into a file of that kind.
         NotWrittenError
-            If that is so.
+            If the disk did not take a file.
         """
+        if self.refused:
+            raise self.refused[0]
         if self.missed:
             complete = ", ".join(self) or "nothing"
             raise NotWrittenError(f"{'; '.join(self.missed)}; written: {complete}")
@@ -104,8 +109,8 @@ class Written(list[str]):
 def write_all(files: Iterable[tuple[Callable[[Path], Path | str], Path]]) -> Written:
     """Write files one after the other and return their names.
 
-    Where the disk takes one of them no more, the others are tried all the same. An interrupt takes
-    effect between two files and names those that are complete.
+    Where one of them cannot be written, the others are tried all the same (:meth:`Written.check`).
+    An interrupt takes effect between two files and names those that are complete.
     """
     written = Written()
     try:
@@ -113,6 +118,8 @@ def write_all(files: Iterable[tuple[Callable[[Path], Path | str], Path]]) -> Wri
             with held_interrupts():
                 try:
                     written.append(str(write(path)))
+                except InputError as error:
+                    written.refused.append(error)
                 except OSError as error:
                     written.missed.append(f"cannot write {path}: {error.strerror or error}")
     except KeyboardInterrupt:

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.limits import detection_limits
 from pendmap.discrepancy.power import seen, separated, tightened
 
@@ -31,8 +32,8 @@ class Advice:
 
     Parameters
     ----------
-    next_experiment : str
-        In a sentence or two.
+    next_experiment : str or None
+        In a sentence or two; none where it cannot be computed.
     limits : mapping of str to Limit
         For each effect that was not found the smallest size that would have been found with 95 %
         probability.
@@ -41,7 +42,7 @@ class Advice:
         through by the model.
     """
 
-    next_experiment: str
+    next_experiment: str | None
     limits: dict[str, Limit]
     outlook: Outlook | None
 
@@ -58,6 +59,7 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     judgement: Judgement,
     scores: Scores,
     level: float,
+    reasons: Reasons,
 ) -> Advice:
     """Return what to record next.
 
@@ -76,16 +78,24 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
         Of all others at the best model.
     level : float
         Of the noise.
+    reasons : dict of str to str
+        Where it is kept why there are no proposals.
     """
     samples = best.trial.fit.samples
     limits = detection_limits(scores, level, samples, best.trial.names, best.trial.fit.model.units)
-    if judgement.verdict == "ambiguous":
-        outlook: Outlook | None = separated(evidence, nearest, judgement.standings, level)
-    elif judgement.verdict == "named":
-        outlook = tightened(evidence, best, level)
-    else:
-        outlook = seen(evidence, best, scores)
-    return Advice(" ".join(_sentences(judgement, outlook, evidence.forced)), limits, outlook)
+
+    def proposed() -> Outlook | None:
+        if judgement.verdict == "ambiguous":
+            return separated(evidence, nearest, judgement.standings, level, reasons)
+        if judgement.verdict == "named":
+            return tightened(evidence, best, level, reasons)
+        return seen(evidence, best, scores, reasons)
+
+    outlook = attempted(reasons, "proposals", proposed, None)
+    said = _sentences(judgement, outlook, evidence.forced)
+    if not said and "proposals" not in reasons:
+        said = [NOTHING]
+    return Advice(" ".join(said) or None, limits, outlook)
 
 
 def chance_said(chance: float) -> str:
@@ -101,7 +111,7 @@ def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> l
             "rotation: whether the rest repeats, and over what it changes, says what it is."
         )
     if outlook is None:
-        return said or [NOTHING]
+        return said
     best = outlook.best
     if best is not None:
         say = {"separation": _separation, "interval": _interval, "limits": _limits}
@@ -112,7 +122,7 @@ def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> l
         f"{_revealed(judgement, one)}; {other} by {_revealed(judgement, other)}."
         for one, other in outlook.equals
     ]
-    return said or [NOTHING]
+    return said
 
 
 def _revealed(judgement: Judgement, name: str) -> str:

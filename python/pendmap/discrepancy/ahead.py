@@ -12,6 +12,7 @@ from pendmap.discrepancy.information import Columns, Information
 from pendmap.discrepancy.replay import Motion, replayed
 from pendmap.errors import InputError
 from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from pendmap.discrepancy.candidates import Candidate
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.further import Reasons
     from pendmap.discrepancy.menu import Planned, Proposal, Start
     from pendmap.discrepancy.refit import Found
 
@@ -36,6 +38,10 @@ MOVING: Final = 1e-9
 """Velocity over ``w0`` below which a pendulum rests: its readings say no more than the first."""
 
 
+FEWEST: Final = 3
+"""Readings of a run that a fit has at least."""
+
+
 class Prospects:
     """Proposals run through by the model found, and what they would say.
 
@@ -49,6 +55,13 @@ class Prospects:
         What might be recorded; one in which the model is lost is left out.
     candidates : sequence of Candidate
         Effects beside those of the model.
+    reasons : dict of str to str
+        Where it is kept how many are left out, and why.
+
+    Raises
+    ------
+    InputError
+        If the model is lost in all of the menu.
     """
 
     def __init__(
@@ -57,6 +70,7 @@ class Prospects:
         found: Found,
         menu: Sequence[Proposal],
         candidates: Sequence[Candidate],
+        reasons: Reasons,
     ) -> None:
         fit = found.trial.fit
         self.units = fit.model.units
@@ -66,8 +80,14 @@ class Prospects:
         longest: dict[Start, float] = {}
         for planned in (run for proposal in menu for run in proposal.runs):
             longest[planned.start] = max(longest.get(planned.start, 0.0), planned.seconds)
-        self._starts, runs, windows = _simulated(evidence, found, longest)
+        self._starts, runs, windows = _simulated(evidence, found, longest, reasons)
         self.menu = [p for p in menu if all(start in self._starts for start in p.starts)]
+        if menu and not self.menu:
+            raise InputError(f"of {counted(len(menu), 'proposal')} none: {reasons['proposals']}")
+        if len(self.menu) < len(menu):
+            reasons["proposals"] = (
+                f"{len(menu) - len(self.menu)} of {len(menu)} left out: {reasons['proposals']}"
+            )
         self._step = _step(evidence, fit.model.w0)
         ahead = dataclasses.replace(
             fit,
@@ -105,7 +125,7 @@ def _reading_step(evidence: Evidence) -> float:
 
 
 def _simulated(
-    evidence: Evidence, found: Found, longest: dict[Start, float]
+    evidence: Evidence, found: Found, longest: dict[Start, float], reasons: Reasons
 ) -> tuple[list[Start], list[FitRun], Windows]:
     """Return starts, runs and windows of what the model could be run through."""
     motion, w0 = Motion.of(found), found.trial.fit.model.w0
@@ -118,11 +138,15 @@ def _simulated(
     starts: list[Start] = []
     runs: list[FitRun] = []
     windows: list[tuple[int, int, int, float, float]] = []
-    for start, curve in _curves(motion, longest, step, floor).items():
+    for start, curve in _curves(motion, longest, step, floor, reasons).items():
         speed = np.abs(curve[1])
         moves = np.flatnonzero(speed > MOVING * w0)
         trusted = np.arange(speed.size) <= (moves[-1] if moves.size else 0)
         if not np.isfinite(curve).all():
+            reasons["proposals"] = "the motion leaves the range of numbers"
+            continue
+        if np.count_nonzero(trusted) < FEWEST:
+            reasons["proposals"] = "by the model nothing moves in it"
             continue
         sigma = scale * np.hypot(floor, late * speed)
         run = _run(start, speed.size, step, sigma)
@@ -139,7 +163,11 @@ def _simulated(
 
 
 def _curves(
-    motion: Motion, longest: dict[Start, float], step: float, floor: float
+    motion: Motion,
+    longest: dict[Start, float],
+    step: float,
+    floor: float,
+    reasons: Reasons,
 ) -> dict[Start, Floats]:
     """Return angle and velocity of each start; without those that leave the range of numbers."""
     runs = {
@@ -155,8 +183,8 @@ def _curves(
         for start, run in runs.items():
             try:
                 found[start] = replayed(motion, [run], [states[start]])[0][1]
-            except InputError:
-                continue
+            except InputError as error:
+                reasons["proposals"] = str(error)
         return found
 
 

@@ -8,13 +8,14 @@ velocity adds to the damping, one of the same size at any velocity to the dry fr
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.replay import Motion
 from pendmap.discrepancy.strength import EXACT, STEP, acting
-from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,7 +33,7 @@ LIKE: Final = 0.05
 """How far from 2, or from 1, the torque at twice the velocity may be over that at once."""
 
 
-def below_zero(evidence: Evidence, found: Found) -> dict[str, float]:
+def below_zero(evidence: Evidence, found: Found, reasons: Reasons) -> dict[str, float]:
     """Return from which time in the laboratory on, s, damping or friction are below 0.
 
     ``c_over_m`` and ``Tr`` with all effects that change with time and add to them, where they are
@@ -44,6 +45,8 @@ def below_zero(evidence: Evidence, found: Found) -> dict[str, float]:
         The records.
     found : Found
         A model.
+    reasons : dict of str to str
+        Where it is kept which effect could not be looked at, and why.
     """
     fit = found.trial.fit
     drifting = [e.name for e in fit.model.effects if e.drifts and e.brakes]
@@ -56,10 +59,15 @@ def below_zero(evidence: Evidence, found: Found) -> dict[str, float]:
     speed = max(float(np.nanmax(np.abs(curve[1]))) for curve in fit.curves)
     own = {name: np.full(INSTANTS, fit[name]) for name in ("c_over_m", "Tr") if name in fit.names}
     for name in drifting:
-        try:
-            once, twice = (_torque(found, runs[0], name, times, v) for v in (speed / 2, speed))
-        except InputError:
-            continue  # so strong that nothing moves: it is told by other signs
+        torques = attempted(
+            reasons,
+            f"below_zero.{name}",
+            functools.partial(_torques, found, runs[0], name, times, speed),
+            None,
+        )
+        if torques is None:
+            continue
+        once, twice = torques
         at = int(np.argmax(np.abs(once)))
         ratio = twice[at] / once[at] if once[at] else 0.0
         if abs(ratio - 2) < LIKE and "c_over_m" in own:
@@ -71,6 +79,14 @@ def below_zero(evidence: Evidence, found: Found) -> dict[str, float]:
         for name, values in own.items()
         if values.min() < 0 < values.max()
     }
+
+
+def _torques(
+    found: Found, run: FitRun, effect: str, times: NDArray[np.float64], speed: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return an effect's torque at half a speed and at that speed."""
+    once, twice = (_torque(found, run, effect, times, v) for v in (speed / 2, speed))
+    return once, twice
 
 
 def _torque(

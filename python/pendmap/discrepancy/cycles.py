@@ -7,13 +7,14 @@ Damping that was fitted negative is simulated as it was fitted.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.replay import Motion, replayed
-from pendmap.errors import InputError
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of
@@ -54,7 +55,7 @@ class Cycles:
     peaks : Peaks
         As they were measured.
     errors : mapping of str to PeakErrors
-        Of the models ``before`` and ``after``.
+        Of the models ``before`` and ``after``; without one that cannot be run from there.
     """
 
     name: str
@@ -63,7 +64,7 @@ class Cycles:
     errors: dict[str, PeakErrors]
 
 
-def cycles_of(evidence: Evidence, base: Found, best: Found) -> tuple[Cycles, ...]:
+def cycles_of(evidence: Evidence, base: Found, best: Found, reasons: Reasons) -> tuple[Cycles, ...]:
     """Return figure 7 of every free run that has a full cycle, those held out first.
 
     Parameters
@@ -72,6 +73,8 @@ def cycles_of(evidence: Evidence, base: Found, best: Found) -> tuple[Cycles, ...
         The records.
     base, best : Found
         The baseline, and the model found.
+    reasons : dict of str to str
+        Where it is kept which model could not be run from the first peak of which run, and why.
     """
     found = []
     for k, (run, reading) in enumerate(zip(evidence.runs, evidence.readings, strict=True)):
@@ -82,7 +85,12 @@ def cycles_of(evidence: Evidence, base: Found, best: Found) -> tuple[Cycles, ...
             continue
         errors = {}
         for name, model in ((BEFORE, base), (AFTER, best)):
-            simulated = _simulated(model, peaks, reading.sigma, run.lab_time_s)
+            simulated = attempted(
+                reasons,
+                f"cycles.{run.name}.{name}",
+                functools.partial(_simulated, model, peaks, reading.sigma, run.lab_time_s),
+                None,
+            )
             if simulated is not None:
                 errors[name] = errors_of(name, peaks, *simulated)
         if errors:
@@ -92,7 +100,7 @@ def cycles_of(evidence: Evidence, base: Found, best: Found) -> tuple[Cycles, ...
 
 def _simulated(
     found: Found, peaks: Peaks, sigma: float, lab_time_s: float
-) -> tuple[Floats, Floats] | None:
+) -> tuple[Floats, Floats]:
     """Return times and angles of a model's peaks from the first measured one on."""
     turned = peaks.turned
     first, amplitude = float(turned.time[0]), float(turned.amplitude[0])
@@ -100,14 +108,11 @@ def _simulated(
     swing = math.tau / found.trial.fit.model.w0
     time = first + np.linspace(0.0, until, math.ceil(PER_SWING * until / swing) + 1)
     run = FitRun(time, np.zeros(time.shape), sigma, lab_time_s=lab_time_s)
-    try:
-        # The sensor's errors stand between the angle and its reading; they change slowly with it.
-        start = amplitude
-        for _ in range(2):
-            ((readings, curve),) = replayed(Motion.of(found), [run], [(start, 0.0)])
-            start += amplitude - float(readings[0])
-    except InputError:
-        return None
+    # The sensor's errors stand between the angle and its reading; they change slowly with it.
+    start = amplitude
+    for _ in range(2):
+        ((readings, curve),) = replayed(Motion.of(found), [run], [(start, 0.0)])
+        start += amplitude - float(readings[0])
     return _peaks(time, readings, curve)
 
 

@@ -13,15 +13,18 @@ from pendmap.discrepancy.candidates import checked_own
 from pendmap.discrepancy.cycles import Cycles, cycles_of
 from pendmap.discrepancy.evidence import Evidence, evidence_of
 from pendmap.discrepancy.functions import FunctionScore, call_once, divided, function_scores
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.gap import Gap, gap_of
 from pendmap.discrepancy.horizon import Forecast, forecasts_of
 from pendmap.discrepancy.named import NamedEffect, named_effects
 from pendmap.discrepancy.physical import physical
 from pendmap.discrepancy.runs import RunByRun, run_by_run
+from pendmap.discrepancy.scores import Scores
 from pendmap.discrepancy.select import Search
 from pendmap.discrepancy.torque import Torque, residual_torque, standing_out
 from pendmap.discrepancy.verdict import Judgement, judge
 from pendmap.errors import InputError
+from pendmap.identification.astray import refuse_astray
 from pendmap.model.effects import definition
 from pendmap.notebook import Readable
 
@@ -31,7 +34,6 @@ if TYPE_CHECKING:
     from pendmap.discrepancy.attempts import Attempt
     from pendmap.discrepancy.functions import TorqueFunction
     from pendmap.discrepancy.refit import Found
-    from pendmap.discrepancy.scores import Scores
     from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
 
@@ -82,6 +84,9 @@ class Discrepancy(Readable):
         Candidates of the user's own beside the library's.
     functions : tuple of FunctionScore
         What Python functions of the user explain, to first order.
+    reasons : dict of str to str
+        Why a part beside the verdict could not be computed, by its field in the JSON object; see
+        :attr:`not_computed`.
     """
 
     evidence: Evidence
@@ -103,6 +108,7 @@ class Discrepancy(Readable):
     most: int = MOST_EFFECTS
     own: tuple[Formula, ...] = ()
     functions: tuple[FunctionScore, ...] = ()
+    reasons: Reasons = dataclasses.field(default_factory=dict)
 
     def definition(self, name: str) -> dict[str, Any]:
         """What the library, or the user's formula, says about a candidate."""
@@ -140,31 +146,49 @@ class Discrepancy(Readable):
         return self.best is not self.base
 
     @functools.cached_property
-    def usable(self) -> Found:
-        """The best model without negative damping, as a file can hold it."""
-        return physical(self.evidence, self.base, self.best, self.own)
+    def not_computed(self) -> Reasons:
+        """Why a part beside the verdict could not be computed, by its field in the JSON object."""
+        for part in (self.usable, self.below_zero, self.forecasts, self.advice, self.cycles):
+            del part
+        return self.reasons
+
+    @functools.cached_property
+    def usable(self) -> Found | None:
+        """The best model without negative damping, as a file can hold it; none without a fit."""
+        return attempted(
+            self.reasons,
+            "model_file",
+            lambda: physical(self.evidence, self.base, self.best, self.own),
+            None,
+        )
 
     @functools.cached_property
     def below_zero(self) -> dict[str, float]:
         """From which time in the laboratory on, s, damping or friction are below 0 by a drift."""
-        return below_zero(self.evidence, self.best)
+        return below_zero(self.evidence, self.best, self.reasons)
 
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:
         """How the error of both models grows with the horizon, on what was held back."""
-        return forecasts_of(self.evidence, self.base, self.best)
+        return forecasts_of(self.evidence, self.base, self.best, self.reasons)
 
     @functools.cached_property
     def advice(self) -> Advice:
         """What to record next, and what these records would have shown."""
         return advice_of(
-            self.evidence, self.best, self.nearest, self.judgement, self.beside, self.level
+            self.evidence,
+            self.best,
+            self.nearest,
+            self.judgement,
+            self.beside,
+            self.level,
+            self.reasons,
         )
 
     @functools.cached_property
     def cycles(self) -> tuple[Cycles, ...]:
         """Periods and peaks of each free run against those of both models."""
-        return cycles_of(self.evidence, self.base, self.best)
+        return cycles_of(self.evidence, self.base, self.best, self.reasons)
 
 
 def diagnose(  # noqa: PLR0913 (each is asked for by name)
@@ -206,8 +230,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     Raises
     ------
     InputError
-        If there is no run with samples, no start can be found, or an effect of your own cannot be a
-        candidate.
+        If there is no run with samples, no start can be found, an effect of your own cannot be a
+        candidate, or no model follows the records.
     """
     functions, others = divided(effects)
     own = checked_own(others)
@@ -223,6 +247,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         evidence, begin, max_effects, without, lambda done: report(1 + done, steps), own=own
     )
     nearest = search.run()
+    refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial)
     try:
@@ -235,7 +260,15 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     judgement = judge(evidence, search, nearest, runs, after.chance)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else search.base
-    before = residual_torque(evidence, search.base.trial) if nearest.trial.chosen else after
+    reasons: Reasons = {}
+    before = after
+    if nearest.trial.chosen:
+        before = attempted(
+            reasons,
+            "where",
+            lambda: residual_torque(evidence, search.base.trial),
+            Torque.unknown(search.base.trial),
+        )
     scores = search.first or search.scores(begin)
     return Discrepancy(
         evidence,
@@ -243,7 +276,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         best,
         nearest,
         judgement,
-        named_effects(evidence, best, judgement) if claimed else (),
+        named_effects(evidence, best, judgement, reasons) if claimed else (),
         gap_of(evidence, search.base, best),
         before,
         after if claimed else before,
@@ -251,10 +284,16 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         runs,
         scores,
         tuple(search.attempts),
-        search.scores(best.trial),
+        attempted(reasons, "detection_limits", lambda: search.scores(best.trial), Scores.of_none()),
         search.level(),
         tuple(without),
         max_effects,
         own,
-        function_scores(evidence, search.base.trial, best.trial, functions),
+        attempted(
+            reasons,
+            "functions",
+            lambda: function_scores(evidence, search.base.trial, best.trial, functions),
+            (),
+        ),
+        reasons,
     )

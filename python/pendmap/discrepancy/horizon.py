@@ -9,13 +9,14 @@ noise to begin with, and then grows with what the noise left unknown of the stat
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.replay import Motion, drives, replayed, settled
-from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -83,7 +84,9 @@ class _Stretch:
     last: int
 
 
-def forecasts_of(evidence: Evidence, base: Found, best: Found) -> tuple[Forecast, ...]:
+def forecasts_of(
+    evidence: Evidence, base: Found, best: Found, reasons: Reasons
+) -> tuple[Forecast, ...]:
     """Return the error of forecasts, of free runs and of forced ones.
 
     Parameters
@@ -92,14 +95,23 @@ def forecasts_of(evidence: Evidence, base: Found, best: Found) -> tuple[Forecast
         What was held back.
     base, best : Found
         The baseline, and the model found.
+    reasons : dict of str to str
+        Where it is kept of which kind of runs there is no forecast, and why.
     """
     swing = math.tau / base.trial.fit.model.w0
     every = [s for place in range(len(evidence.held)) for s in _stretches(evidence, place, swing)]
     kinds = (("free", False), ("forced", True))
-    found = [
-        _forecast(kind, [s for s in every if s.run.forced == forced], base, best, swing)
-        for kind, forced in kinds
-    ]
+    found = []
+    for kind, forced in kinds:
+        own = [s for s in every if s.run.forced == forced]
+        found.append(
+            attempted(
+                reasons,
+                f"forecast.{kind}",
+                functools.partial(_forecast, kind, own, base, best, swing),
+                None,
+            )
+        )
     return tuple(forecast for forecast in found if forecast is not None)
 
 
@@ -148,8 +160,6 @@ def _forecast(
         sigma = np.broadcast_to(np.asarray(stretch.run.sigma, float), ahead.shape)
         floors.append(float(np.mean(sigma[counts] ** 2)) if counts.any() else math.nan)
     before, after = (_errors(found, starts, which, reach, swing, count) for found in (base, best))
-    if before is None or after is None:
-        return None
     return Forecast(
         kind,
         (np.arange(count) + 0.5) * reach / count,
@@ -188,20 +198,17 @@ def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are so
     reach: float,
     swing: float,
     count: int,
-) -> Floats | None:
-    """Return the root mean square error in each bin; none where a forecast leaves all numbers."""
+) -> Floats:
+    """Return the root mean square error in each bin."""
     before, whole = [], []
     for stretch, at in starts:
         run = dataclasses.replace(stretch.run, drive=drives(found, stretch.run, stretch.place))
         behind = _behind(stretch, at, swing)
         before.append(_of(run, behind))
         whole.append(_of(run, behind | _ahead(stretch, at, reach)))
-    try:
-        motion = Motion.of(found)
-        states = settled(motion, before, [_guess(run, swing) for run in before])
-        forecasts = replayed(motion, whole, states)
-    except InputError:
-        return None
+    motion = Motion.of(found)
+    states = settled(motion, before, [_guess(run, swing) for run in before])
+    forecasts = replayed(motion, whole, states)
     squares, samples = np.zeros(count), np.zeros(count)
     for (stretch, _), (counts, bins), (readings, _) in zip(starts, which, forecasts, strict=True):
         error = stretch.run.theta[counts] - readings[readings.size - bins.size :]

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.discrepancy.candidates import own_name
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.intervals import Z95, profiles
 from pendmap.discrepancy.physical import unphysical
 from pendmap.discrepancy.sides import elsewhere
+from pendmap.errors import InputError
 from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
@@ -77,7 +79,9 @@ class NamedEffect:
         )
 
 
-def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tuple[NamedEffect, ...]:
+def named_effects(
+    evidence: Evidence, best: Found, judgement: Judgement, reasons: Reasons
+) -> tuple[NamedEffect, ...]:
     """Return the effects of the best model.
 
     Parameters
@@ -88,9 +92,12 @@ def named_effects(evidence: Evidence, best: Found, judgement: Judgement) -> tupl
         The model.
     judgement : Judgement
         Its standing. Of effects that the model does not have nothing is returned.
+    reasons : dict of str to str
+        Where it is kept why intervals are those of the covariance where a profile is wanted.
     """
     widening = math.sqrt(best.trial.widening)
-    profiled = profiles(evidence, best.trial)
+    none: dict[str, dict[str, tuple[float, float]]] = {}
+    profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)
     others = elsewhere(evidence, best.trial)
     named = []
     for standing in judgement.standings:
@@ -156,14 +163,21 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         As of :func:`pendmap.discrepancy.diagnose`.
     command : str
         How it was called.
+
+    Raises
+    ------
+    InputError
+        If no model without negative damping follows the records.
     """
     usable = found.usable
+    if usable is None:
+        raise InputError(found.reasons["model_file"])
     fit = usable.trial.fit
     model = fit.model
     covariance = usable.trial.widening * fit.covariance
     claimed = found.effects
     if claimed and usable is not found.best:
-        claimed = named_effects(found.evidence, usable, found.judgement)
+        claimed = named_effects(found.evidence, usable, found.judgement, found.reasons)
     named = {effect.name: effect.effect for effect in claimed}
     own = {own_name(name) for name in named} - {None}
     kept = tuple(e for e in model.effects if e.name not in named)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.held import tried
 from pendmap.discrepancy.refit import Found
 from pendmap.discrepancy.select import Search
@@ -55,63 +56,68 @@ def physical(evidence: Evidence, base: Found, found: Found, own: Collection[Form
     base : Found
         The model that the search began with.
     found : Found
-        A model; where none of its coefficients is negative it is given back, and so it is where
-        with 0 no fit is found. What is found may have fewer effects.
+        A model; where none of its coefficients is negative it is given back. What is found may
+        have fewer effects.
     own : collection of Formula
         Candidates of the user's own.
+
+    Raises
+    ------
+    InputError
+        If no fit is found without the negative coefficients.
     """
     if not unphysical(found.trial.fit):
         return found
-    near = _at_zero(evidence, found.trial)
+    reasons: Reasons = {}
+    near = attempted(reasons, "near", lambda: _at_zero(evidence, found.trial), None)
+    far = None
     if near is None or near.chi2 > ASTRAY * found.trial.chi2:
-        far = _searched(evidence, base.trial, found.trial, own)
-        near = min((t for t in (near, far) if t is not None), key=lambda t: t.chi2, default=None)
-    try:
-        return found if near is None else Found(near, tried(evidence, near))
-    except InputError:
-        return found
+        far = attempted(
+            reasons, "far", lambda: _searched(evidence, base.trial, found.trial, own), None
+        )
+    fits = [trial for trial in (near, far) if trial is not None]
+    if not fits:
+        names = " and ".join(unphysical(found.trial.fit))
+        raise InputError(
+            f"{evidence.experiment.path}: no model without a negative {names} follows these "
+            f"records: {reasons['near']}"
+        )
+    best = min(fits, key=lambda trial: trial.chi2)
+    return Found(best, tried(evidence, best))
 
 
-def _at_zero(evidence: Evidence, trial: Trial) -> Trial | None:
+def _at_zero(evidence: Evidence, trial: Trial) -> Trial:
     """Fit a model again with its negative coefficients at 0, from where the others are."""
-    try:
-        while negative := unphysical(trial.fit):
-            zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
-            trial = fitted(
-                evidence,
-                dataclasses.replace(trial.fit.model, **zeros),
-                [name for name in trial.free if name not in negative],
-                trial.chosen,
-                start={n: v for n, v in trial.start.items() if n not in negative},
-                growth=GENTLE,
-            )
-    except InputError:
-        return None
+    while negative := unphysical(trial.fit):
+        zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
+        trial = fitted(
+            evidence,
+            dataclasses.replace(trial.fit.model, **zeros),
+            [name for name in trial.free if name not in negative],
+            trial.chosen,
+            start={n: v for n, v in trial.start.items() if n not in negative},
+            growth=GENTLE,
+        )
     return trial
 
 
-def _searched(
-    evidence: Evidence, base: Trial, trial: Trial, own: Collection[Formula]
-) -> Trial | None:
+def _searched(evidence: Evidence, base: Trial, trial: Trial, own: Collection[Formula]) -> Trial:
     """Search among a model's effects from the baseline, its negative coefficients at 0."""
     without = [name for name in library() if name not in trial.names]
     formulas = [formula for formula in own if formula.name in trial.names]
     zero: set[str] = set()
-    try:
-        while negative := set(unphysical(trial.fit)) - zero:
-            zero |= negative
-            zeros: dict[str, Any] = dict.fromkeys(zero, 0.0)
-            begin = fitted(
-                evidence,
-                dataclasses.replace(base.fit.model, **zeros),
-                [name for name in base.free if name not in zero],
-                start={n: v for n, v in base.start.items() if n not in zero},
-                growth=GENTLE,
-            )
-            again = Search(
-                evidence, begin, len(trial.names), without, lambda _found: None, own=formulas
-            )
-            trial = again.run().trial
-    except InputError:
-        return None
+    while negative := set(unphysical(trial.fit)) - zero:
+        zero |= negative
+        zeros: dict[str, Any] = dict.fromkeys(zero, 0.0)
+        begin = fitted(
+            evidence,
+            dataclasses.replace(base.fit.model, **zeros),
+            [name for name in base.free if name not in zero],
+            start={n: v for n, v in base.start.items() if n not in zero},
+            growth=GENTLE,
+        )
+        again = Search(
+            evidence, begin, len(trial.names), without, lambda _found: None, own=formulas
+        )
+        trial = again.run().trial
     return trial

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from pendmap.discrepancy.evidence import Evidence
+    from pendmap.discrepancy.further import Reasons
     from pendmap.discrepancy.information import Information
     from pendmap.discrepancy.refit import Found
     from pendmap.discrepancy.rivals import Rival, Standing
@@ -56,7 +57,11 @@ class _Pair:
 
 
 def separated(
-    evidence: Evidence, found: Found, standings: Sequence[Standing], level: float
+    evidence: Evidence,
+    found: Found,
+    standings: Sequence[Standing],
+    level: float,
+    reasons: Reasons,
 ) -> Outlook:
     """Return what each proposal would add to the separation of names that are alike.
 
@@ -70,6 +75,8 @@ def separated(
         Its effects among their rivals.
     level : float
         Of the noise.
+    reasons : dict of str to str
+        Where it is kept why a proposal is left out.
     """
     pairs = [
         _Pair(standing.candidate, rival, _shapes(rival.candidate))
@@ -79,7 +86,7 @@ def separated(
     ]
     shapes = {shape.title: shape for pair in pairs for shape in pair.shapes}
     w0 = found.trial.fit.model.w0
-    ahead = Prospects(evidence, found, menu_of(evidence, w0), list(shapes.values()))
+    ahead = Prospects(evidence, found, menu_of(evidence, w0), list(shapes.values()), reasons)
     before = [_separation(ahead, ahead.old, found, pair) for pair in pairs]
     added = [
         [
@@ -137,16 +144,16 @@ def _separation(ahead: Prospects, total: Information, found: Found, pair: _Pair)
     return value * min(right, other)
 
 
-def tightened(evidence: Evidence, found: Found, level: float) -> Outlook | None:
+def tightened(evidence: Evidence, found: Found, level: float, reasons: Reasons) -> Outlook | None:
     """Return what each proposal would do to the widest interval of an effect's size.
 
     Parameters
     ----------
-    evidence, found, level
+    evidence, found, level, reasons
         As of :func:`separated`.
     """
     w0 = found.trial.fit.model.w0
-    ahead = Prospects(evidence, found, menu_of(evidence, w0), ())
+    ahead = Prospects(evidence, found, menu_of(evidence, w0), (), reasons)
     shared = ahead.now.shared
     sizes = [c.free[0] for c in found.trial.chosen if c.free[0] in shared]
     if not sizes:
@@ -164,7 +171,7 @@ def tightened(evidence: Evidence, found: Found, level: float) -> Outlook | None:
     return Outlook("interval", (weakest,), now, HALF * now, prospects)
 
 
-def seen(evidence: Evidence, found: Found, scores: Scores) -> Outlook | None:
+def seen(evidence: Evidence, found: Found, scores: Scores, reasons: Reasons) -> Outlook | None:
     """Return what each proposal would do to the smallest sizes that would be seen.
 
     Parameters
@@ -173,6 +180,8 @@ def seen(evidence: Evidence, found: Found, scores: Scores) -> Outlook | None:
         As of :func:`separated`.
     scores : Scores
         At that model: each effect's shape that shows least is what is looked at.
+    reasons : dict of str to str
+        As of :func:`separated`.
     """
     faintest: dict[str, Candidate] = {}
     least: dict[str, float] = {}
@@ -184,7 +193,7 @@ def seen(evidence: Evidence, found: Found, scores: Scores) -> Outlook | None:
     if not faintest:
         return None
     w0 = found.trial.fit.model.w0
-    ahead = Prospects(evidence, found, menu_of(evidence, w0), list(faintest.values()))
+    ahead = Prospects(evidence, found, menu_of(evidence, w0), list(faintest.values()), reasons)
     now = _shown(ahead, ahead.old, faintest)
     ratios = []
     for total in map(ahead.after, ahead.menu):

@@ -102,6 +102,11 @@ class Scores:
     gram: Floats
     pull: Floats
 
+    @classmethod
+    def of_none(cls) -> Scores:
+        """Return the scores of no candidate."""
+        return cls((), (), np.zeros((0, 0)), np.zeros(0))
+
     def best(self) -> list[int]:
         """Return the places of each effect's best shape, the greatest gain first."""
         chosen: dict[str, int] = {}
@@ -172,7 +177,7 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
         )
         every += present
     if not every:
-        return Scores((), (), np.zeros((0, 0)), np.zeros(0))
+        return Scores.of_none()
     windows = [
         dataclasses.replace(each[0], columns=np.hstack([w.columns for w in each]))
         for each in zip(*passes, strict=True)

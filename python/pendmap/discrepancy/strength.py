@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.discrepancy.replay import Motion, replayed
-from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,7 +48,7 @@ class Strength:
     greatest_reading: float
 
 
-def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength | None:
+def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength:
     """Return how strong an effect of a model is, from the motion with it and without it.
 
     Parameters
@@ -61,10 +60,10 @@ def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength | None
     effect : str
         One of its effects.
 
-    Returns
-    -------
-    Strength or None
-        None where a motion leaves the range of numbers.
+    Raises
+    ------
+    InputError
+        If a motion leaves the range of numbers.
     """
     fit = best.trial.fit
     step = STEP * 2 * np.pi / fit.model.w0
@@ -84,10 +83,7 @@ def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength | None
             )
             states.append((float(theta[at]), float(velocity[at])))
     motion = Motion.of(best)
-    try:
-        torque, reading = acting(motion, effect, runs, states, step)
-    except InputError:
-        return None
+    torque, reading = acting(motion, effect, runs, states, step)
     return Strength(*(s for x in (torque, reading) for s in (_rms(x), float(np.abs(x).max()))))
 
 

@@ -6,10 +6,11 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.discrepancy.cycles import AFTER, BEFORE
 from pendmap.discrepancy.given_out import confined, feeding, given_out
 from pendmap.discrepancy.physical import unphysical
 from pendmap.model.unit_names import unit_of
-from pendmap.records.summary import doubts_said, findings_said
+from pendmap.records.summary import doubts, doubts_said, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,12 +47,17 @@ RANKED: Final = 8
 
 
 def as_json(found: Discrepancy) -> dict[str, Any]:
-    """Return the JSON object of ``pendmap diagnose``, without the paths of files."""
+    """Return the JSON object of ``pendmap diagnose``, without the paths of files.
+
+    What could not be computed beside the verdict is null, and ``not_computed`` has the reason.
+    """
+    unknown, usable = found.not_computed, found.usable
     gap, judgement = found.gap, found.judgement
     fit, base = found.best.trial.fit, found.base.trial.fit
     wider = math.sqrt(found.best.trial.widening)
     return {
         "experiment": str(found.evidence.experiment.path),
+        "doubts": doubts(found.evidence.experiment, *found.evidence.runs),
         "verdict": found.verdict,
         "effects": [
             {
@@ -100,15 +106,22 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             {
                 "name": one.name,
                 "held_out": one.held_out,
-                "period_rms_percent": {m: e.period_rms for m, e in one.errors.items()},
-                "peak_rms_percent": {m: e.peak_rms for m, e in one.errors.items()},
+                **{
+                    f"{what}_percent": {
+                        model: getattr(one.errors.get(model), what, None)
+                        for model in (BEFORE, AFTER)
+                    }
+                    for what in ("period_rms", "peak_rms")
+                },
             }
             for one in found.cycles
         ],
-        "where": found.where,
+        "where": None if "where" in unknown else found.where,
         "next_experiment": found.advice.next_experiment,
         "proposals": _proposals(found),
-        "detection_limits": {name: limit.size for name, limit in found.advice.limits.items()},
+        "detection_limits": None
+        if "detection_limits" in unknown
+        else {name: limit.size for name, limit in found.advice.limits.items()},
         "nearest": list(found.nearest.trial.names),
         "left": {
             "z": judgement.left,
@@ -125,7 +138,9 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "baseline": {name: e.value for name, e in base.estimates.items()},
         "unphysical": unphysical(fit),
         "below_zero": found.below_zero,
-        "model_file": {"rms": found.usable.trial.fit.rms, "parameters": given_out(found)},
+        "model_file": None
+        if usable is None
+        else {"rms": usable.trial.fit.rms, "parameters": given_out(usable)},
         "parameters": {
             name: {"value": e.value, "stderr": e.stderr and wider * e.stderr}
             for name, e in fit.estimates.items()
@@ -135,7 +150,10 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             for name, pairs in found.runs.coefficients.items()
         },
         "ranking": _ranking(found),
-        "functions": [dataclasses.asdict(score) for score in found.functions],
+        "functions": None
+        if "functions" in unknown
+        else [dataclasses.asdict(score) for score in found.functions],
+        "not_computed": unknown,
         "attempts": [
             {
                 "effects": list(a.names),
@@ -284,8 +302,16 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             f"Function {score.name}, to first order: {score.size:.3g} +- {score.stderr:.2g} times "
             f"it, G = {score.gain:.1f}; {score.left:.1f} beside the effects found"
         )
-    yield f"Next: {found.advice.next_experiment}"
+    yield from _further(found)
     yield from findings_said(found.evidence.experiment, *runs)
+
+
+def _further(found: Discrepancy) -> Iterator[str]:
+    """Yield what to record next, and what could not be computed beside the verdict."""
+    if found.advice.next_experiment is not None:
+        yield f"Next: {found.advice.next_experiment}"
+    for field, reason in found.not_computed.items():
+        yield f"Not computed: {field}: {reason}"
 
 
 def _unit(found: Discrepancy, effect: str, parameter: str) -> str:

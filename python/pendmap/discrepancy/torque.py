@@ -86,6 +86,11 @@ class Torque:
     gains: dict[str, tuple[float, int]]
     remainder: Remainder
 
+    @classmethod
+    def unknown(cls, trial: Trial) -> Torque:
+        """Return that of a model of which it cannot be computed."""
+        return cls({name: [] for name in OVER}, {}, trial.remainder)
+
     @property
     def chance(self) -> float:
         """The chance that noise alone gains so much: the least of all, times how many there are."""

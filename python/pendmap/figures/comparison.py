@@ -159,7 +159,7 @@ def _row(figure: Figure, box: Box, one: Compared, letters: Iterator[str]) -> Non
         style.scale(axes, "x", ends, names.clock(_SI))
     if one.errors is None:
         few = "Fewer than three peaks:\nno errors of periods and peaks."
-        why = one.table.left_out
+        why = one.table.left_out or next(iter(one.table.lost.values()), "")
         blocks.say(figure, cells[2], blocks.sentence(why, 40) if why else few)
         return
     titles = (next(letters) + "error of each period", next(letters) + "error of each peak")

@@ -86,7 +86,11 @@ def _able(report: IdentificationReport) -> list[str]:
     """Return the methods whose models are drawn; none where there is too little to compare."""
     if report.table.left_out or len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return []
-    return drawn(n for n, m in report.methods.items() if m.applicable and "w0" in m.estimates)
+    return drawn(
+        name
+        for name, found in report.methods.items()
+        if found.applicable and "w0" in found.estimates and name not in report.table.lost
+    )
 
 
 def _decays(report: IdentificationReport) -> dict[str, Decay]:

@@ -184,30 +184,36 @@ def compare(
     if not sampled:
         raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
     experiment.refuse_still(sampled)
-    reasons = [(run, why_not(model, run)) for run in experiment.runs]
-    out = tuple((run.name, why) for run, why in reasons if why)
-    kept = [run for run, why in reasons if not why]
-    if not kept:
+    many = ensemble or Ensemble()
+    free: list[RunComparison] = []
+    forced: list[ForcedComparison] = []
+    out: list[tuple[str, str]] = []
+    for run in experiment.runs:
+        why = why_not(model, run)
+        if not why:
+            try:
+                if run.kind == "free":
+                    free.append(_compared(model, run))
+                else:
+                    forced.append(
+                        compare_forced(model, run, many, threads=threads, progress=progress)
+                    )
+            except InputError as error:  # the others are compared all the same
+                why = str(error)
+        if why:
+            out.append((run.name, why))
+    if not free and not forced:
         said = "; ".join(f"{name}: {why}" for name, why in out)
         raise InputError(f"{experiment.path}: no run can be compared: {said}")
-    many = ensemble or Ensemble()
-    return Comparison(
-        model,
-        experiment,
-        tuple(_compared(model, run) for run in kept if run.kind == "free"),
-        tuple(
-            compare_forced(model, run, many, threads=threads, progress=progress)
-            for run in kept
-            if run.kind == "forced"
-        ),
-        out,
-    )
+    return Comparison(model, experiment, tuple(free), tuple(forced), tuple(out))
 
 
 def why_not(model: Rig, run: Run) -> str:
     """Return why a run cannot be compared with a model; empty where it can."""
     if run.peaks_only:
         return "it holds peaks alone"
+    if run.copied:
+        return "it is a copy of another run"
     if not run.moves:
         return "nothing moves in it"
     if run.kind != "forced":

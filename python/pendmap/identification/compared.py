@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.identification import forced_said
-from pendmap.records.summary import doubts_said, findings_said
+from pendmap.records.summary import doubts, doubts_said, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,6 +24,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     """Return the JSON object of ``pendmap compare``."""
     return {
         "experiment": str(comparison.experiment.path),
+        "doubts": doubts(comparison.experiment, *(one.run for one in comparison.every)),
         "runs": [
             *(_run(run) for run in comparison.runs),
             *(forced_said.as_json(run) for run in comparison.forced),
@@ -54,7 +55,7 @@ def _run(one: RunComparison) -> dict[str, Any]:
             }
             for row in one.table.rows
         ],
-        "table1_left_out": one.table.left_out or None,
+        "table1_left_out": one.table.left_out or next(iter(one.table.lost.values()), None),
         "periods": _pairs(errors and errors.period_time, errors and errors.period_error),
         "peaks": _pairs(errors and errors.peak, errors and errors.peak_error),
         "findings": [found.text for found in one.run.findings],
@@ -113,6 +114,8 @@ def as_text(comparison: Comparison) -> Iterator[str]:
             yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {said}"
         if one.table.left_out:
             yield f"{one.run.name}: {one.table.left_out}"
+        for reason in one.table.lost.values():
+            yield f"{one.run.name}: periods and peaks are not compared: {reason}"
         if one.rms > FITS * one.sigma:
             yield (
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "

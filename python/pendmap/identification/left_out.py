@@ -16,6 +16,9 @@ __all__ = ["left_out"]
 STILL: Final = "in which nothing moves"
 """What a run is that shows no motion."""
 
+COPY: Final = "that copies another"
+"""What a run is whose readings count in another one."""
+
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     """Return how many runs were read and which were not, in words; empty if all were.
@@ -40,12 +43,14 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
             why = STILL
         elif run.kind == "free" and run.peaks_only and any(each.hold_out for each in read):
             why = "of peaks alone"
+        if run.copied:
+            why = COPY
         reasons[why] = reasons.get(why, 0) + 1
     if not reasons:
         return ""
     first, *others = (
         f"{counted(n, 'run')} {why}"
-        if why in {"held out", "of peaks alone", STILL}
+        if why in {"held out", "of peaks alone", STILL, COPY}
         else counted(n, f"{why} run")
         for why, n in reasons.items()
     )

@@ -9,9 +9,10 @@ import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.identification.astray import refuse_astray
 from pendmap.identification.clock import span
 from pendmap.identification.from_start import TooShortError
-from pendmap.identification.joint import JointFit, fit_together
+from pendmap.identification.joint import JointFit, as_fit_run, fit_together
 from pendmap.identification.methods import check_names, identify, identify_peaks
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.result import Identification
@@ -102,12 +103,11 @@ class IdentificationReport(Readable):
     @property
     def passed_over(self) -> str:
         """Which better method the best one stands in for, and why, in words; empty if for none."""
-        for found in self.methods.values():
-            if found.sound:
-                return ""
-            if not found.converged:
-                return f"{found.method} did not converge: the model is that of {self.best.method}"
-        return ""
+        first = next(iter(self.methods.values()))
+        if first.sound or not any(found.sound for found in self.methods.values()):
+            return ""
+        why = "cannot be applied" if first.converged else "did not converge"
+        return f"{first.method} {why}: the model is that of {self.best.method}"
 
     @property
     def model(self) -> Rig:
@@ -169,8 +169,8 @@ def identify_experiment(
     Raises
     ------
     InputError
-        If a method or an effect is not known, an effect is one of the drive, or there is no free
-        decay.
+        If a method or an effect is not known, an effect is one of the drive, there is no free
+        decay, or the trajectory that fits best is plainly not one of these records.
     """
     checks.of_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
     if start is not None:
@@ -226,5 +226,16 @@ def _best(
         joint = fit_together(runs, start=start, known=known, effects=effects)
     except TooShortError as error:
         return None, Identification(BEST, warnings=(str(error),), applicable=False)
+    except InputError as error:
+        if start is not None or effects:
+            raise
+        # No other method can stand in for what was asked for by name; without that they can.
+        return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
+    if joint.fit.converged or len(runs) > 1:
+        refuse_astray(
+            experiment.path,
+            [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)],
+            joint.fit,
+        )
     part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
     return joint, identification_of(joint.fit, joint.readings, part)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.errors import InputError
 from pendmap.identification.digits import interval, with_error
 from pendmap.identification.left_out import left_out
-from pendmap.records.summary import doubts_said, findings_said
+from pendmap.records.summary import doubts, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,6 +20,7 @@ __all__ = [
     "COLUMNS",
     "as_json",
     "as_text",
+    "foremost",
     "methods_table",
     "table1_table",
 ]
@@ -44,12 +45,14 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "runs": _runs(report),
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
+        "doubts": foremost(report),
         "methods": {name: _method(found) for name, found in report.methods.items()},
         "table1": [
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
             for r in report.table.rows
         ],
         "table1_left_out": report.table.left_out or None,
+        "not_simulated": dict(report.table.lost),
         "rms": None if report.joint is None else report.joint.fit.rms,
         "findings": [
             found.text
@@ -103,17 +106,16 @@ def _method(found: Identification) -> dict[str, Any]:
 def as_text(report: IdentificationReport) -> Iterator[str]:
     """Yield the lines beside the tables: intervals, warnings, what was found in the record.
 
-    Doubts about a unit come first.
+    What a reader must know before any number comes first.
     """
-    yield from doubts_said(report.experiment, *report.runs)
+    for text in foremost(report):
+        yield f"Warning: {text}"
     best = _best(report)
     if best is not None:
         yield f"{best.method}: {best.used}"
         for name, estimate in {**best.estimates, **best.derived}.items():
             if estimate.ci95 is not None:
                 yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
-        if report.passed_over:
-            yield report.passed_over
     if report.table.left_out:
         yield f"{report.run.name}: {report.table.left_out}"
     said = left_out(report.experiment, report.runs)
@@ -122,7 +124,15 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
     for name, found in report.methods.items():
         for warning in found.warnings:
             yield f"{name}: {warning}"
+        if name in report.table.lost:
+            yield f"{name}: not simulated from the first peak: {report.table.lost[name]}"
     yield from findings_said(report.experiment, *report.runs)
+
+
+def foremost(report: IdentificationReport) -> list[str]:
+    """Return doubts about the records, and which method another stands in for."""
+    first = doubts(report.experiment, *report.runs)
+    return [*first, report.passed_over] if report.passed_over else first
 
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.errors import InputError
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.trajectory import simulate
 
@@ -120,11 +121,13 @@ class Table1:
 
     Rows that fall on the same measured value are one, and none falls on the peak that simulations
     start from. ``left_out`` says why there is none although there are peaks; else it is empty.
+    ``lost`` has the reason, by method, where a model cannot be run from the first peak.
     """
 
     rows: tuple[Row, ...]
     errors: Mapping[str, PeakErrors]
     left_out: str = ""
+    lost: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 def _rms(errors: Floats) -> float:
@@ -262,11 +265,14 @@ def table_of(
     if len(found.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return Table1((), {})
     start = first_state(found)
-    errors = {
-        name: peak_errors(each, found, start)
-        for name, each in identifications.items()
-        if each.applicable
-    }
+    errors, lost = {}, {}
+    for name, each in identifications.items():
+        if not each.applicable:
+            continue
+        try:
+            errors[name] = peak_errors(each, found, start)
+        except InputError as error:
+            lost[name] = str(error)
     rows = [_row("period", asked, errors) for asked in periods]
     rows += [_row("peak", asked, errors) for asked in peaks]
     # Several asked ones may have the same nearest measured one.
@@ -274,7 +280,7 @@ def table_of(
     for row in rows:
         if row is not None:
             told.setdefault((row.what, row.measured), row)
-    return Table1(tuple(told.values()), errors)
+    return Table1(tuple(told.values()), errors, lost=lost)
 
 
 def table_of_run(run: Run, found: Peaks, identifications: Mapping[str, Identification]) -> Table1:

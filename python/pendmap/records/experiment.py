@@ -155,6 +155,11 @@ class Run:
         return bool(self.trusted.any())
 
     @property
+    def copied(self) -> bool:
+        """Whether its readings are those of another run, and count there."""
+        return not self.moves and any(found.what == "same-record" for found in self.findings)
+
+    @property
     def rod_sensor(self) -> Accelerometer | Gyroscope | None:
         """What read in place of a sensor of the angle, whose readings a fit compares."""
         return self.accelerometer or self.gyroscope

@@ -6,8 +6,6 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pendmap.errors import InputError
 from pendmap.records import (
     angle,
@@ -15,12 +13,14 @@ from pendmap.records import (
     motion,
     noise_check,
     resampled,
+    resolution,
     samples,
     scale,
     signs,
     trigger,
     unmarked_peaks,
 )
+from pendmap.records.across import checked_together
 from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
@@ -98,7 +98,9 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
     place = Path(path)
     if not place.is_dir():
         found, findings = _runs(place, RunPlan(place.name), ALONE, {}, place.stem)
-        return Experiment(place, tuple(found), {}, tuple(findings), {place.name: found[0].sha256})
+        checked, together = checked_together(found)
+        digest = {place.name: found[0].sha256}
+        return Experiment(place, checked, {}, (*findings, *together), digest)
     if not (place / NAME).is_file():
         raise InputError(f"{place}: has no {NAME}: allowed is one that lists the runs, or a file")
     description = read_description(place / NAME)
@@ -113,7 +115,8 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
         runs += found
         shared += findings
     digests = {run.file: run.sha256 for run in runs}
-    return Experiment(place, tuple(runs), description.known, (*shared, *_across(runs)), digests)
+    checked, together = checked_together(runs)
+    return Experiment(place, checked, description.known, (*shared, *together), digests)
 
 
 def _names(files: list[str]) -> list[str]:
@@ -163,6 +166,7 @@ def _runs(
         motion.check(work)
         trigger.check_drive(work)
         signs.check(work)
+        resolution.check(work)
     work.refuse_short()
     works, shared = work.apart()
     runs = []
@@ -207,17 +211,3 @@ def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
 
 def _columns(channels: Channels) -> dict[str, str]:
     return {channel: str(column) for channel, column in channels.columns.items()}
-
-
-def _across(runs: list[Run]) -> tuple[Finding, ...]:
-    """Return what runs show together: the same record twice, all of them held out."""
-    found = []
-    for k, run in enumerate(runs):
-        for other in runs[:k]:
-            same = run.theta.size == other.theta.size and np.array_equal(run.theta, other.theta)
-            if same and np.array_equal(run.time, other.time):
-                text = f"{run.name} and {other.name} are the same record"
-                found.append(Finding("same-record", text, where=run.name))
-    if all(run.hold_out for run in runs):
-        found.append(Finding("all-held-out", "all runs are held out: none is left to fit"))
-    return tuple(found)

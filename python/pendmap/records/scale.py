@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Periods", "check", "periods_of"]
+__all__ = ["Periods", "check", "gain_of", "periods_of", "small_period"]
 
 DEGREE: Final = math.pi / 180
 
@@ -45,6 +45,12 @@ UNLIKE: Final = 0.25
 
 FEWEST: Final = 6
 """Periods that a relation is taken from."""
+
+LARGEST: Final = 3.0
+"""Swings, rad, up to which the period grows smoothly: near the top it does without bounds."""
+
+Z95: Final = 1.959963984540054
+"""The 97.5 % point of the standard normal distribution."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,14 +96,47 @@ def check(work: Work) -> None:
 def periods_of(work: Work, middle: float) -> Periods | None:
     """Return the periods of a record about its middle; none where there are too few."""
     good = work.trusted
-    time, theta = work.time[good], work.theta[good] - middle
+    return _periods(work.time[good], work.theta[good] - middle, work.count)
+
+
+def small_period(time: Floats, theta: Floats, count: float) -> float:
+    """Return the period of small swings, s, by the swings of a free record about its middle.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, and rad.
+    count : float
+        The step of the readings, rad.
+
+    Returns
+    -------
+    float
+        No number where there are too few swings, or none of less than half a turn.
+    """
+    middle = middle_of(time, theta)
+    found = _periods(time, theta - (0.0 if middle is None else middle), count)
+    if found is None or float(np.min(found.amplitude)) >= math.pi:
+        return math.nan
+    return _small(found)
+
+
+def _small(found: Periods) -> float:
+    """Return the period of small swings, by how that of the smallest ones has grown."""
+    if float(np.min(found.amplitude)) >= math.pi:
+        return found.small
+    smallest = found.amplitude[np.argsort(found.amplitude)[: max(found.period.size // 3, 1)]]
+    return found.small / float(np.median(_growth(np.minimum(smallest, 3.0))))
+
+
+def _periods(time: Floats, theta: Floats, count: float) -> Periods | None:
     start = after_turns(theta)
     time, theta = time[start:], theta[start:]
     if time.size < 4 * FEWEST:
         return None
     noise = float(np.median(np.abs(np.diff(theta, 2)))) if theta.size > 2 else 0.0
     reach = float(np.quantile(np.abs(theta), 0.98))
-    least = max(2.5 * work.count, min(4 * noise, 0.3 * reach), 0.02 * reach)
+    least = max(2.5 * count, min(4 * noise, 0.3 * reach), 0.02 * reach)
     half = swings(time, theta, least=least)
     if half.peak.size < FEWEST + 2:
         return None
@@ -165,13 +204,9 @@ def _rescale(work: Work, factor: float) -> None:
 def _curvature(work: Work, found: Periods, largest: float) -> None:
     """Say so where the period does not grow with the swing as a pendulum's does."""
     grown = _growth(found.amplitude)
-    if largest > 3.0 or np.ptp(grown) < 2e-3 or found.period.size < FEWEST + 2:
+    if largest > LARGEST or np.ptp(grown) < 2e-3 or found.period.size < FEWEST + 2:
         return
-    columns = np.column_stack([np.ones(grown.size), grown - 1])
-    answer, spread = _robust_line(columns, found.period)
-    share = float(answer[1] / answer[0])
-    error = float(spread[1] / answer[0])
-    # 1 for radians; readings that are k times the angle show about 1/k^2.
+    share, error = _share(found, grown)
     if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
         factor = _factor(found)
         flat = share < 0.1
@@ -182,6 +217,44 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
             f" {factor:.2g} times the reading{degrees}, or another force acts"
         )
         work.say("angle-unit" if flat else "angle-scale", text)
+
+
+def _share(found: Periods, grown: Floats) -> tuple[float, float]:
+    """Return how much of a pendulum's growth the periods show, with its standard error.
+
+    1 for radians; readings that are k times the angle show about 1/k^2.
+    """
+    columns = np.column_stack([np.ones(grown.size), grown - 1])
+    answer, spread = _robust_line(columns, found.period)
+    return float(answer[1] / answer[0]), float(spread[1] / answer[0])
+
+
+def gain_of(work: Work) -> tuple[float, float] | None:
+    """Return between which factors the readings are the angle, by the periods of a free run.
+
+    The motion of small swings has no scale: the period alone grows with the square of the angle.
+
+    Parameters
+    ----------
+    work : Work
+        A run whose angle is in rad about its rest.
+
+    Returns
+    -------
+    tuple of float or None
+        Ends of the interval of 95 %, the upper one infinite where nothing bounds it; none where
+        there are too few periods, or none of half a turn or less.
+    """
+    good = work.trusted
+    middle = middle_of(work.time[good], work.theta[good])
+    found = periods_of(work, 0.0 if middle is None else middle)
+    if found is None or float(np.max(found.amplitude)) > LARGEST:
+        return None
+    share, error = _share(found, _growth(found.amplitude))
+    least, most = share - Z95 * error, share + Z95 * error
+    if most <= 0:
+        return 0.0, math.inf
+    return 1 / math.sqrt(most), 1 / math.sqrt(least) if least > 0 else math.inf
 
 
 def _factor(found: Periods) -> float:
@@ -225,10 +298,7 @@ def _known(work: Work, found: Periods) -> None:
     if "length_m" in work.known:
         length, gravity = work.known["length_m"], work.known.get("gravity", GRAVITY)
         expected[f"length_m = {length:g} m"] = 2 * math.pi * math.sqrt(length / gravity)
-    seen = found.small
-    if float(np.min(found.amplitude)) < math.pi:
-        smallest = found.amplitude[np.argsort(found.amplitude)[: max(found.period.size // 3, 1)]]
-        seen /= float(np.median(_growth(np.minimum(smallest, 3.0))))
+    seen = _small(found)
     for said, period in expected.items():
         if abs(seen / period - 1) > UNLIKE:
             text = f"small swings take {seen:.4g} s, by {said} {period:.4g} s: one of them is wrong"

@@ -22,6 +22,7 @@ __all__ = [
     "as_json",
     "as_text",
     "doubted",
+    "doubts",
     "doubts_said",
     "findings_said",
     "noise_said",
@@ -30,6 +31,9 @@ __all__ = [
 
 UNITS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
 """Findings that a unit or a scale is wrong: unless that is mended, so is all that is fitted."""
+
+DOUBTS: Final = UNITS | {"few-used", "rigs-differ"}
+"""Findings that are told before any number: with them a model may not be that of the records."""
 
 SCALE: Final = "angle-scale"
 """Of these the one that an effect may bring about just as well."""
@@ -147,15 +151,20 @@ def _line(found: Finding) -> str:
     return f"- {mark}{found.text}{where}  [{found.what}]"
 
 
+def doubts(experiment: Experiment, *runs: Run) -> list[str]:
+    """Return each doubt about a unit or the records: to be read before any result."""
+    said = _said_of(experiment, runs)
+    return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
+
+
 def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
-    """Yield a warning for each unit or scale that is wrong: to be read before any result."""
-    for where, found in _said_of(experiment, runs):
-        if _doubted(found):
-            yield f"Warning: {where}: {found.text}"
+    """Yield a warning for each of :func:`doubts`."""
+    for text in doubts(experiment, *runs):
+        yield f"Warning: {text}"
 
 
 def doubted(experiment: Experiment, *runs: Run) -> bool:
-    """Whether a unit of these runs is wrong, as far as can be seen."""
+    """Whether a unit of these runs is wrong, or they are of several rigs, as far as can be seen."""
     said = (found for _, found in _said_of(experiment, runs))
     return any(_doubted(found) and found.what != SCALE for found in said)
 
@@ -179,7 +188,7 @@ def _said_of(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str,
 
 
 def _doubted(found: Finding) -> bool:
-    return found.what in UNITS and not found.mended
+    return found.what in DOUBTS and not found.mended
 
 
 def _steps(run: Run) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.discrepancy.further import Reasons, attempted
 from pendmap.discrepancy.given_out import given_out
 from pendmap.discrepancy.physical import unphysical
 from pendmap.discrepancy.strength import strength_of
@@ -94,8 +95,12 @@ def _elsewhere(effect: NamedEffect) -> Iterator[str]:
 
 def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:
     """Yield how strong an effect is over the records, against friction and gravity."""
-    strength = strength_of(found.evidence, found.best, effect.name)
+    reasons: Reasons = {}
+    strength = attempted(
+        reasons, "strength", lambda: strength_of(found.evidence, found.best, effect.name), None
+    )
     if strength is None:
+        yield f". How strong it is over these records is not computed: {reasons['strength']}"
         return
     fit = found.best.trial.fit
     if strength.torque > 0:
@@ -154,14 +159,14 @@ def _unphysical(found: Discrepancy) -> Iterator[Block]:
                 " for what is missing."
             )
             yield Paragraph((Name(name), said))
-    if unphysical(found.best.trial.fit):
+    if unphysical(found.best.trial.fit) and found.usable is not None:
         yield Paragraph(
             "The model file has 0 there, and the rest found again, to a residual of "
             f"{mrad(found.usable.trial.fit.rms)} rms:"
         )
         rows = (
             (Name(name), unit_of(name, found.definition), f"{value:.5g}")
-            for name, value in given_out(found).items()
+            for name, value in given_out(found.usable).items()
         )
         yield Table(("parameter", "unit", "in the model file"), tuple(rows))
     for name, since in found.below_zero.items():

@@ -52,7 +52,11 @@ FIGURES: Final = {
 def following(found: Discrepancy) -> Section:
     """Return what to record next, and what each kind of run would do."""
     advice = found.advice
-    blocks: list[Block] = [Paragraph(advice.next_experiment)]
+    blocks: list[Block] = []
+    if advice.next_experiment is not None:
+        blocks.append(Paragraph(advice.next_experiment))
+    elif "proposals" in found.reasons:
+        blocks.append(Paragraph(f"Not computed: {found.reasons['proposals']}."))
     outlook = advice.outlook
     if outlook is not None and outlook.prospects:
         blocks += [Paragraph(_meaning(outlook)), _proposals(outlook)]
@@ -110,7 +114,7 @@ def _wrong(probability: float) -> str:
 
 
 def set_aside(found: Discrepancy) -> Section:
-    """Return what was not used, what was tried and dropped, and what would have shown."""
+    """Return what was not used or not computed, what was dropped, and what would have shown."""
     blocks: list[Block] = []
     used = found.evidence.runs
     texts: list[Text] = []
@@ -124,6 +128,10 @@ def set_aside(found: Discrepancy) -> Section:
         texts += [(Name(run.name), f": {finding.text}") for finding in run.findings]
     texts += [finding.text for finding in found.evidence.experiment.findings]
     blocks += [Paragraph("Not used, or noted:"), Items(tuple(texts))] if texts else []
+    unknown = found.not_computed
+    if unknown:
+        rows = tuple((Name(field), f": {reason}") for field, reason in unknown.items())
+        blocks += [Paragraph("Not computed, by the field of the JSON object:"), Items(rows)]
     dropped = [a for a in found.attempts if not a.accepted]
     if dropped:
         blocks += [

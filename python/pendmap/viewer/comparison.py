@@ -114,7 +114,7 @@ def _simulated(report: IdentificationReport) -> Comparison:
     except InputError:
         best = None
     never = np.full(run.time.size, math.nan)
-    if best is None or not len(peaks.turned):
+    if best is None or not len(peaks.turned) or best.method in report.table.lost:
         w0 = math.pi / float(np.median(np.diff(peaks.time))) if len(peaks) > 1 else 0.0
         return (
             _of_peaks(run, peaks, None, 0.0)

@@ -1,0 +1,48 @@
+"""What a diagnosis computes once its verdict stands, each part by itself.
+
+The verdict does not rest on these parts, and a model that was fitted may be lost where they run it:
+in another record, from another start, with another size of an effect. A part that cannot be
+computed is left out, and its reason is kept.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, TypeVar
+
+import numpy as np
+
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["Reasons", "attempted"]
+
+Reasons = dict[str, str]
+"""Why a part was not computed, by its field in the JSON object."""
+
+Part = TypeVar("Part")
+
+LOST: Final = (InputError, ArithmeticError, np.linalg.LinAlgError)
+"""How it shows that numbers are lost: in a motion, in a quotient, in a matrix made of both."""
+
+
+def attempted(reasons: Reasons, field: str, compute: Callable[[], Part], otherwise: Part) -> Part:
+    """Return a part of a diagnosis, or ``otherwise`` with the reason kept.
+
+    Parameters
+    ----------
+    reasons : dict of str to str
+        Where the reason is kept.
+    field : str
+        The field of the JSON object.
+    compute : callable
+        Computes the part.
+    otherwise : object
+        Stands for it where it cannot be computed.
+    """
+    try:
+        return compute()
+    except LOST as error:
+        reasons[field] = str(error)
+        return otherwise

@@ -1,0 +1,109 @@
+"""A verdict is said whole, whatever cannot be computed beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import pendmap.discrepancy
+from hidden import once
+from pendmap import InputError, _core, figures, viewer
+from pendmap.cli import main
+from pendmap.cli.show import plain
+from pendmap.discrepancy import Discrepancy, summary
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+ENTRIES = ("fit_runs", "fit_equations", "fit_rows", "simulate")
+"""Where the core follows a motion of a model."""
+LOST = "the motion leaves the range of numbers: it begins too fast"
+
+
+def anew() -> Discrepancy:
+    """Return a diagnosis of which nothing beside the verdict is computed yet."""
+    return dataclasses.replace(once("quadratic_drag"), reasons={})
+
+
+def lose(monkeypatch: pytest.MonkeyPatch, share: float, seed: int = 0) -> None:
+    """Let each call into the core lose the motion with this chance."""
+    draw = np.random.default_rng(seed)
+    for name in ENTRIES:
+        true = getattr(_core, name)
+
+        def call(*given: Any, true: Any = true) -> Any:  # noqa: ANN401 (as the core)
+            if draw.random() < share:
+                raise InputError(LOST)
+            return true(*given)
+
+        monkeypatch.setattr(_core, name, call)
+
+
+@pytest.mark.parametrize(("share", "seed"), [(1.0, 0), (0.3, 2)])
+def test_what_cannot_be_computed_is_null_with_its_reason(
+    share: float, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = plain(summary.as_json(once("quadratic_drag")))
+    assert whole["not_computed"] == {}
+    found = anew()
+    lose(monkeypatch, share, seed)
+    told = json.loads(json.dumps(plain(summary.as_json(found)), allow_nan=False))
+    assert told.keys() == whole.keys()
+    for name in ("verdict", "effects", "gap", "where", "ranking", "left"):
+        assert told[name] == whole[name], name
+    # Each part is there, or its reason is.
+    unknown = told["not_computed"]
+    for part in {name.partition(".")[0] for name in unknown}:
+        assert told[part] is None or told[part] != whole[part], part
+    for part in ("forecast", "cycles", "proposals", "next_experiment"):
+        if told[part] != whole[part]:
+            wanted = "proposals" if part == "next_experiment" else part
+            assert any(name.partition(".")[0] == wanted for name in unknown), part
+    assert all("range of numbers" in reason for reason in unknown.values())
+    if share == 1.0:
+        assert told["next_experiment"] is None
+        assert {name.partition(".")[0] for name in unknown} >= {"forecast", "cycles", "proposals"}
+    text = "\n".join(summary.as_text(found))
+    assert "Verdict: named" in text
+    for name in unknown:
+        assert f"Not computed: {name}: " in text
+    figures.draw_discrepancy(found, tmp_path / "a.png")
+    figures.write_report(found, tmp_path / "a.html")
+    viewer.record_discrepancy(found, tmp_path / "a.rrd")
+    report = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert all(name in report for name in unknown)
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_a_model_that_cannot_be_given_out_costs_no_verdict(
+    as_json: bool,  # noqa: FBT001 (a parameter)
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    record = tmp_path / "run.csv"
+    record.write_text("".join(f"{k / 100},{np.cos(k / 20):.4f}\n" for k in range(500)))
+    found = anew()
+    monkeypatch.setattr(pendmap.discrepancy, "diagnose", lambda *_, **__: found)
+
+    def refuse(*_: Any) -> None:  # noqa: ANN401 (as the one it stands for)
+        raise InputError(LOST)
+
+    monkeypatch.setattr(sys.modules[Discrepancy.__module__], "physical", refuse)
+    words = ["diagnose", str(record), "--out", str(tmp_path / "m.toml"), *["--json"] * as_json]
+    with pytest.raises(InputError, match="range of numbers"):
+        main.command.main(words, standalone_mode=False)
+    said = capsys.readouterr().out
+    if as_json:
+        told = json.loads(said)
+        assert (told["verdict"], told["model"], told["model_file"]) == ("named", None, None)
+        assert told["not_computed"]["model_file"] == LOST
+    else:
+        assert "Verdict: named" in said
+        assert f"Not computed: model_file: {LOST}" in said
+    assert not (tmp_path / "m.toml").exists()
