@@ -15,12 +15,14 @@
 //! - [`orbits`]: all closed orbits of one period and winding: `vanishing` and `approach` find
 //!   where Newton's method begins
 //! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials
+//! - [`bounds`]: how many periods a trajectory is given to settle
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
 mod approach;
 pub mod basins;
 pub mod bifurcation;
+pub mod bounds;
 pub mod cell;
 mod chebyshev;
 pub mod control;
