@@ -205,7 +205,8 @@ pub fn basins(
                 let states = Starts::List(states);
                 Ok(label(&strobe, &catalogue, &states, None, bound, &pool, control)?.label)
             };
-            map.uncertainty = Some(uncertainty([theta, velocity], options.seed, again)?);
+            map.uncertainty =
+                Some(uncertainty([theta, velocity], &labels.label, options.seed, again)?);
         }
         map.labels = labels;
     } else {

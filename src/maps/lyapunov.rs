@@ -163,14 +163,24 @@ impl Run<'_> {
         result: &mut Exponent,
     ) -> Result<(), Error> {
         let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH);
-        catalogue.search(self.strobe, seeds, search_periods(&self.strobe.pendulum), self.control.flag());
+        catalogue.search(
+            self.strobe,
+            seeds,
+            search_periods(&self.strobe.pendulum),
+            self.control.flag(),
+        );
         self.control.check()?;
         let (mut fate, mut periods) = self.follow(course, &catalogue, result.bound)?;
         let mut home = self.region(course, &catalogue, fate)?;
         if fate == Fate::Open && home.is_none() {
             // Something that the search has not met: it begins anew where the start has come to.
             let here: Vec<State> = course.states.last().copied().into_iter().collect();
-            catalogue.search(self.strobe, &here, search_periods(&self.strobe.pendulum), self.control.flag());
+            catalogue.search(
+                self.strobe,
+                &here,
+                search_periods(&self.strobe.pendulum),
+                self.control.flag(),
+            );
             self.control.check()?;
             (fate, periods) = self.follow(course, &catalogue, result.bound)?;
             home = self.region(course, &catalogue, fate)?;
@@ -270,7 +280,12 @@ impl Run<'_> {
             .map(|(_, end)| *end)
             .collect();
         if !suspects.is_empty() {
-            catalogue.search(self.strobe, &suspects, search_periods(&self.strobe.pendulum), self.control.flag());
+            catalogue.search(
+                self.strobe,
+                &suspects,
+                search_periods(&self.strobe.pendulum),
+                self.control.flag(),
+            );
         }
         let found = outcomes(self.strobe, &catalogue.traps, TAKEN, ends, self.control.flag());
         let found = found.ok_or(Error::Interrupted)?;
