@@ -91,7 +91,10 @@ def uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
         "uncertainty_tried": (
             "distance",
             raw["uncertainty_tried"].astype(np.int64),
-            {"long_name": "starts with known ends, drawn anew for each distance"},
+            {
+                "long_name": "starts with known ends, drawn anew for each distance; where drawn by "
+                "strata, as many drawn evenly as tell the share as precisely"
+            },
         ),
     }
 

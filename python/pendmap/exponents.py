@@ -74,9 +74,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol : float
         As for :func:`pendmap.basins`.
     max_periods : int, optional
-        Periods within which an attractor must capture the start, 4000 where nothing is said, and
-        that each trajectory of an ensemble is followed for at the most, 20,000 (without damping
-        2000).
+        Periods within which an attractor must capture the start, by default as for
+        :func:`pendmap.basins`, and that each trajectory of an ensemble is followed for at the most,
+        20,000 (without damping 2000).
     threads : int, optional
         Number of threads; by default one a processor. The result does not depend on it.
     seed : int

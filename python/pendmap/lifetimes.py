@@ -82,7 +82,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Where the tail begins. By default where the data say so: twice the earliest period from
         which two tests (of a Weibull shape, and of a rate that changes) find it exponential.
     max_periods : int, optional
-        The bound after which a start is given up, as for :func:`pendmap.basins`: 4000.
+        The bound after which a start is given up, as for :func:`pendmap.basins`.
     tol : float
         As for :func:`pendmap.basins`.
     threads : int, optional

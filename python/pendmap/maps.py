@@ -63,8 +63,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         The 95th percentile, over a sample of the starts, of the difference that halving the step
         makes after 5 periods; 1e-13 to 1e-2.
     max_periods : int, optional
-        Periods after which a start is undecided; by default 4000, and where chaos coexists with
-        other attractors ten times the longest settling time seen.
+        Periods after which a start is undecided; by default those in which damping shrinks a free
+        motion by exp(-200), ``400 / (gamma T)``, from 4000 to a million; with dry friction
+        ``theta_r`` adds to ``gamma``. Where chaos coexists with other attractors ten times the
+        longest settling time seen.
     layer_periods : int, optional
         Periods of the finite-time layers; by default what an exponent needs to stretch one cell to
         the size of the plane.

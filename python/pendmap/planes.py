@@ -89,7 +89,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         with the period and the drive's pull.
     max_periods : int, optional
         Periods after which trajectories begin to be watched; by default until damping would have
-        shrunk a free motion by exp(-40), and 64 to 1000.
+        shrunk a free motion by exp(-40), 64 at least.
     threads : int, optional
         Number of threads; by default one a processor. The result does not depend on it.
     seed : int

@@ -63,6 +63,8 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
     a = dataset.attrs
     if plane != "conservative":
         lines += unlimited
+        if not unlimited and a["undecided"] > 0:
+            lines += _sustained_rotation(pendulum)
     lines += of_motion(pendulum.effects, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
@@ -79,18 +81,10 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
     Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
     grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
     """
-    kinds = {effect.name: effect for effect in pendulum.effects if effect.brakes}
-    own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
-    added = dict.fromkeys(own.values(), 0.0)
-    for effect in pendulum.effects:
-        if effect.name in own:
-            added[own[effect.name]] = next(iter(effect.parameters.values()))
-    gamma, friction, torque = (
-        getattr(pendulum, name) + added[name] for name in ("gamma", "theta_r", "torque")
-    )
-    # Stribeck's part of friction is none at speed; all others may brake a rotation.
-    if gamma > 0 or kinds.keys() - {"coulomb_friction", "stribeck_friction", "viscous_damping"}:
+    dry = _dry(pendulum)
+    if dry is None:
         return []
+    friction, torque = dry
     if torque == 0 or friction == 0 or abs(torque) < friction:
         return []
     way = "forward" if torque > 0 else "backward"
@@ -103,6 +97,38 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
     if abs(torque) > friction + 1 + abs(pendulum.p):
         lines.append("Friction can hold it nowhere (torque above theta_r + 1 + p): no start rests.")
     return lines
+
+
+def _sustained_rotation(pendulum: Pendulum) -> list[str]:
+    """Say what keeps starts undecided where dry friction alone damps a driven pendulum.
+
+    Friction of one sense is a constant torque, which keeps phase area: only where the motion turns
+    back does the area shrink.
+    """
+    dry = _dry(pendulum)
+    if dry is None or dry[0] == 0 or pendulum.p == 0:
+        return []
+    line = (
+        "With dry friction alone (gamma = 0) phase area shrinks only where the motion turns back: "
+    )
+    return [line + "a rotation that the drive keeps up settles on nothing."]
+
+
+def _dry(pendulum: Pendulum) -> tuple[float, float] | None:
+    """Return dry friction and torque where nothing grows with the speed; else None."""
+    kinds = {effect.name for effect in pendulum.effects if effect.brakes}
+    own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
+    added = dict.fromkeys(own.values(), 0.0)
+    for effect in pendulum.effects:
+        if effect.name in own:
+            added[own[effect.name]] = next(iter(effect.parameters.values()))
+    gamma, friction, torque = (
+        getattr(pendulum, name) + added[name] for name in ("gamma", "theta_r", "torque")
+    )
+    # Stribeck's part of friction is none at speed; all others may brake a rotation.
+    if gamma > 0 or kinds - {"coulomb_friction", "stribeck_friction", "viscous_damping"}:
+        return None
+    return friction, torque
 
 
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:

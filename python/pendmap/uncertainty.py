@@ -119,8 +119,10 @@ def uncertainty_exponent(
 
     Of a dataset of :func:`pendmap.basins` it is what the map found by starts of its own: anew for
     each distance, in directions drawn at random, down to 1.5e-8 of the window's sides, so that
-    counts are independent. Of labels on a grid the distances are 1, 2, 3, 4, 6, ... cells, along
-    both axes at once, from every cell. Labels on a grid tell nothing below a cell: where filaments
+    counts are independent. Where the map shows every change of label that a pilot meets, most
+    starts are drawn near those, each with its weight, and the counts are those of as many starts
+    drawn evenly as tell the share as precisely. Of labels on a grid the distances are 1, 2, 3, 4,
+    6, ... cells, along both axes at once, from every cell. Labels on a grid tell nothing below a cell: where filaments
     are thinner, the exponent is that of what is seen.
 
     The law is fitted by its binomial likelihood to the smallest distances, to all of them up to

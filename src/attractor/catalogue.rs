@@ -9,10 +9,11 @@ use super::kind::Kind;
 use super::region::Region;
 use super::walk::Senses;
 use crate::integrate::State;
-use crate::integrate::accuracy::{distance, wrapped};
+use crate::integrate::accuracy::distance;
 use crate::model::Pendulum;
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::rotation::Rotation;
+use crate::orbit::symmetry::Mirror;
 
 /// An attractor.
 #[derive(Clone, Debug)]
@@ -158,10 +159,9 @@ impl Attractor {
     /// Whether it is a set in whose region these points lie, most of them, and which turns so.
     #[must_use]
     pub fn keeps(&self, points: &[State], senses: Senses) -> bool {
-        let inside = |region: &Region| points.iter().filter(|p| region.contains(**p)).count();
         let (kind, sense) = senses.kind();
         let turns = self.kind == Kind::TumblingChaos || (self.kind, self.sense) == (kind, sense);
-        turns && self.region.as_ref().is_some_and(|region| 2 * inside(region) > points.len())
+        turns && self.region.as_ref().is_some_and(|region| region.holds_most(points))
     }
 
     /// What stays when a catalogue is sorted anew: the bits of the first point.
@@ -170,23 +170,16 @@ impl Attractor {
         self.points.first().map_or([0; 2], |p| p.map(f64::to_bits))
     }
 
-    /// Mean angle of the cycle's points, each wrapped; its sign tells asymmetric twins apart.
-    fn lean(&self) -> f64 {
-        self.points.iter().map(|p| p[0]).sum::<f64>() / self.points.len().max(1) as f64
-    }
-
-    /// Whether the other is this one's image under `(th, v) -> (-th, -v)`.
-    fn mirrors(&self, other: &Self) -> bool {
-        let image = (other.kind, other.n, other.w.map(|w| -w), -other.sense);
-        if (self.kind, self.n, self.w, self.sense) != image {
+    /// Whether the other is this one's mirror image; `image` holds the images of its points.
+    fn mirrors(&self, image: &[State], other: &Self, tolerance: f64) -> bool {
+        let alike = (other.kind, other.n, other.w.map(|w| -w), -other.sense);
+        if (self.kind, self.n, self.w, self.sense) != alike {
             return false;
         }
         if self.n.is_none() {
-            let (Some(own), Some(other)) = (&self.region, &other.region) else { return true };
-            return own.mirrored().meets(other);
+            return other.region.as_ref().is_none_or(|region| region.holds_most(image));
         }
-        let image = |p: &State| [wrapped(-p[0]), -p[1]];
-        self.points.iter().all(|p| other.points.iter().any(|q| distance(image(p), *q) < 1e-7))
+        image.iter().all(|p| other.points.iter().any(|q| distance(*p, *q) < tolerance))
     }
 
     fn key(&self) -> (Kind, usize, i64, f64, f64) {
@@ -194,6 +187,11 @@ impl Attractor {
         let w = self.w.unwrap_or(self.sense);
         (self.kind, self.n.unwrap_or(0), w, first[0], first[1])
     }
+}
+
+/// Mean angle of states, each wrapped.
+fn mean_angle(states: &[State]) -> f64 {
+    states.iter().map(|p| p[0]).sum::<f64>() / states.len().max(1) as f64
 }
 
 /// The kind of a closed orbit.
@@ -213,11 +211,11 @@ fn classify(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Kind {
 /// Sorts by key, pairs twins and names all.
 ///
 /// Names are "rest", "rotation 1:+1", "oscillation 2:0"; of asymmetric twin oscillations the one
-/// that leans to positive angles is "(+)"; if two share a name all the same, the angle of their
-/// first point is added.
-#[must_use]
+/// that leans to positive angles is "(+)"; if some share a name all the same, the angle of their
+/// first point is added, to as many digits as tell them apart. No two names are the same.
 ///
 /// Also returns the place that each of the given attractors has in the result.
+#[must_use]
 pub fn arrange(pendulum: &Pendulum, attractors: Vec<Attractor>) -> (Vec<Attractor>, Vec<usize>) {
     let mut keyed: Vec<(usize, Attractor)> = attractors.into_iter().enumerate().collect();
     keyed.sort_by(|(_, a), (_, b)| {
@@ -229,44 +227,67 @@ pub fn arrange(pendulum: &Pendulum, attractors: Vec<Attractor>) -> (Vec<Attracto
         place[*from] = to;
     }
     let mut sorted: Vec<Attractor> = keyed.into_iter().map(|(_, a)| a).collect();
-    let twins: Vec<Option<usize>> = sorted
+    let mirror = Mirror::of(pendulum);
+    let images: Vec<Vec<State>> = sorted
         .iter()
         .map(|a| {
-            let is_twin = |b: &&Attractor| pendulum.is_mirror_symmetric() && a.mirrors(b);
-            sorted
-                .iter()
-                .find(is_twin)
-                .and_then(|b| sorted.iter().position(|other| std::ptr::eq(other, b)))
+            let image = |m: &Mirror| a.points.iter().map(|p| m.image(*p)).collect();
+            mirror.as_ref().map_or_else(Vec::new, image)
         })
         .collect();
-    let plain: Vec<String> =
-        sorted.iter().zip(&twins).enumerate().map(|(i, (a, t))| name(a, *t != Some(i))).collect();
-    for (i, (attractor, twin)) in sorted.iter_mut().zip(twins).enumerate() {
-        attractor.twin = twin;
-        attractor.name.clone_from(&plain[i]);
-        if plain.iter().filter(|other| **other == plain[i]).count() > 1 {
-            let theta = attractor.points.first().map_or(0.0, |p| p[0]);
-            attractor.name = format!("{} at {theta:+.4}", plain[i]);
-        }
+    let twin = |a: &Attractor, image: &[State]| {
+        let tolerance = mirror.as_ref()?.tolerance();
+        sorted.iter().position(|b| a.mirrors(image, b, tolerance))
+    };
+    let twins: Vec<Option<usize>> = sorted.iter().zip(&images).map(|(a, i)| twin(a, i)).collect();
+    let plain = |i: usize| {
+        // Twins lean to opposite sides, also where the image takes half a period.
+        let own = mean_angle(&sorted[i].points);
+        let lean = if images[i].is_empty() { own } else { own - mean_angle(&images[i]) };
+        name(&sorted[i], twins[i] != Some(i), lean)
+    };
+    let plain: Vec<String> = (0..sorted.len()).map(plain).collect();
+    let names: Vec<String> = (0..sorted.len()).map(|i| unique(&sorted, &plain, i)).collect();
+    for ((attractor, twin), name) in sorted.iter_mut().zip(twins).zip(names) {
+        (attractor.twin, attractor.name) = (twin, name);
     }
     (sorted, place)
 }
 
-fn name(attractor: &Attractor, asymmetric: bool) -> String {
+/// The name of attractor `i`, with what tells it from those that share its plain name.
+fn unique(sorted: &[Attractor], plain: &[String], i: usize) -> String {
+    let alike: Vec<usize> = (0..plain.len()).filter(|k| plain[*k] == plain[i]).collect();
+    if alike.len() == 1 {
+        return plain[i].clone();
+    }
+    let all = |digits: usize| -> Vec<String> {
+        let theta = |k: &usize| sorted[*k].points.first().map_or(0.0, |p| p[0]);
+        alike.iter().map(|k| format!("{} at {:+.digits$}", plain[*k], theta(k))).collect()
+    };
+    let own = alike.iter().position(|k| *k == i).unwrap_or(0);
+    let differ =
+        |names: &Vec<String>| names.iter().enumerate().all(|(k, name)| !names[..k].contains(name));
+    match (4..=12).map(all).find(differ) {
+        Some(names) => names[own].clone(),
+        None => format!("{} ({})", plain[i], own + 1),
+    }
+}
+
+fn name(attractor: &Attractor, asymmetric: bool, lean: f64) -> String {
     let signed = |w: i64| if w == 0 { "0".to_owned() } else { format!("{w:+}") };
     let side = |x: f64| if x < 0.0 { "(-)" } else { "(+)" };
     let word = attractor.kind.word().replace('_', " ");
     match (attractor.kind, attractor.n, attractor.w) {
         (Kind::Rest | Kind::InvertedRest, ..) => word,
         (_, Some(n), Some(0)) if asymmetric => {
-            format!("{word} {n}:0 {}", side(attractor.lean()))
+            format!("{word} {n}:0 {}", side(lean))
         }
         (_, Some(n), Some(w)) => format!("{word} {n}:{}", signed(w)),
         (Kind::RotatingChaos | Kind::QuasiperiodicRotation, ..) => {
             format!("{word} {}", if attractor.sense < 0 { "-" } else { "+" })
         }
         (Kind::LibrationChaos, ..) if asymmetric => {
-            format!("{word} {}", side(attractor.lean()))
+            format!("{word} {}", side(lean))
         }
         _ => word,
     }

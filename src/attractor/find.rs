@@ -15,6 +15,7 @@ use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
+use crate::orbit::symmetry::Mirror;
 
 /// Newton's method may not wander further than this from where the trajectory was.
 pub(super) const REACH: f64 = 0.3;
@@ -140,7 +141,7 @@ impl Catalogue {
             match orbit {
                 Some(orbit) if self.knows(&orbit) => {}
                 Some(orbit) => {
-                    self.admit(strobe, orbit, cancel);
+                    self.admit(strobe, &map, orbit, cancel);
                 }
                 None => left.push(*point),
             }
@@ -215,7 +216,7 @@ impl Catalogue {
             if !self.attracts_anew(strobe, &orbit) {
                 continue;
             }
-            let traps = self.admit(strobe, orbit, cancel);
+            let traps = self.admit(strobe, map, orbit, cancel);
             if !traps.is_empty() {
                 tries = 0;
             }
@@ -231,6 +232,7 @@ impl Catalogue {
     pub(super) fn admit(
         &mut self,
         strobe: &Strobe,
+        map: &PoincareMap,
         orbit: PeriodicOrbit,
         cancel: &AtomicBool,
     ) -> Vec<Ellipse> {
@@ -241,10 +243,12 @@ impl Catalogue {
             return own;
         }
         let mut traps = own.clone();
-        let (image, moved) = orbit.mirrored();
-        let symmetric = strobe.pendulum.is_mirror_symmetric();
-        if symmetric && !orbit.contains(image.points[0], SAME) {
-            let twins = trap::mirrored(&own, moved);
+        let image = Mirror::of(&strobe.pendulum).and_then(|mirror| mirror.orbit(map, &orbit));
+        if let Some((image, moved)) = image.filter(|(i, _)| !orbit.contains(i.points[0], SAME)) {
+            let twins = match moved {
+                Some(moved) => trap::mirrored(&own, moved),
+                None => ellipses(strobe, &image, &self.effort.trap, cancel),
+            };
             traps.extend(&twins);
             self.orbits.push((image, twins));
         }

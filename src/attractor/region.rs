@@ -47,6 +47,12 @@ impl Region {
         self.cells.contains(&self.cell(state))
     }
 
+    /// Whether most of these states lie in visited cells.
+    #[must_use]
+    pub fn holds_most(&self, states: &[State]) -> bool {
+        2 * states.iter().filter(|state| self.contains(**state)).count() > states.len()
+    }
+
     /// Adds the cells of another region of the same pendulum.
     pub fn unite(&mut self, other: &Self) {
         self.cells.extend(&other.cells);

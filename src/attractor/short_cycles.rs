@@ -45,7 +45,7 @@ impl Catalogue {
                     };
                     met.extend(&orbit.points);
                     if self.attracts_anew(strobe, &orbit) {
-                        self.admit(strobe, orbit, cancel);
+                        self.admit(strobe, &map, orbit, cancel);
                     }
                 }
             }

@@ -1,5 +1,6 @@
 //! Basins of attraction: attractors from a coarse set of starts, then every start to capture.
 
+use super::bounds::{chaos_periods, max_periods, search_periods};
 use super::control::{Control, pool};
 use super::label::{FAILED, Labels, UNDECIDED, label};
 use super::layers::{FiniteTime, finite_time};
@@ -21,11 +22,6 @@ pub(crate) const SEARCH_SAMPLE: usize = 400;
 const FURTHER_SAMPLE: usize = 256;
 /// Further searches at the most.
 const FURTHER: usize = 6;
-/// Periods after which a search begins to watch what is left, whatever bound is set for the starts:
-/// what counts as chaos does not depend on it.
-pub(crate) const SEARCH_BOUND: u32 = 1000;
-/// Periods within which nothing may capture a trajectory that counts as chaotic.
-pub const CHAOS_BOUND: u32 = SEARCH_BOUND * (1 + Effort::THOROUGH.watch);
 /// Where chaos coexists with other attractors, a start is given this many times the longest
 /// settling time that the search saw before it counts as chaotic.
 const PATIENCE: u32 = 10;
@@ -33,8 +29,6 @@ const LEAST_BOUND: u32 = 200;
 /// Cells of a map from which its uncertainty exponent is worth the 50,000 starts that it takes; a
 /// smaller map is a sketch, whatever a start costs.
 const LEAST_CELLS: usize = 10_000;
-/// The bound where none is given.
-pub(crate) const MAX_PERIODS: u32 = 4000;
 
 /// What to compute, and how well.
 #[derive(Clone, Copy, Debug)]
@@ -101,6 +95,8 @@ pub struct BasinMap {
     pub reached_error: f64,
     /// Bound after which a start counted as undecided or, near chaos, as chaotic.
     pub bound: u32,
+    /// Periods within which nothing may capture a trajectory that counts as chaotic.
+    pub chaos_bound: u32,
     /// The instruction set.
     pub path: Path,
 }
@@ -162,9 +158,9 @@ pub fn basins(
     let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
     let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, path)?;
     let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
-    let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
+    let max_periods = options.max_periods.unwrap_or_else(|| max_periods(pendulum)).max(1);
     let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
-    let endings = catalogue.endings(&strobe, &seeds, SEARCH_BOUND, control.flag());
+    let endings = catalogue.endings(&strobe, &seeds, search_periods(pendulum), control.flag());
     control.check()?;
 
     let plane = if !pendulum.is_dissipative() {
@@ -188,6 +184,7 @@ pub fn basins(
         steps: strobe.steps(),
         reached_error,
         bound: max_periods,
+        chaos_bound: chaos_periods(pendulum),
         path,
     };
     if plane == Plane::Basins {
@@ -212,7 +209,8 @@ pub fn basins(
                 let states = Starts::List(states);
                 Ok(label(&strobe, &catalogue, &states, None, bound, &pool, control)?.label)
             };
-            map.uncertainty = Some(uncertainty([theta, velocity], options.seed, again)?);
+            map.uncertainty =
+                Some(uncertainty([theta, velocity], &labels.label, options.seed, again)?);
         }
         map.labels = labels;
     } else {
@@ -239,11 +237,12 @@ fn to_capture(
     pool: &rayon::ThreadPool,
     control: &Control,
 ) -> Result<(Labels, u32), Error> {
-    let max_periods = options.max_periods.unwrap_or(MAX_PERIODS).max(1);
+    let searched = search_periods(&strobe.pendulum);
+    let max_periods = options.max_periods.unwrap_or_else(|| max_periods(&strobe.pendulum)).max(1);
     let bound = |catalogue: &Catalogue| {
         if catalogue.has_chaos() && catalogue.longest_settle == 0 && options.max_periods.is_none() {
             // Several chaotic sets and nothing else: no settling to measure patience by.
-            SEARCH_BOUND
+            searched
         } else if catalogue.has_chaos() && options.max_periods.is_none() {
             (PATIENCE * catalogue.longest_settle).clamp(LEAST_BOUND, max_periods)
         } else {
@@ -259,7 +258,7 @@ fn to_capture(
         let stride = labels.open.len().div_ceil(FURTHER_SAMPLE);
         let states: Vec<State> = labels.open.iter().step_by(stride).map(|(_, s)| *s).collect();
         let keys: Vec<[u64; 2]> = catalogue.attractors.iter().map(Attractor::mark).collect();
-        if !catalogue.search(strobe, &states, SEARCH_BOUND, control.flag()) {
+        if !catalogue.search(strobe, &states, searched, control.flag()) {
             break;
         }
         control.check()?;

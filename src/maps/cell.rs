@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
+use super::bounds::cell_periods;
 use crate::attractor::chaos::spread;
 use crate::attractor::rest::balances;
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
 use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
-use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 
@@ -18,11 +18,6 @@ const LIKE: f64 = 0.25;
 const SAME: f64 = 1e-6;
 /// Newton's method may not wander further than this from an orbit of a neighbour.
 const REACH: f64 = 0.3;
-/// Trajectories run until viscous damping alone would have shrunk them by this power of e, and are
-/// watched as long again; ...
-const DECAY: f64 = 40.0;
-/// ... in periods between these.
-const BOUNDS: [f64; 2] = [64.0, 1000.0];
 /// Hints that a search takes at the most.
 const MOST_HINTS: usize = 16;
 /// Points of an attractor that does not close: where it has changed a little one alone may lie beside it.
@@ -99,7 +94,7 @@ impl Search {
         let own = |k: usize| self.starts[(first + k) % self.starts.len()];
         let mut starts: Vec<State> = (0..self.each).map(own).collect();
         starts.extend(further);
-        let bound = self.bound.unwrap_or_else(|| bound(&strobe.pendulum));
+        let bound = self.bound.unwrap_or_else(|| cell_periods(&strobe.pendulum));
         let endings = catalogue.endings(strobe, &starts, bound, cancel);
         let watched = bound * (1 + Effort::BRISK.watch);
         Cell {
@@ -240,10 +235,4 @@ impl Hint {
         (self.kind, self.n) == (attractor.kind, attractor.n)
             && (either(1, self.points[0]) || (symmetric && either(-1, image)))
     }
-}
-
-/// Periods that a trajectory is given.
-fn bound(pendulum: &Pendulum) -> u32 {
-    let periods = 2.0 * DECAY / (pendulum.damping_rate() * pendulum.period());
-    periods.clamp(BOUNDS[0], BOUNDS[1]).ceil() as u32
 }

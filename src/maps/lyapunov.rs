@@ -4,7 +4,8 @@
 //! ensemble of trajectories on the attractor, with a standard error from their spread. A chaotic
 //! transient has a positive exponent too: what counts is what captured it.
 
-use super::basins::{MAX_PERIODS, SEARCH_BOUND, SEARCH_SAMPLE};
+use super::basins::SEARCH_SAMPLE;
+use super::bounds::{chaos_periods, max_periods, search_periods};
 use super::control::{Control, pool};
 use super::ensemble::{Ensemble, NEAR, ROUND, Run};
 use super::growth::Course;
@@ -86,6 +87,8 @@ pub struct Exponent {
     pub course: Vec<f64>,
     /// Periods after which the start counted as undecided.
     pub bound: u32,
+    /// Periods within which nothing may capture a trajectory that counts as chaotic.
+    pub chaos_bound: u32,
     /// Steps a period.
     pub steps: usize,
     /// The error that was reached, as [`accuracy::error_reached`] defines it.
@@ -117,7 +120,7 @@ pub fn lyapunov(
     let (strobe, reached_error) = accuracy::choose(pendulum, &seeds, request.tol, path)?;
     seeds.insert(0, start);
     let pool = pool(request.threads)?;
-    let bound = request.max_periods.unwrap_or(MAX_PERIODS).max(1);
+    let bound = request.max_periods.unwrap_or_else(|| max_periods(pendulum)).max(1);
     let mut result = Exponent {
         end: End::Undamped,
         attractor: None,
@@ -126,6 +129,7 @@ pub fn lyapunov(
         lost: 0,
         course: Vec::new(),
         bound,
+        chaos_bound: chaos_periods(pendulum),
         steps: strobe.steps(),
         reached_error,
         path,
@@ -157,14 +161,24 @@ impl Run<'_> {
         result: &mut Exponent,
     ) -> Result<(), Error> {
         let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH);
-        catalogue.search(self.strobe, seeds, SEARCH_BOUND, self.control.flag());
+        catalogue.search(
+            self.strobe,
+            seeds,
+            search_periods(&self.strobe.pendulum),
+            self.control.flag(),
+        );
         self.control.check()?;
         let (mut fate, mut periods) = self.follow(course, &catalogue, result.bound)?;
         let mut home = self.home(course, &catalogue, fate);
         if fate == Fate::Open && home.is_none() {
             // Something that the search has not met: it begins anew where the start has come to.
             let here: Vec<State> = course.states.last().copied().into_iter().collect();
-            catalogue.search(self.strobe, &here, SEARCH_BOUND, self.control.flag());
+            catalogue.search(
+                self.strobe,
+                &here,
+                search_periods(&self.strobe.pendulum),
+                self.control.flag(),
+            );
             self.control.check()?;
             (fate, periods) = self.follow(course, &catalogue, result.bound)?;
             home = self.home(course, &catalogue, fate);
@@ -253,7 +267,12 @@ impl Run<'_> {
             .map(|(_, end)| *end)
             .collect();
         if !suspects.is_empty() {
-            catalogue.search(self.strobe, &suspects, SEARCH_BOUND, self.control.flag());
+            catalogue.search(
+                self.strobe,
+                &suspects,
+                search_periods(&self.strobe.pendulum),
+                self.control.flag(),
+            );
         }
         let found = outcomes(self.strobe, &catalogue.traps, TAKEN, ends, self.control.flag());
         let found = found.ok_or(Error::Interrupted)?;

@@ -5,7 +5,7 @@
 //! - [`basins`]: basins of attraction
 //! - [`label`]: every start to the attractor that captures it
 //! - [`layers`]: turns and exponents over a fixed time
-//! - [`texture`], [`uncertainty`]: how fine the basins are; [`reliability`]: whether labels can be
+//! - [`texture`], [`uncertainty`]: how fine the basins are, with `near`'s cells; [`reliability`]: whether labels can be
 //!   believed
 //! - [`lyapunov`]: the largest exponent of what a start reaches; [`ensemble`], [`growth`]: of many
 //!   trajectories
@@ -15,12 +15,14 @@
 //! - [`orbits`]: all closed orbits of one period and winding: `vanishing` and `approach` find
 //!   where Newton's method begins
 //! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials
+//! - [`bounds`]: how many periods a trajectory is given to settle
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
 mod approach;
 pub mod basins;
 pub mod bifurcation;
+pub mod bounds;
 pub mod cell;
 mod chebyshev;
 pub mod control;
@@ -29,6 +31,7 @@ pub mod growth;
 pub mod label;
 pub mod layers;
 pub mod lyapunov;
+mod near;
 pub mod orbits;
 pub mod parameter_map;
 pub mod reliability;

@@ -22,6 +22,7 @@ use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
+use crate::orbit::symmetry::Mirror;
 
 /// The longest period that is looked for, in forcing periods.
 pub const LONGEST: usize = 64;
@@ -93,6 +94,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         return Ok(Orbits { running, ..none });
     }
     let map = PoincareMap::new(pendulum);
+    let mirror = Mirror::of(pendulum);
     let rubs = pendulum.has_friction();
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
@@ -120,7 +122,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
             pool.install(|| next.par_iter().map(search).collect::<Result<_, Error>>())?;
         let before = all.len();
         for orbit in found.into_iter().flatten() {
-            let image = pendulum.is_mirror_symmetric().then(|| orbit.mirrored().0);
+            let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
             for one in std::iter::once(orbit).chain(image) {
                 if !all.iter().any(|other| other.contains(one.points[0], SAME)) {
                     all.push(one);

@@ -6,6 +6,7 @@ use super::starts::Starts;
 use crate::attractor::Catalogue;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
+use crate::orbit::symmetry::Mirror;
 
 /// Labels that are tried again.
 const SAMPLE: usize = 2000;
@@ -49,9 +50,9 @@ pub fn reliability(
     };
     let own: Vec<i16> = picks.iter().map(|i| labels.label[*i]).collect();
     let halved = again(&strobe.refined(2), states.clone())?.label;
-    let mirrored = if strobe.pendulum.is_mirror_symmetric() {
-        let mirror = states.iter().map(|s| [(-s[0]).next_up(), (-s[1]).next_up()]).collect();
-        Some(again(strobe, mirror)?.label)
+    let mirrored = if let Some(mirror) = Mirror::of(&strobe.pendulum) {
+        let image = |s: &State| mirror.image(*s).map(f64::next_up);
+        Some(again(strobe, states.iter().map(image).collect())?.label)
     } else {
         None
     };

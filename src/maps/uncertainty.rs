@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::label::UNDECIDED;
+use super::near::Nearness;
 use super::starts::Axis;
 use crate::error::Error;
 use crate::integrate::State;
@@ -25,6 +26,10 @@ const LEAST_TELLING: usize = 3;
 const LEAST_UNCERTAIN: f64 = 40.0;
 /// Labels in all: at least, over the cells of the map, and at most.
 const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
+/// Part of the starts that is drawn where the map shows a change within the distance, in the pilot and ...
+const PILOT_NEAR: f64 = 0.5;
+/// ... where this has met no uncertain start elsewhere.
+const NEAR: f64 = 0.9;
 /// Labels of a start: its own and one on either side.
 const SIDES: usize = 3;
 
@@ -32,8 +37,11 @@ const SIDES: usize = 3;
 /// on one side or on the other, in a direction drawn at random for each (Grebogi, `McDonald`, Ott &
 /// Yorke 1983, Physics Letters A 99, 415).
 ///
-/// Starts are drawn anew for each distance, so the counts are independent and binomial. Those with an
-/// end that is not known, own or beside, are left out.
+/// Starts are drawn anew for each distance, so the counts are independent. Those with an end that is
+/// not known, own or beside, are left out. Where the pilot meets uncertain starts only in cells from which
+/// the map shows a change of label within the distance, most starts are drawn there, the others elsewhere,
+/// and both count with their shares of the map (stratified sampling): the counts are those of as many
+/// starts drawn evenly as tell the share as precisely.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Uncertainty {
     /// Distances, in sides of the window, falling.
@@ -44,7 +52,8 @@ pub struct Uncertainty {
     pub tried: Vec<u64>,
 }
 
-/// The shares of uncertain starts in a window of angle and velocity, by what `label` says of starts.
+/// The shares of uncertain starts in a window of angle and velocity whose map has the labels `map`, by what
+/// `label` says of starts.
 ///
 /// A pilot says at which distances enough starts are uncertain, and how many each needs; it is not
 /// counted. Empty where no boundary was met.
@@ -53,45 +62,54 @@ pub struct Uncertainty {
 /// Whatever `label` meets.
 pub fn uncertainty(
     window: [&Axis; 2],
+    map: &[i16],
     seed: u64,
     mut label: impl FnMut(Vec<State>) -> Result<Vec<i16>, Error>,
 ) -> Result<Uncertainty, Error> {
+    let near = Nearness::new(map, window[0].count);
     let mut draw = Draw { state: seed };
-    let mut counted = |plan: &[(i32, usize)]| -> Result<Vec<[u64; 2]>, Error> {
+    let mut counted = |plan: &[(i32, usize)], part: f64| -> Result<Vec<Counts>, Error> {
         let mut states = Vec::new();
-        for (scale, starts) in plan {
-            for _ in 0..*starts {
-                states.extend(draw.around(window, 2_f64.powi(*scale)));
-            }
-        }
-        let labels = label(states)?;
-        let mut all = labels.chunks_exact(SIDES);
         let mut counts = Vec::new();
-        for (_, starts) in plan {
-            let mut count = [0; 2];
-            for near in
-                all.by_ref().take(*starts).filter(|near| near.iter().all(|l| *l > UNDECIDED))
-            {
-                count[0] += u64::from(near.iter().any(|l| *l != near[0]));
-                count[1] += 1;
+        for (scale, starts) in plan {
+            let eps = 2_f64.powi(*scale);
+            let mut count = Counts::planned(near.reached(eps), near.count(), *starts, part);
+            for stratum in &mut count.strata {
+                for _ in 0..stratum.drawn {
+                    let rank = stratum.first + (draw.next() * stratum.cells as f64) as usize;
+                    let last = stratum.first + stratum.cells - 1;
+                    let part = [draw.next(), draw.next()];
+                    let at = near.place(rank.min(last), part, window);
+                    states.extend(draw.around(window, at, eps));
+                }
             }
             counts.push(count);
         }
+        let labels = label(states)?;
+        let mut all = labels.chunks_exact(SIDES);
+        for stratum in counts.iter_mut().flat_map(|count| &mut count.strata) {
+            for near in
+                all.by_ref().take(stratum.drawn).filter(|near| near.iter().all(|l| *l > UNDECIDED))
+            {
+                stratum.uncertain += usize::from(near.iter().any(|l| *l != near[0]));
+                stratum.known += 1;
+            }
+        }
         Ok(counts)
     };
-    let cells = (window[0].count * window[1].count) as f64;
-    let labels = (LABELS[1] * cells).clamp(LABELS[0], LABELS[2]);
-    let mut planned = |widest: i32| -> Result<Vec<(i32, usize)>, Error> {
+    let labels = (LABELS[1] * map.len() as f64).clamp(LABELS[0], LABELS[2]);
+    let mut planned = |widest: i32| -> Result<(Vec<(i32, usize)>, f64), Error> {
         let pilot: Vec<(i32, usize)> =
             (SCALES[1]..=widest).rev().step_by(2).map(|scale| (scale, PILOT)).collect();
-        let seen = counted(&pilot)?;
-        Ok(plan(&pilot, &seen, labels))
+        let seen = counted(&pilot, PILOT_NEAR)?;
+        let part = if seen.iter().any(Counts::astray) { 0.0 } else { NEAR };
+        Ok((plan(&pilot, &seen, part, labels), part))
     };
-    let mut plan = planned(SCALES[0])?;
+    let (mut plan, mut part) = planned(SCALES[0])?;
     if plan.len() < LEAST_SCALES {
-        plan = planned(WIDEST)?;
+        (plan, part) = planned(WIDEST)?;
     }
-    let counts = counted(&plan)?;
+    let counts: Vec<[u64; 2]> = counted(&plan, part)?.iter().map(Counts::even).collect();
     Ok(Uncertainty {
         eps: plan.iter().map(|(scale, _)| 2_f64.powi(*scale)).collect(),
         uncertain: counts.iter().map(|c| c[0]).collect(),
@@ -99,35 +117,121 @@ pub fn uncertainty(
     })
 }
 
-/// Distances, and starts for each, from the pilot's counts.
-fn plan(pilot: &[(i32, usize)], seen: &[[u64; 2]], labels: f64) -> Vec<(i32, usize)> {
-    let told = seen.iter().take_while(|c| c[0] as usize >= LEAST_TELLING).count();
+/// Starts drawn from some cells of a map, and what became of them.
+#[derive(Clone, Copy, Debug)]
+struct Stratum {
+    first: usize,
+    cells: usize,
+    drawn: usize,
+    known: usize,
+    uncertain: usize,
+}
+
+/// The starts of one distance.
+#[derive(Clone, Debug)]
+struct Counts {
+    strata: Vec<Stratum>,
+}
+
+impl Counts {
+    /// Of `starts`, this part at least from the first `near` of `cells`; all from all where it is 0.
+    fn planned(near: usize, cells: usize, starts: usize, part: f64) -> Self {
+        let stratum = |first, cells, drawn| Stratum { first, cells, drawn, known: 0, uncertain: 0 };
+        if part == 0.0 || near == cells {
+            return Self { strata: vec![stratum(0, cells, starts)] };
+        }
+        let share = (near as f64 / cells as f64).max(part);
+        let first = (share * starts as f64) as usize;
+        // One elsewhere at least: without it the share would be that of the first cells.
+        let first = first.min(starts - 1);
+        Self { strata: vec![stratum(0, near, first), stratum(near, cells - near, starts - first)] }
+    }
+
+    /// Whether a start was uncertain elsewhere than in the first cells.
+    fn astray(&self) -> bool {
+        self.strata.iter().skip(1).any(|s| s.uncertain > 0)
+    }
+
+    /// The share of starts with known ends that are uncertain, and its variance.
+    fn share(&self) -> (f64, f64) {
+        let cells: usize = self.strata.iter().map(|s| s.cells).sum();
+        let weight = |s: &Stratum| s.cells as f64 / cells as f64;
+        let sum = |of: fn(&Stratum) -> usize| -> f64 {
+            self.strata.iter().map(|s| weight(s) * of(s) as f64 / s.drawn as f64).sum()
+        };
+        let known = sum(|s| s.known);
+        let share = sum(|s| s.uncertain) / known;
+        // Of the ratio of two means, to first order.
+        let variance = |s: &Stratum| {
+            let [hit, known] = [s.uncertain, s.known].map(|n| n as f64 / s.drawn as f64);
+            let mean = hit - share * known;
+            let square = hit * (1.0 - 2.0 * share) + share * share * known;
+            weight(s).powi(2) * (square - mean * mean) / s.drawn as f64
+        };
+        (share, self.strata.iter().map(variance).sum::<f64>() / (known * known))
+    }
+
+    fn uncertain(&self) -> usize {
+        self.strata.iter().map(|s| s.uncertain).sum()
+    }
+
+    /// Starts that one uncertain start takes where this part is drawn from the first cells.
+    fn price(&self, part: f64) -> f64 {
+        let (near, cells) = (&self.strata[0], self.strata.iter().map(|s| s.cells).sum::<usize>());
+        let rate = near.uncertain as f64 / near.drawn.max(1) as f64;
+        let even = || 1.0 / self.share().0;
+        if part == 0.0 { even() } else { 1.0 / (rate * part.max(near.cells as f64 / cells as f64)) }
+    }
+
+    /// Uncertain starts and starts, of those drawn evenly that tell the share as precisely.
+    fn even(&self) -> [u64; 2] {
+        let (share, variance) = self.share();
+        if self.uncertain() == 0 || variance <= 0.0 {
+            return [self.uncertain() as u64, self.strata.iter().map(|s| s.known as u64).sum()];
+        }
+        let uncertain = (share * share * (1.0 - share) / variance).round().max(1.0);
+        [uncertain as u64, (uncertain / share).round() as u64]
+    }
+}
+
+/// Distances, and starts for each, from the pilot's counts: of the distances that tell enough the first
+/// ones, as many as leave the exponent the least error.
+fn plan(pilot: &[(i32, usize)], seen: &[Counts], part: f64, labels: f64) -> Vec<(i32, usize)> {
+    let told = seen.iter().take_while(|c| c.uncertain() >= LEAST_TELLING).count();
     if told == 0 {
         return Vec::new();
     }
-    let share = |k: usize| seen[k][0] as f64 / seen[k][1].max(1) as f64;
-    let mut wanted: Vec<(i32, f64)> = Vec::new();
-    let mut add = |scale: i32, share: f64| {
-        let enough = share * STARTS[1] >= LEAST_UNCERTAIN && scale >= SCALES[1];
-        if enough {
-            wanted.push((scale, (AIM / share).clamp(STARTS[0], STARTS[1])));
-        }
-        enough
-    };
-    for (k, (scale, _)) in pilot.iter().take(told).enumerate() {
-        add(*scale, share(k));
+    let mut prices: Vec<f64> = Vec::new();
+    for k in 0..told {
+        prices.push(seen[k].price(part));
         if k + 1 < told {
-            add(scale - 1, (share(k) * share(k + 1)).sqrt());
+            prices.push((seen[k].price(part) * seen[k + 1].price(part)).sqrt());
         }
     }
     // Beyond what the pilot tells the share may fall as on a smooth boundary.
-    let (mut scale, mut expected) = (pilot[told - 1].0 - 1, 0.5 * share(told - 1));
-    while add(scale, expected) {
-        (scale, expected) = (scale - 1, 0.5 * expected);
-    }
-    let all: f64 = SIDES as f64 * wanted.iter().map(|(_, starts)| starts).sum::<f64>();
-    let part = (labels / all).min(1.0);
-    wanted.into_iter().map(|(scale, starts)| (scale, (part * starts).ceil() as usize)).collect()
+    let last = prices[prices.len() - 1];
+    prices.extend((1..SCALES[0] - SCALES[1]).map(|k| last * 2_f64.powi(k)));
+    let all = (pilot[0].0 - SCALES[1]) as usize + 1;
+    let enough = |price: &f64| STARTS[1] >= LEAST_UNCERTAIN * price;
+    let count = prices.iter().take(all).take_while(|price| enough(price)).count();
+    let starts = |count: usize| -> Vec<f64> {
+        let wanted = prices[..count].iter().map(|price| (AIM * price).clamp(STARTS[0], STARTS[1]));
+        let wanted: Vec<f64> = wanted.collect();
+        let part = (labels / SIDES as f64 / wanted.iter().sum::<f64>()).min(1.0);
+        wanted.iter().map(|starts| part * starts).collect()
+    };
+    // One over the square of the error, of a line through independent points.
+    let told = |count: usize| {
+        let weights: Vec<f64> = starts(count).iter().zip(&prices).map(|(n, p)| n / p).collect();
+        let moment = |power: i32| -> f64 {
+            weights.iter().enumerate().map(|(k, w)| w * (k as f64).powi(power)).sum()
+        };
+        moment(2) - moment(1).powi(2) / moment(0)
+    };
+    let best = (LEAST_SCALES.min(count)..=count).max_by(|a, b| told(*a).total_cmp(&told(*b)));
+    let scales = (0..).map(|k| pilot[0].0 - k);
+    let rounded = starts(best.unwrap_or(0)).into_iter().map(|starts| starts.ceil() as usize);
+    scales.zip(rounded).collect()
 }
 
 /// Random numbers by `SplitMix64` (Steele, Lea & Flood 2014, OOPSLA): the same on every machine.
@@ -145,9 +249,9 @@ impl Draw {
         (z ^ (z >> 31)) as f64 / u64::MAX as f64
     }
 
-    /// A start anywhere in the window, and those at a distance `eps` on either side of it.
-    fn around(&mut self, window: [&Axis; 2], eps: f64) -> [State; SIDES] {
-        let (at, angle) = ([self.next(), self.next()], TAU * self.next());
+    /// The start at a place in the window, in its sides, and those at a distance `eps` on either side.
+    fn around(&mut self, window: [&Axis; 2], at: [f64; 2], eps: f64) -> [State; SIDES] {
+        let angle = TAU * self.next();
         let away = [eps * angle.cos(), eps * angle.sin()];
         [0.0, 1.0, -1.0].map(|side| {
             let part = |k: usize| {

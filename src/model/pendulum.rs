@@ -24,6 +24,15 @@ pub struct Pendulum {
     pub lab_time: f64,
 }
 
+/// How the mirrored motion `(-th, -v)` is a motion too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Symmetry {
+    /// At the same phase of the drive.
+    AtOnce,
+    /// Half a period of the drive later: under a torque that changes its sign by then.
+    HalfPeriod,
+}
+
 /// Which way through the kernel a pendulum takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Route {
@@ -215,6 +224,18 @@ impl Pendulum {
     #[must_use]
     pub fn is_mirror_symmetric(&self) -> bool {
         self.torque == 0.0 && self.effects.iter().all(Effect::is_mirror_symmetric)
+    }
+
+    /// The symmetry that maps motions to mirrored motions, if it has one.
+    #[must_use]
+    pub fn symmetry(&self) -> Option<Symmetry> {
+        let later = |e: &Effect| e.is_mirror_symmetric_later();
+        if self.is_mirror_symmetric() {
+            return Some(Symmetry::AtOnce);
+        }
+        // A moving pivot is not what it was half a period before.
+        let symmetric = self.torque == 0.0 && self.motion().p == 0.0;
+        (symmetric && self.effects.iter().all(later)).then_some(Symmetry::HalfPeriod)
     }
 
     /// Whether attractors can exist: without damping phase area is kept, and there are none.

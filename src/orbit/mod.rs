@@ -5,6 +5,7 @@ pub mod fold;
 pub mod newton;
 pub mod poincare;
 pub mod rotation;
+pub mod symmetry;
 
 pub use floquet::Multipliers;
 pub use newton::PeriodicOrbit;

@@ -6,7 +6,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::attractor::Attractor;
 use crate::integrate::trajectory::Trajectory;
-use crate::maps::basins::{BasinMap, CHAOS_BOUND, Plane};
+use crate::maps::basins::{BasinMap, Plane};
 use crate::maps::texture::Texture;
 use crate::maps::uncertainty::Uncertainty;
 
@@ -26,7 +26,7 @@ pub fn basin_map<'py>(py: Python<'py>, map: BasinMap) -> PyResult<Bound<'py, PyD
         Plane::OnlyChaos => "only_chaos",
     };
     dict.set_item("plane", plane)?;
-    dict.set_item("chaos_bound", CHAOS_BOUND)?;
+    dict.set_item("chaos_bound", map.chaos_bound)?;
     dict.set_item("searched_starts", map.searched)?;
     dict.set_item("layer_periods", map.layer_periods)?;
     dict.set_item("bound", map.bound)?;

@@ -10,7 +10,6 @@ use super::{Parameters, pendulum};
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::lanes::Path;
-use crate::maps::basins::CHAOS_BOUND;
 use crate::maps::control::pool;
 use crate::maps::ensemble::WINDOW;
 use crate::maps::growth::Bundle;
@@ -58,7 +57,7 @@ pub fn lyapunov<'py>(
     dict.set_item("lost", found.lost)?;
     dict.set_item("course", found.course.into_pyarray(py))?;
     dict.set_item("bound", found.bound)?;
-    dict.set_item("chaos_bound", CHAOS_BOUND)?;
+    dict.set_item("chaos_bound", found.chaos_bound)?;
     dict.set_item("steps_per_period", found.steps)?;
     dict.set_item("reached_error", found.reached_error)?;
     dict.set_item("simd", found.path.name())?;

@@ -18,6 +18,7 @@ use pyo3::prelude::*;
 
 use crate::error::Error;
 use crate::lanes::Path;
+use crate::maps::bounds::{LEAST, cell_periods, max_periods};
 use crate::model::formula::{ParameterSpec, Spec};
 use crate::model::{Effect, Formula, Kind, Pendulum};
 
@@ -86,6 +87,14 @@ fn period(parameters: Parameters) -> PyResult<f64> {
     Ok(pendulum(parameters)?.period())
 }
 
+/// Periods after which a start of a basin map, and a cell of a map over parameters, is undecided where
+/// none are given; and the first of the two where damping is not small.
+#[pyfunction]
+fn bounds(parameters: Parameters) -> PyResult<(u32, u32, u32)> {
+    let pendulum = pendulum(parameters)?;
+    Ok((max_periods(&pendulum), cell_periods(&pendulum), LEAST))
+}
+
 /// The instruction set that a call would use now.
 #[pyfunction]
 fn simd() -> PyResult<&'static str> {
@@ -115,6 +124,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(library::effects, module)?)?;
     module.add_function(wrap_pyfunction!(library::formula, module)?)?;
     module.add_function(wrap_pyfunction!(period, module)?)?;
+    module.add_function(wrap_pyfunction!(bounds, module)?)?;
     module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
     module.add_function(wrap_pyfunction!(motion::choose_steps, module)?)?;
     module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;

@@ -170,6 +170,16 @@ def test_below_the_homoclinic_tangency_the_boundary_is_smooth_and_above_fractal(
     assert abs(grid.value - fractal.value) < 3 * math.hypot(grid.stderr, fractal.stderr)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_boundary_of_an_undriven_pendulum_is_smooth(seed: int) -> None:
+    """Without drive the boundary is a saddle's stable manifold: the exponent is 1."""
+    draw = np.random.default_rng(seed)
+    pendulum = Pendulum(gamma=draw.uniform(0.05, 0.2), p=0.0, torque=draw.uniform(0.3, 0.6))
+    found = pendmap.uncertainty_exponent(pendmap.basins(pendulum, Grid.square(400), seed=seed))
+    assert abs(found.value - 1) < 0.05
+    assert found.ci95[1] - found.ci95[0] < 0.15
+
+
 def test_three_basins_of_the_paper_s_kind_pass_the_log2_criterion() -> None:
     result = pendmap.basins(Pendulum(p=1.0), Grid.square(200))
     again = pendmap.basin_entropy(result.label.values)

@@ -18,7 +18,12 @@ fn window(side: usize) -> [Axis; 2] {
 
 fn measured(side: usize, seed: u64, of: impl Fn(f64, f64) -> i16) -> Uncertainty {
     let [theta, velocity] = window(side);
-    uncertainty([&theta, &velocity], seed, |states: Vec<State>| {
+    let cell = |k: usize| {
+        let centre = |place: usize| (place as f64 + 0.5) / side as f64;
+        of(centre(k % side), centre(k / side))
+    };
+    let map: Vec<i16> = (0..side * side).map(cell).collect();
+    uncertainty([&theta, &velocity], &map, seed, |states: Vec<State>| {
         let part = |value: f64, axis: &Axis| (value - axis.low) / (axis.high - axis.low);
         let labels = states.iter().map(|s| of(part(s[0], &theta), part(s[1], &velocity)));
         Ok::<_, Error>(labels.collect())
@@ -48,6 +53,51 @@ fn near_a_circle_the_share_is_its_length_times_the_mean_reach() {
     }
     assert_ne!(measured(1000, 4, inside), found);
     assert_eq!(measured(1000, 3, inside), found);
+}
+
+/// The slope of the logarithm of the share, points weighted by their counts.
+fn exponent(found: &Uncertainty) -> f64 {
+    let points: Vec<[f64; 3]> = (0..found.eps.len())
+        .map(|k| {
+            let (hit, tried) = (found.uncertain[k] as f64, found.tried[k] as f64);
+            [hit, found.eps[k].ln(), ((hit + 0.25) / tried).ln()]
+        })
+        .collect();
+    let mean = |of: &dyn Fn(&[f64; 3]) -> f64| {
+        points.iter().map(|p| p[0] * of(p)).sum::<f64>() / points.iter().map(|p| p[0]).sum::<f64>()
+    };
+    let (x, y) = (mean(&|p| p[1]), mean(&|p| p[2]));
+    mean(&|p| (p[1] - x) * (p[2] - y)) / mean(&|p| (p[1] - x).powi(2))
+}
+
+/// The level of the gap of Cantor's set of thirds that `x` lies in, even or odd.
+fn thirds(mut x: f64) -> i16 {
+    for level in 0..40 {
+        x *= 3.0;
+        if (1.0..2.0).contains(&x) {
+            return 1 + level % 2;
+        }
+        x -= if x < 1.0 { 0.0 } else { 2.0 };
+    }
+    1
+}
+
+#[test]
+fn exponents_that_are_known_are_found_on_maps_of_any_size() {
+    type Plane = (f64, f64, fn(f64, f64) -> i16);
+    let planes: [Plane; 4] = [
+        (1.0, 0.05, |x, y| 1 + i16::from((x - 0.5).hypot(y - 0.5) < 0.31)),
+        (1.0, 0.05, |x, y| 1 + i16::from(y > 0.45 + 0.2 * (7.0 * x).sin())),
+        (1.0, 0.05, |x, y| 1 + i16::from(x + 0.37 * y > 0.61) + i16::from(x < 0.2)),
+        (1.0 - 2_f64.ln() / 3_f64.ln(), 0.07, |x, y| thirds((x + 0.013 * y).fract())),
+    ];
+    for (known, width, of) in planes {
+        for (side, seed) in [(100, 1), (400, 2), (1000, 3)] {
+            let found = measured(side, seed, of);
+            let value = exponent(&found);
+            assert!((value - known).abs() < width, "{value} for {known} on {side}: {found:?}");
+        }
+    }
 }
 
 #[test]

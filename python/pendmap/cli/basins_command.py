@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED
+from pendmap.cli import price
 from pendmap.cli.model_options import model_from, model_options
 from pendmap.cli.options import (
     Outputs,
@@ -37,7 +38,8 @@ _DEFAULT = 1000
 @click.option(
     "--max-periods",
     type=Whole(1, MOST_PERIODS),
-    help="Bound after which a start is undecided.  [default: 4000; less beside chaos]",
+    help="Bound after which a start is undecided.  [default: 4000; more where damping"
+    " is small, less beside chaos]",
 )
 @click.option(
     "--layer-periods", type=Whole(1, MOST_PERIODS), help="Periods of the finite-time layers."
@@ -73,6 +75,9 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     if outputs.shows_progress:  # the summary says it too, after all periods have passed
         for line in unlimited_rotation(without_dimensions(model)[0]):
             click.echo(line, err=True)
+    if given["max_periods"] is None and not outputs.quiet:
+        cells = grid.theta.count * grid.velocity.count
+        price.say(model, cells, tol=given["tol"], threads=given["threads"])
     with progress_bar("basins", shown=outputs.shows_progress) as progress:
         dataset = basins(model, grid, progress=progress, **given)
     show(dataset, outputs, fields)

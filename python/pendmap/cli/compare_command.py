@@ -6,6 +6,7 @@ import functools
 import json
 import sys
 from pathlib import Path
+
 import click
 
 from pendmap.checks import MOST_SEED, MOST_THREADS

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.checks import MOST_PERIODS, MOST_SEED
+from pendmap.cli import price
 from pendmap.cli.model_options import model_from, model_options
 from pendmap.cli.options import Outputs, output_options, progress_options
 from pendmap.cli.show import progress_bar, show
@@ -37,7 +38,8 @@ _STARTS = (100, 10_000_000)
 @click.option(
     "--max-periods",
     type=Whole(1, MOST_PERIODS),
-    help="Bound after which a start is given up.  [default: 4000; less beside chaos]",
+    help="Bound after which a start is given up.  [default: 4000; more where damping"
+    " is small, less beside chaos]",
 )
 @click.option("--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]")
 @click.option("--seed", type=Whole(0, MOST_SEED), default=0, help="Draws the starts.  [default: 0]")
@@ -55,6 +57,8 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
     from pendmap.lifetimes import lifetime
 
+    if given["max_periods"] is None and not outputs.quiet:
+        price.say(model, given["starts"], tol=given["tol"], threads=given["threads"])
     with progress_bar("lifetime", shown=outputs.shows_progress) as progress:
         dataset = lifetime(model, progress=progress, **given)
     show(dataset, outputs, fields)

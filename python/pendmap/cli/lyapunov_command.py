@@ -35,7 +35,7 @@ __all__ = ["command"]
     "--max-periods",
     type=Whole(1, MOST_PERIODS),
     help="Bound after which the start is undecided, and of each trajectory averaged."
-    "  [default: 4000, and 20000]",
+    "  [default: 4000, more where damping is small; and 20000]",
 )
 @click.option(
     "--seed", type=Whole(0, MOST_SEED), default=0, help="Chooses the trajectories.  [default: 0]"

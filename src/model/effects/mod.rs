@@ -280,4 +280,13 @@ impl Effect {
     pub fn is_mirror_symmetric(&self) -> bool {
         self.kind.keeps_mirror(&self.parameters)
     }
+
+    /// Whether it is the same for the mirrored motion half a period of the drive later, the pivot at rest.
+    #[must_use]
+    pub fn is_mirror_symmetric_later(&self) -> bool {
+        match self.kind {
+            Kind::Formula(formula) => formula.keeps_mirror_later(&self.parameters),
+            kind => kind.keeps_mirror(&self.parameters),
+        }
+    }
 }

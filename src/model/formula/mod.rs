@@ -15,6 +15,7 @@ mod program;
 mod tree;
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::sync::{Mutex, PoisonError};
 
 use self::program::{Kinks, Program, SLOTS};
@@ -233,7 +234,13 @@ impl Formula {
     /// Whether it pushes the mirrored motion the other way.
     #[must_use]
     pub fn keeps_mirror(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
-        probe::mirrors(&self.tree, parameters)
+        probe::mirrors(&self.tree, parameters, 0.0)
+    }
+
+    /// The same half a period of the drive later.
+    #[must_use]
+    pub fn keeps_mirror_later(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
+        probe::mirrors(&self.tree, parameters, PI)
     }
 
     /// Why a map cannot have it with these parameters.

@@ -74,11 +74,11 @@ pub fn repeats_every_period(term: &Tree, values: &[f64]) -> bool {
     always(term, values, |at| term.value(values, &Place { phase: at.phase + TAU, ..*at }))
 }
 
-/// Whether the mirrored motion is pushed the other way.
-pub fn mirrors(term: &Tree, values: &[f64]) -> bool {
+/// Whether the mirrored motion is pushed the other way so much of the drive's phase later.
+pub fn mirrors(term: &Tree, values: &[f64], later: f64) -> bool {
     always(term, values, |at| {
-        let Place { theta, velocity, sense, .. } = *at;
-        -term.value(values, &Place { theta: -theta, velocity: -velocity, sense: -sense, ..*at })
+        let (theta, velocity, sense) = (-at.theta, -at.velocity, -at.sense);
+        -term.value(values, &Place { theta, velocity, sense, phase: at.phase + later, ..*at })
     })
 }
 

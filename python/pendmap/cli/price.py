@@ -1,0 +1,77 @@
+"""What a computation costs where damping is small, said on stderr before it begins."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from pendmap import _core
+    from pendmap.model import Pendulum, Rig
+
+__all__ = ["say"]
+
+_TYPICAL: Final = 20
+"""A start settles after about this part of its bound: 1/60 to 1/8 for gamma .01 to .0003."""
+_BESIDE: Final = 5000
+"""Starts that the search for attractors and the checks are worth."""
+_SAMPLE: Final = 960
+"""Starts of the measurement of speed."""
+_LEAST_SECONDS: Final = 0.05
+"""Time, s, from which a measurement of speed is good enough."""
+
+
+def say(model: Pendulum | Rig, starts: int, *, tol: float, threads: int | None) -> None:
+    """Say the periods and roughly the time of ``starts`` starts, where damping raises the bound.
+
+    Nothing of a model that cannot be computed: the computation itself says why.
+    """
+    from pendmap import _core
+    from pendmap.model import without_dimensions
+
+    parameters = without_dimensions(model)[0].parameters
+    try:
+        bound, _, least = _core.bounds(parameters)
+        if bound == least:
+            return
+        speed = _speed(parameters, tol, threads or 0)
+    except ValueError:
+        return
+    typical = bound // _TYPICAL
+    first, last = (_duration((starts + _BESIDE) * periods / speed) for periods in (typical, bound))
+    click.echo(
+        f"Damping is small: each of {counted(starts, 'start')} has up to {bound} periods to "
+        f"settle, {typical} are typical. That takes roughly {first}, and {last} if none settles; "
+        "--max-periods sets another bound.",
+        err=True,
+    )
+
+
+def _speed(parameters: _core._Parameters, tol: float, threads: int) -> float:
+    """Return how many periods of single trajectories are computed in a second."""
+    import numpy as np
+
+    from pendmap import _core
+
+    draw = np.random.default_rng(0)
+    theta, velocity = draw.uniform(-np.pi, np.pi, _SAMPLE), draw.uniform(-3.0, 3.0, _SAMPLE)
+    steps, _ = _core.choose_steps(parameters, theta[:100], velocity[:100], tol)
+    periods = 4
+    while True:
+        began = time.perf_counter()
+        _core.advance(parameters, theta, velocity, periods, steps, threads)
+        seconds = time.perf_counter() - began
+        if seconds > _LEAST_SECONDS:
+            return _SAMPLE * periods / seconds
+        periods *= 4
+
+
+def _duration(seconds: float) -> str:
+    for size, word in ((86400.0, "day"), (3600.0, "hour"), (60.0, "minute")):
+        if seconds >= size:
+            return counted(round(seconds / size), word)
+    return counted(max(1, round(seconds)), "second")

@@ -1,0 +1,82 @@
+//! Which cells of a map lie near a change of label.
+
+use super::starts::Axis;
+
+/// Cells of a map, those near a change of label first.
+#[derive(Debug)]
+pub struct Nearness {
+    /// Cells sorted by their distance from the next change.
+    order: Vec<u32>,
+    /// How many lie at each distance or nearer, in cells along the farther axis.
+    within: Vec<usize>,
+    columns: usize,
+}
+
+impl Nearness {
+    /// Sorts the cells with these labels, rows of `columns`.
+    ///
+    /// A cell with another label next to it, or at the edge of the map, has the distance 0.
+    #[must_use]
+    pub fn new(labels: &[i16], columns: usize) -> Self {
+        let rows = labels.len() / columns;
+        let changes = |k: usize| {
+            let (i, j) = (k % columns, k / columns);
+            let edge = i == 0 || j == 0 || i + 1 == columns || j + 1 == rows;
+            edge || around(k, columns).iter().any(|other| labels[*other] != labels[k])
+        };
+        let far = u32::MAX - 1;
+        let mut distance: Vec<u32> =
+            (0..labels.len()).map(|k| if changes(k) { 0 } else { far }).collect();
+        // Along rows from either end each distance is at most one more than that of the cells passed.
+        let inner = |k: &usize| !(k.is_multiple_of(columns) || k % columns + 1 == columns);
+        let body = columns..labels.len().saturating_sub(columns);
+        for k in body.clone().filter(inner) {
+            let least = around(k, columns)[..4].iter().map(|o| distance[*o]).min();
+            distance[k] = distance[k].min(least.unwrap_or(far) + 1);
+        }
+        for k in body.filter(inner).rev() {
+            let least = around(k, columns)[4..].iter().map(|o| distance[*o]).min();
+            distance[k] = distance[k].min(least.unwrap_or(far) + 1);
+        }
+        let longest = distance.iter().copied().max().unwrap_or(0) as usize;
+        let mut within = vec![0; longest + 1];
+        for d in &distance {
+            within[*d as usize] += 1;
+        }
+        for d in 1..within.len() {
+            within[d] += within[d - 1];
+        }
+        let mut order: Vec<u32> = (0..labels.len() as u32).collect();
+        order.sort_by_key(|k| distance[*k as usize]);
+        Self { order, within, columns }
+    }
+
+    /// How many cells, the first ones, a change can reach by a step of `eps` sides of the window.
+    #[must_use]
+    pub fn reached(&self, eps: f64) -> usize {
+        let rows = self.order.len() / self.columns;
+        let cells = (eps * self.columns.max(rows) as f64) as usize;
+        self.within[cells.min(self.within.len() - 1)]
+    }
+
+    /// How many cells there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// A place in the cell of rank `rank`, in sides of the window; `part` is that in the cell.
+    #[must_use]
+    pub fn place(&self, rank: usize, part: [f64; 2], window: [&Axis; 2]) -> [f64; 2] {
+        let cell = self.order[rank] as usize;
+        let [columns, rows] = window.map(|axis| axis.count as f64);
+        let (i, j) = ((cell % self.columns) as f64, (cell / self.columns) as f64);
+        [(i + part[0]) / columns, (j + part[1]) / rows]
+    }
+}
+
+/// The eight cells around one that is not at the edge, in rising order.
+fn around(k: usize, columns: usize) -> [usize; 8] {
+    let (below, above) = (k - columns, k + columns);
+    [below - 1, below, below + 1, k - 1, k + 1, above - 1, above, above + 1]
+}

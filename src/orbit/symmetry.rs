@@ -1,0 +1,73 @@
+//! Mirror images of states and orbits.
+
+use super::newton::{self, PeriodicOrbit};
+use super::poincare::PoincareMap;
+use crate::integrate::State;
+use crate::integrate::accuracy::{distance, wrapped};
+use crate::integrate::flow::Flow;
+use crate::model::Pendulum;
+use crate::model::pendulum::Symmetry;
+
+/// Error of a step of the flow over half a period.
+const STEP_ERROR: f64 = 1e-12;
+/// Newton's method may not wander further than this from the image that half a period gives.
+const REACH: f64 = 0.1;
+
+/// The symmetry of a pendulum, acting on stroboscopic states.
+#[derive(Debug)]
+pub struct Mirror {
+    /// Half a period, where the symmetry takes it.
+    half: Option<(Flow, f64)>,
+}
+
+impl Mirror {
+    /// Of `pendulum`; none where it has no such symmetry.
+    #[must_use]
+    pub fn of(pendulum: &Pendulum) -> Option<Self> {
+        let half = match pendulum.symmetry()? {
+            Symmetry::AtOnce => None,
+            Symmetry::HalfPeriod => {
+                let flow = Flow::with_tolerance(pendulum, STEP_ERROR);
+                Some((flow, 0.5 * pendulum.period()))
+            }
+        };
+        Some(Self { half })
+    }
+
+    /// The stroboscopic state of the mirrored motion.
+    #[must_use]
+    pub fn image(&self, state: State) -> State {
+        let [theta, velocity] = match &self.half {
+            None => state,
+            Some((flow, half)) => flow.carry(state, 0.0, *half).state,
+        };
+        [wrapped(-theta), -velocity]
+    }
+
+    /// How far the image of a point of an orbit may lie from that of the image's orbit: a map of steps errs,
+    /// and the flow over half a period does not.
+    #[must_use]
+    pub fn tolerance(&self) -> f64 {
+        if self.half.is_some() { 1e-4 } else { 1e-7 }
+    }
+
+    /// The mirror image of an orbit of `map`, and where that is exact the number of places that its points
+    /// have moved ([`PeriodicOrbit::mirrored`]).
+    ///
+    /// None where Newton's method does not find it.
+    #[must_use]
+    pub fn orbit(
+        &self,
+        map: &PoincareMap,
+        orbit: &PeriodicOrbit,
+    ) -> Option<(PeriodicOrbit, Option<usize>)> {
+        if self.half.is_none() {
+            let (image, moved) = orbit.mirrored();
+            return Some((image, Some(moved)));
+        }
+        let image = self.image(orbit.points[0]);
+        let found = newton::find(map, image, orbit.n, REACH)?;
+        let own = found.n == orbit.n && found.points.iter().any(|p| distance(*p, image) < 1e-2);
+        own.then_some((found, None))
+    }
+}

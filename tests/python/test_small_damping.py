@@ -1,0 +1,70 @@
+"""Where damping is small, motions are given time to settle, and the price is said before."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from pendmap import Grid, Pendulum
+
+if TYPE_CHECKING:
+    from conftest import Run
+
+SMALL = "Damping is small"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_stays_undecided_where_damping_is_small(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    gamma = float(np.exp(draw.uniform(math.log(0.002), math.log(0.02))))
+    pendulum = Pendulum(gamma=gamma, p=draw.uniform(0.1, 0.5), omega=draw.uniform(1.5, 2.5))
+    found = pendmap.basins(pendulum, Grid.square(8), check=False)
+    assert found.attrs["undecided"] == 0.0
+    bound = 400 / (gamma * pendulum.period)
+    assert found.attrs["max_periods"] == math.ceil(max(bound, 4000))
+
+
+def test_a_start_that_takes_long_ends_where_scipy_says() -> None:
+    pendulum = Pendulum(gamma=0.01, p=0.6, omega=2.0)
+    theta, velocity = 0.4, 0.9
+    label = pendmap.basins_of(pendulum, [theta], [velocity], check=False)
+
+    def slope(t: float, y: list[float]) -> list[float]:
+        return [y[1], -0.01 * y[1] - (1 + 0.6 * math.cos(2 * t)) * math.sin(y[0])]
+
+    # From where the motion has settled, the stroboscopic points are the attractor's.
+    end = (int(label["settle_periods"][0]) + 500) * math.pi
+    run = solve_ivp(slope, (0, end), [theta, velocity], method="DOP853", rtol=1e-9, atol=1e-9)
+    which = int(label["label"][0])
+    own = label["point_attractor"].values == which
+    points = np.stack([label["point_theta"].values[own], label["point_velocity"].values[own]])
+    last = np.array([math.remainder(run.y[0, -1], math.tau), run.y[1, -1]])
+    assert np.hypot(*(points - last[:, None])).min() < 1e-2
+
+
+def test_a_bound_that_is_given_stays_as_it_is() -> None:
+    pendulum = Pendulum(gamma=0.003, p=1.0, omega=2.0)
+    found = pendmap.basins(pendulum, Grid.square(6), check=False, max_periods=100)
+    assert found.attrs["max_periods"] == 100
+    assert found.attrs["undecided"] > 0
+
+
+def test_the_price_is_said_before_where_it_is_more_than_usual(pendmap_command: Run) -> None:
+    given = ["basins", "--p", "0.3", "--grid", "4", "--json"]
+    done = pendmap_command(*given, "--gamma", "0.02")
+    assert SMALL in done.stderr
+    assert "6367 periods" in done.stderr
+    for cheap in (["--gamma", "0.1"], ["--gamma", "0.02", "--max-periods", "50"]):
+        assert SMALL not in pendmap_command(*given, *cheap).stderr
+
+
+def test_rotations_that_dry_friction_lets_be_are_explained() -> None:
+    pendulum = Pendulum(gamma=0.0, theta_r=0.01, p=0.3, omega=2.0)
+    found = pendmap.basins_of(pendulum, [0.0, 0.5], [2.0, 0.1], check=False, max_periods=500)
+    assert list(found["label"].values > 0) == [False, True]
+    assert "a rotation that the drive keeps up settles on nothing" in found.attrs["summary"]
