@@ -1,7 +1,7 @@
-//! Where rest loses and gains stability: critical amplitudes of the drive, by Floquet.
+//! Where rest, hanging or inverted, loses and gains stability: critical amplitudes, by Floquet.
 //!
-//! The derivative `M` of the stroboscopic map at hanging rest is the monodromy matrix of the
-//! linearised equation, eq. 1.3 with damping. Rest changes where a multiplier passes +1,
+//! The derivative `M` of the stroboscopic map at rest is the monodromy matrix of the linearised
+//! equation, eq. 1.3 with damping, with the opposite sign of gravity upright. Rest changes where a multiplier passes +1,
 //! `1 - tr M + det M = 0`, or -1, `1 + tr M + det M = 0`. As `p` stands in the linear equation linearly,
 //! `M` is an entire function of it: its Chebyshev series on an interval soon says all about it.
 //!
@@ -9,6 +9,8 @@
 //! even in time then, so that `m11 = m22` and, on a boundary, `m12 m21 = m11^2 - 1 = 0`: one is a
 //! simple zero of `m12`, the other of `m21`, however narrow the tongue (Magnus & Winkler 1966, Hill's
 //! equation, section 1.1).
+
+use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
@@ -25,10 +27,27 @@ pub const MOST_P: f64 = 100.0;
 const GROWTH: f64 = 8.0;
 /// Entries, or products of multipliers, that differ by less than this part are alike.
 const ALIKE: f64 = 1e-9;
-/// A load on the pendulum hanging at rest up to this is none.
-const NO_LOAD: f64 = 1e-14;
+/// A load on the pendulum at rest up to this is none.
+const NO_LOAD: f64 = 1e-13;
 /// Times in a period, and share of gravity of the drive, at which that is looked at.
 const TIMES: usize = 16;
+
+/// The two places where gravity has no torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Balance {
+    /// Angle 0.
+    Hanging,
+    /// Angle pi.
+    Inverted,
+}
+
+impl Balance {
+    /// Its angle.
+    #[must_use]
+    pub fn angle(self) -> f64 {
+        if self == Self::Hanging { 0.0 } else { PI }
+    }
+}
 
 /// What happens at a critical amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,14 +77,16 @@ pub struct Curve {
 /// A function of the monodromy matrix and its product that vanishes at critical amplitudes.
 type Vanishing = fn(Values<5>) -> f64;
 
-/// All critical amplitudes up to `p_max` at each of the frequencies, with `folds` if asked for.
+/// All critical amplitudes of a balance up to `p_max` at each of the frequencies, with `folds` of
+/// oscillations of hanging rest if asked for.
 ///
 /// # Errors
 /// [`Error::Range`] for a `p_max` or frequency out of range, [`Error::NotMappable`] for effects that no
-/// map can have, [`Error::NoRest`] where hanging at rest is no solution, or friction holds it,
+/// map can have, [`Error::NoRest`] where rest is no solution, or friction holds it,
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn tongues(
     pendulum: &Pendulum,
+    balance: Balance,
     omegas: &[f64],
     p_max: f64,
     folds: bool,
@@ -78,12 +99,12 @@ pub fn tongues(
     if let Some(value) = omegas.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
         return Err(Error::Range { name: "omega", value: *value, allowed: "above 0" });
     }
-    check(pendulum, omegas, p_max)?;
+    check(pendulum, balance, omegas, p_max)?;
     control.begin(omegas.len());
     pool(threads)?.install(|| {
         let one = |omega: &f64| {
             control.check()?;
-            let curve = along(pendulum, *omega, p_max, folds);
+            let curve = along(pendulum, balance, *omega, p_max, folds);
             control.add(1);
             Ok(curve)
         };
@@ -98,8 +119,8 @@ fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
     other
 }
 
-/// Whether hanging at rest is a solution under all these drives, and nothing holds it.
-fn check(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Result<(), Error> {
+/// Whether rest is a solution under all these drives, and nothing holds it.
+fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> Result<(), Error> {
     pendulum.check_mappable()?;
     if pendulum.has_friction() {
         let why = "friction holds it whatever the drive: rest never loses its stability";
@@ -109,7 +130,7 @@ fn check(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Result<(), Error> {
         let driven = under(pendulum, p_max, *omega);
         let loaded = (0..TIMES).any(|k| {
             let tau = driven.period() * k as f64 / TIMES as f64;
-            driven.acceleration(tau, 0.0, 0.0).abs() > NO_LOAD
+            driven.acceleration(tau, balance.angle(), 0.0).abs() > NO_LOAD
         });
         if loaded {
             let why =
@@ -121,9 +142,10 @@ fn check(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Result<(), Error> {
 }
 
 /// Entries of the monodromy matrix by rows, and its determinant.
-fn monodromy(pendulum: &Pendulum, p: f64, omega: f64) -> Values<5> {
+fn monodromy(pendulum: &Pendulum, balance: Balance, p: f64, omega: f64) -> Values<5> {
     // Without drive a period is another one: so little of it changes nothing.
-    let image = PoincareMap::new(&under(pendulum, p.max(f64::MIN_POSITIVE), omega)).once([0.0; 2]);
+    let map = PoincareMap::new(&under(pendulum, p.max(f64::MIN_POSITIVE), omega));
+    let image = map.once([balance.angle(), 0.0]);
     let m = image.derivative;
     let product = image.product.unwrap_or(m.determinant());
     [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)], product]
@@ -139,8 +161,8 @@ fn is_stable(m: Values<5>) -> bool {
     within && m[4] < 1.0 + ALIKE
 }
 
-fn along(pendulum: &Pendulum, omega: f64, p_max: f64, folds: bool) -> Curve {
-    let at = |p: f64| monodromy(pendulum, p, omega);
+fn along(pendulum: &Pendulum, balance: Balance, omega: f64, p_max: f64, folds: bool) -> Curve {
+    let at = |p: f64| monodromy(pendulum, balance, p, omega);
     // Solutions grow by about the exponential of the period times the root of p.
     let period = std::f64::consts::TAU / omega;
     let parts = (0.4 * period * p_max.sqrt() / GROWTH).ceil().max(1.0) as usize;
@@ -189,7 +211,9 @@ fn along(pendulum: &Pendulum, omega: f64, p_max: f64, folds: bool) -> Curve {
     let onset = critical.iter().find(|c| c.stable == [true, false]);
     let mirrored = pendulum.is_mirror_symmetric();
     let fold = onset
-        .filter(|c| folds && c.p > 0.0 && (mirrored || c.multiplier > 0.0))
+        .filter(|c| {
+            folds && balance == Balance::Hanging && c.p > 0.0 && (mirrored || c.multiplier > 0.0)
+        })
         .and_then(|c| fold_of_onset(&under(pendulum, c.p, omega), c.multiplier));
     Curve { omega, critical, stable_at_first: between[0], fold }
 }
