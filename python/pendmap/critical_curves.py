@@ -75,7 +75,13 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     are found, and moved onto the map itself. In the plane of eq. 1.4 a point is ``(e, alpha^2) =
     (p/omega^2, 1/omega^2)``.
 
-    Where hanging rest first loses its stability an oscillation is born, with period 1 (multiplier
+    A constant torque makes of rest an orbit of the drive's period. Where rest is stable without the
+    torque, the orbit that it becomes as the torque grows from 0 is followed along ``p``, both ways,
+    by Newton's method. It is stable between critical amplitudes as rest is; it ceases at a fold,
+    which is the one with multiplier +1. Where rest sheds two oscillations of period 1, a torque
+    makes one of them the continuation of rest, without a critical amplitude.
+
+    Without a torque, where hanging rest first loses its stability an oscillation is born, with period 1 (multiplier
     +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its fold: between fold
     and critical curve it is there beside a rest that is stable.
 
@@ -112,7 +118,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         same without damping: ``undamped_index``, ``undamped_p``, ``undamped_multiplier`` over
         ``undamped``. Of inverted rest, which is unstable without drive: ``inverted_index``,
         ``inverted_p``, ``inverted_multiplier``, ``inverted_stable_above`` over ``inverted``; none,
-        and the attribute ``inverted`` 0, where upright is no rest. Over ``curve`` and ``omega``:
+        and the attribute ``inverted`` 0, where upright is no rest. Under a torque, when the
+        attribute ``moved`` is 1, there are no folds and none without damping. Over ``curve`` and ``omega``:
         ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by
         (:mod:`pendmap.asymptotic`).
 
@@ -120,7 +127,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is outside its range; if the model has friction, which holds rest whatever the
-        drive, or a torque or another load at rest, which moves it.
+        drive, or a load that is no constant torque, which moves it.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
     """
@@ -143,7 +150,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
         found = solve(at, pendulum, upright=False, folds=folds)
-        undamped = solve(at, free, upright=False) if free else found
+        undamped = solve(at, free, upright=False) if free and not found[0]["moved"] else found
         above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
         return list(zip(found, undamped, above, strict=True))
 
@@ -165,6 +172,9 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
             looked = _folds_to_their_ends(frequencies, found, known, again)
     except ValueError as error:
         raise InputError(str(error)) from None
+    moved = bool(found[0]["moved"])
+    if moved:
+        undamped = [_NO_REST] * len(found)
     folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
     of_p = {"units": "1", "long_name": "amplitude of the drive over gravity"}
@@ -182,7 +192,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     for prefix, one, rest in (("", "critical", found), ("inverted_", "inverted", upright)):
         above = [stable for row in rest for stable in row["stable"][1:]]
         variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
-    asymptotic_p, off = _asymptotic(found, frequencies, pendulum.gamma, p_max)
+    asymptotic_p, off = _asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max)
     variables["asymptotic"] = (("curve", "omega"), asymptotic_p, of_p)
     variables["asymptotic_error"] = (("curve", "omega"), off, {"units": "1"})
     coords: dict[str, Any] = {
@@ -199,6 +209,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         **model.attributes,
         "plane": plane,
         "p_max": p_max,
+        "moved": int(moved),
         "inverted": int(upright[0] is not _NO_REST),
         "own_p": pendulum.p,
         "own_omega": pendulum.omega,
@@ -284,6 +295,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     count = dataset.sizes["critical"]
     of_asked = int(asked[dataset["index"].values].sum())
     where = f"{counted(int(asked.sum()), 'value')} of omega from {omega[0]:g} to {omega[-1]:g}"
+    hanging = "the orbit about hanging rest" if a["moved"] else "hanging rest"
     lines = [f"{counted(of_asked, 'critical amplitude')} up to p = {a['p_max']:g} at {where}."]
     if added := int((~asked).sum()):
         lines[0] += f" {added} more values of omega where curves turn, end or bend."
@@ -296,11 +308,11 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if never.size:
         said = ", ".join(f"{value:.6g}" for value in never[:3])
         more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
-        lines.append(f"Hanging rest is unstable from p = 0 on at omega = {said}{more}.")
+        lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {said}{more}.")
     elif first:
         least = min(first, key=lambda k: p[k])
         lines.append(
-            f"Of these frequencies hanging rest loses its stability soonest at omega = "
+            f"Of these frequencies {hanging} loses its stability soonest at omega = "
             f"{omega[index[least]]:.6g}: p = {p[least]:.9g} (multiplier "
             f"{dataset['multiplier'].values[least]})."
         )
@@ -326,6 +338,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
     """Say where inverted rest is stable."""
+    rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
     if not dataset.attrs["inverted"]:
         return []
     omega, p_max = dataset["omega"].values, dataset.attrs["p_max"]
@@ -337,9 +350,9 @@ def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
         if asked[index[k]] and high - p[k] > _STRIP:
             wide.append((p[k], high, omega[index[k]]))
     if not wide:
-        return ["Inverted rest is stable nowhere there."]
+        return [f"{rest} is stable nowhere there."]
     low, high, where = max(wide, key=lambda strip: strip[1] - strip[0])
     count = counted(len({w for *_, w in wide}), "value")
     on = " and on" if high == p_max else ""
     widest = f"in the widest strip from p = {low:.9g} to {high:.9g}{on}, at omega = {where:.6g}"
-    return [f"Inverted rest is stable at {count} of omega, {widest}."]
+    return [f"{rest} is stable at {count} of omega, {widest}."]

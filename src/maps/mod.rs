@@ -14,7 +14,8 @@
 //! - [`bifurcation`]: along one parameter, all attractors, and one followed up and down
 //! - [`orbits`]: all closed orbits of one period and winding: `vanishing` and `approach` find
 //!   where Newton's method begins
-//! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials
+//! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials; `continued`
+//!   where a torque makes it an orbit
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
@@ -23,6 +24,7 @@ pub mod basins;
 pub mod bifurcation;
 pub mod cell;
 mod chebyshev;
+mod continued;
 pub mod control;
 pub mod ensemble;
 pub mod growth;

@@ -5,6 +5,8 @@
 //! `1 - tr M + det M = 0`, or -1, `1 + tr M + det M = 0`. As `p` stands in the linear equation linearly,
 //! `M` is an entire function of it: its Chebyshev series on an interval soon says all about it.
 //!
+//! Under a constant torque rest is a periodic orbit; `continued` follows it.
+//!
 //! Without damping the two boundaries of a narrow tongue are nearly a double zero of that. The drive is
 //! even in time then, so that `m11 = m22` and, on a boundary, `m12 m21 = m11^2 - 1 = 0`: one is a
 //! simple zero of `m12`, the other of `m21`, however narrow the tongue (Magnus & Winkler 1966, Hill's
@@ -15,6 +17,7 @@ use std::f64::consts::PI;
 use rayon::prelude::*;
 
 use super::chebyshev::{Interpolant, Values};
+use super::continued;
 use super::control::{Control, pool};
 use crate::error::Error;
 use crate::model::Pendulum;
@@ -49,7 +52,8 @@ impl Balance {
     }
 }
 
-/// What happens at a critical amplitude.
+/// What happens at a critical amplitude. Under a torque the orbit that continues rest ceases where its
+/// multiplier is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
     /// Amplitude of the drive.
@@ -70,8 +74,20 @@ pub struct Curve {
     /// Whether rest is stable between `p = 0` and the first.
     pub stable_at_first: bool,
     /// Where the oscillation that is born at the first loss of stability turns back: below that `p`
-    /// it is not. `None` where it is born toward larger `p`.
+    /// it is not. `None` where it is born toward larger `p`, and under a torque.
     pub fold: Option<Fold>,
+}
+
+impl Curve {
+    /// Where rest is stable.
+    pub(super) fn stable_intervals(&self, p_max: f64) -> Vec<[f64; 2]> {
+        let inner = self.critical.iter().map(|c| c.p);
+        let ends: Vec<f64> = [0.0].into_iter().chain(inner).chain([p_max]).collect();
+        let above = self.critical.iter().map(|c| c.stable[1]);
+        let stable = [self.stable_at_first].into_iter().chain(above);
+        let of_both = ends.windows(2).zip(stable).filter(|(_, yes)| *yes);
+        of_both.map(|(both, _)| [both[0], both[1]]).collect()
+    }
 }
 
 /// A function of the monodromy matrix and its product that vanishes at critical amplitudes.
@@ -99,12 +115,18 @@ pub fn tongues(
     if let Some(value) = omegas.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
         return Err(Error::Range { name: "omega", value: *value, allowed: "above 0" });
     }
-    check(pendulum, balance, omegas, p_max)?;
+    let mut level = pendulum.clone();
+    level.torque = 0.0;
+    check(&level, balance, omegas, p_max)?;
     control.begin(omegas.len());
     pool(threads)?.install(|| {
         let one = |omega: &f64| {
             control.check()?;
-            let curve = along(pendulum, balance, *omega, p_max, folds);
+            let moved = pendulum.torque != 0.0;
+            let mut curve = along(&level, balance, *omega, p_max, folds && !moved);
+            if moved {
+                curve = continued::curve(pendulum, balance, &curve, p_max);
+            }
             control.add(1);
             Ok(curve)
         };
@@ -113,7 +135,7 @@ pub fn tongues(
 }
 
 /// The same pendulum under another drive.
-fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
+pub(super) fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
     let mut other = pendulum.clone();
     (other.drive.p, other.drive.omega, other.drive.phase) = (p, omega, 0.0);
     other
@@ -134,7 +156,7 @@ fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> R
         });
         if loaded {
             let why =
-                "a torque or a sideways drive moves it, and eq. 1.3 is not its linear equation";
+                "a sideways drive or an effect moves it, and eq. 1.3 is not its linear equation";
             return Err(Error::NoRest { why });
         }
     }
@@ -152,11 +174,11 @@ fn monodromy(pendulum: &Pendulum, balance: Balance, p: f64, omega: f64) -> Value
 }
 
 /// `1 - m tr M + det M`: zero where `m`, 1 or -1, is a multiplier.
-fn gap(multiplier: f64, [a, _, _, d, product]: Values<5>) -> f64 {
+pub(super) fn gap(multiplier: f64, [a, _, _, d, product]: Values<5>) -> f64 {
     1.0 - multiplier * (a + d) + product
 }
 
-fn is_stable(m: Values<5>) -> bool {
+pub(super) fn is_stable(m: Values<5>) -> bool {
     let within = gap(1.0, m) > 0.0 && gap(-1.0, m) > 0.0;
     within && m[4] < 1.0 + ALIKE
 }

@@ -44,6 +44,7 @@ pub fn tongues<'py>(
         let above = curve.critical.iter().map(|c| c.stable[1]);
         let stable: Vec<bool> = std::iter::once(curve.stable_at_first).chain(above).collect();
         dict.set_item("stable", stable)?;
+        dict.set_item("moved", pendulum.torque != 0.0)?;
         dict.set_item("fold", curve.fold.map(|f| (f.p, f.point[0], f.point[1])))?;
         listed.append(dict)?;
     }

@@ -14,7 +14,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
 from drawn import made
-from pendmap import Effect, Pendulum, Rig, asymptotic, figures
+from pendmap import Effect, Formula, Pendulum, Rig, asymptotic, figures
 from pendmap.pictures import tongues as drawn
 from recordings import recorded
 
@@ -138,7 +138,8 @@ def test_inverted_rest_is_stable_where_its_motions_decay(seed: int) -> None:
 
 
 def test_where_upright_is_no_rest_hanging_rest_is_looked_at_alone() -> None:
-    pushed = Pendulum(gamma=0.1, effects=(Effect.formula("push", "0.1*(1 - cos(theta))"),))
+    push = Formula("push", "a*(1 - cos(theta))", {"a": 2})
+    pushed = Pendulum(gamma=0.1, effects=(push(a=0.1),))
     found = pendmap.tongues(pushed, 6.0, 20.0)
     assert found.attrs["inverted"] == 0
     assert found.sizes["inverted"] == 0
