@@ -168,12 +168,13 @@ def growth(
 ) -> _Floats: ...
 def tongues(
     parameters: _Parameters,
+    inverted: bool,
     omegas: Sequence[float],
     p_max: float,
     folds: bool,
     threads: int,
     progress: _Progress | None = None,
-) -> list[dict[str, Any]]: ...
+) -> list[dict[str, Any]] | None: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],

@@ -1,4 +1,4 @@
-"""Critical curves: where rest loses its stability under a harmonic drive of the pivot."""
+"""Critical curves: where rest, hanging and inverted, is stable under a drive of the pivot."""
 
 from __future__ import annotations
 
@@ -41,8 +41,14 @@ OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
 MOST_P = 100.0
 """Largest amplitude that may be asked for."""
 
+_NO_REST: _Row = {"p": [], "multiplier": [], "stable": [False]}
+"""What is found of a rest that is no solution."""
+
 _TIPS = 8
 """Without damping tongues have their tips at omega = 2/k, k = 1, 2, ...: so many are told."""
+
+_STRIP = 1e-6
+"""Strips of stability narrower than this are not told."""
 
 NEAR = 0.05
 """An asymptotic curve that is off by less than this part is near the exact one."""
@@ -54,22 +60,30 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     p_max: float = P_MAX,
     *,
     plane: str = "omega-p",
+    inverted: bool = True,
     refine: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
-    """Return the critical curves of hanging rest, exact, with folds and asymptotic curves.
+    """Return the critical curves of rest, exact, with folds and asymptotic curves.
 
-    Rest obeys ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` (eq. 1.3 with damping). The
-    derivative of the stroboscopic map there is its monodromy matrix ``M``, and rest changes its
-    stability where a multiplier passes +1, ``1 - tr M + det M = 0``, or -1, ``1 + tr M + det M =
-    0``. As ``p`` enters linearly, ``M`` is an entire function of ``p``: from its Chebyshev series
-    all such amplitudes up to ``p_max`` are found, and moved onto the map itself. In the plane of
-    eq. 1.4 a point is ``(e, alpha^2) = (p/omega^2, 1/omega^2)``.
+    Hanging rest obeys ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` (eq. 1.3 with damping);
+    inverted rest the same with ``-(1 + p cos(omega tau))``. The derivative of the stroboscopic map
+    there is its monodromy matrix ``M``, and rest changes its stability where a multiplier passes
+    +1, ``1 - tr M + det M = 0``, or -1, ``1 + tr M + det M = 0``. As ``p`` enters linearly, ``M``
+    is an entire function of ``p``: from its Chebyshev series all such amplitudes up to ``p_max``
+    are found, and moved onto the map itself. In the plane of eq. 1.4 a point is ``(e, alpha^2) =
+    (p/omega^2, 1/omega^2)``.
 
-    Where rest first loses its stability an oscillation is born, with period 1 (multiplier +1) or 2
-    (-1). Where it is born toward smaller ``p`` it is followed to its fold: between fold and
-    critical curve it is there beside a rest that is stable.
+    A constant torque makes of rest an orbit of the drive's period. Where rest is stable without the
+    torque, the orbit that it becomes as the torque grows from 0 is followed along ``p``, both ways,
+    by Newton's method. It is stable between critical amplitudes as rest is; it ceases at a fold,
+    which is the one with multiplier +1. Where rest sheds two oscillations of period 1, a torque
+    makes one of them the continuation of rest, without a critical amplitude.
+
+    Without a torque, where hanging rest first loses its stability an oscillation is born, with period 1 (multiplier
+    +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its fold: between fold
+    and critical curve it is there beside a rest that is stable.
 
     Parameters
     ----------
@@ -83,6 +97,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         Largest amplitude, up to 100.
     plane : str
         In which plane a figure shows them: ``omega-p``, or ``e-alpha2``, that of eq. 1.4.
+    inverted : bool
+        Whether to find where inverted rest is stable too.
     refine : bool
         Whether to add frequencies where curves begin, end, turn or bend between two of those asked
         for, so that a figure shows them as they are.
@@ -100,14 +116,18 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         first), ``fold`` (nan where none) and the point ``fold_theta``, ``fold_velocity`` of the
         oscillation there, ``fold_sought`` (0 where the frequency was added and no fold ends). The
         same without damping: ``undamped_index``, ``undamped_p``, ``undamped_multiplier`` over
-        ``undamped``. Over ``curve`` and ``omega``: ``asymptotic`` and ``asymptotic_error``,
-        relative to the exact curve nearest by (:mod:`pendmap.asymptotic`).
+        ``undamped``. Of inverted rest, which is unstable without drive: ``inverted_index``,
+        ``inverted_p``, ``inverted_multiplier``, ``inverted_stable_above`` over ``inverted``; none,
+        and the attribute ``inverted`` 0, where upright is no rest. Under a torque, when the
+        attribute ``moved`` is 1, there are no folds and none without damping. Over ``curve`` and ``omega``:
+        ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by
+        (:mod:`pendmap.asymptotic`).
 
     Raises
     ------
     InputError
         If a value is outside its range; if the model has friction, which holds rest whatever the
-        drive, or a torque or another load at rest, which moves it.
+        drive, or a load that is no constant torque, which moves it.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
     """
@@ -119,7 +139,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     if plane not in PLANES:
         raise InputError(f"plane is {checks.shown(plane)}: allowed are {', '.join(PLANES)}")
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
-    refine = checks.flag("refine", refine)
+    refine, inverted = checks.flag("refine", refine), checks.flag("inverted", inverted)
     if pendulum.theta_r > 0:
         raise InputError(
             f"theta_r is {pendulum.theta_r:g}: friction holds hanging rest whatever the drive, and "
@@ -129,38 +149,44 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
-    def solve(at: Floats, one: Pendulum = pendulum, *, folds: bool = False) -> list[_Row]:
-        return _core.tongues(one.parameters, at.tolist(), p_max, folds, workers, progress)
+    def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
+        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, workers, progress)
+        return [_NO_REST] * at.size if found is None else found
 
-    def both(at: Floats) -> list[tuple[_Row, _Row]]:
-        found = solve(at)
-        return list(zip(found, solve(at, free) if free else found, strict=True))
+    def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
+        found = solve(at, pendulum, upright=False, folds=folds)
+        undamped = solve(at, free, upright=False) if free and not found[0]["moved"] else found
+        above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
+        return list(zip(found, undamped, above, strict=True))
 
-    def curves(pair: tuple[_Row, _Row]) -> list[tuple[Floats, Floats]]:
+    def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
         # The end of what is looked for bounds the last strip.
-        return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in pair]
+        return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in rows]
 
     asked = frequencies
     looked = np.ones(asked.size, dtype=bool)
     try:
-        found = solve(asked, folds=True)
-        undamped = solve(asked, free) if free else found
+        rows = all_at(asked, folds=True)
         if refine and asked.size > 1:
             views = [in_picture(asked, p_max, one) for one in PLANES]
-            pairs = list(zip(found, undamped, strict=True))
-            frequencies, pairs = critical_refinement.denser(asked, pairs, both, curves, views)
-            found, undamped = ([pair[k] for pair in pairs] for k in (0, 1))
-            looked = _folds_to_their_ends(
-                frequencies, found, np.isin(frequencies, asked), partial(solve, folds=True)
-            )
+            frequencies, rows = critical_refinement.denser(asked, rows, all_at, curves, views)
+        found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
+        if refine and asked.size > 1:
+            again = partial(solve, one=pendulum, upright=False, folds=True)
+            known = np.isin(frequencies, asked)
+            looked = _folds_to_their_ends(frequencies, found, known, again)
     except ValueError as error:
         raise InputError(str(error)) from None
+    moved = bool(found[0]["moved"])
+    if moved:
+        undamped = [_NO_REST] * len(found)
     folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
     of_p = {"units": "1", "long_name": "amplitude of the drive over gravity"}
     variables: dict[str, Any] = {
         **_columns(found, "critical", ""),
         **_columns(undamped, "undamped", "undamped_"),
+        **_columns(upright, "inverted", "inverted_"),
         "asked": ("omega", np.isin(frequencies, asked).astype(np.int8)),
         "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
         "fold_sought": ("omega", looked.astype(np.int8)),
@@ -168,9 +194,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         "fold_theta": ("omega", theta, {"units": "rad"}),
         "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
     }
-    above = [stable for row in found for stable in row["stable"][1:]]
-    variables["stable_above"] = ("critical", np.array(above, dtype=np.int8))
-    asymptotic_p, off = _asymptotic(found, frequencies, pendulum.gamma, p_max)
+    for prefix, one, rest in (("", "critical", found), ("inverted_", "inverted", upright)):
+        above = [stable for row in rest for stable in row["stable"][1:]]
+        variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
+    asymptotic_p, off = _asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max)
     variables["asymptotic"] = (("curve", "omega"), asymptotic_p, of_p)
     variables["asymptotic_error"] = (("curve", "omega"), off, {"units": "1"})
     coords: dict[str, Any] = {
@@ -187,6 +214,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         **model.attributes,
         "plane": plane,
         "p_max": p_max,
+        "moved": int(moved),
+        "inverted": int(upright[0] is not _NO_REST),
         "own_p": pendulum.p,
         "own_omega": pendulum.omega,
         "seconds": time.perf_counter() - began,
@@ -271,6 +300,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     count = dataset.sizes["critical"]
     of_asked = int(asked[dataset["index"].values].sum())
     where = f"{counted(int(asked.sum()), 'value')} of omega from {omega[0]:g} to {omega[-1]:g}"
+    hanging = "the orbit about hanging rest" if a["moved"] else "hanging rest"
     lines = [f"{counted(of_asked, 'critical amplitude')} up to p = {a['p_max']:g} at {where}."]
     if added := int((~asked).sum()):
         lines[0] += f" {added} more values of omega where curves turn, end or bend."
@@ -283,11 +313,11 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if never.size:
         said = ", ".join(f"{value:.6g}" for value in never[:3])
         more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
-        lines.append(f"Rest is unstable from p = 0 on at omega = {said}{more}.")
+        lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {said}{more}.")
     elif first:
         least = min(first, key=lambda k: p[k])
         lines.append(
-            f"Of these frequencies rest loses its stability soonest at omega = "
+            f"Of these frequencies {hanging} loses its stability soonest at omega = "
             f"{omega[index[least]]:.6g}: p = {p[least]:.9g} (multiplier "
             f"{dataset['multiplier'].values[least]})."
         )
@@ -298,6 +328,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
             f"At {counted(at.size, 'value')} of omega from {at.min():.4g} to {at.max():.4g} the "
             "oscillation is born toward smaller p: it exists from its fold on."
         )
+    lines += _inverted(dataset, asked)
     for name in dataset["curve"].values:
         error = dataset["asymptotic_error"].sel(curve=name).values
         near = omega[(error < NEAR) & asked]
@@ -308,3 +339,25 @@ def _summary(dataset: xr.Dataset) -> list[str]:
             )
     lines.append(f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')}.")
     return lines
+
+
+def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
+    """Say where inverted rest is stable."""
+    rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
+    if not dataset.attrs["inverted"]:
+        return []
+    omega, p_max = dataset["omega"].values, dataset.attrs["p_max"]
+    index, p = dataset["inverted_index"].values, dataset["inverted_p"].values
+    wide = []
+    for k in np.flatnonzero(dataset["inverted_stable_above"].values):
+        last = k + 1 == p.size or index[k + 1] != index[k]
+        high = p_max if last else p[k + 1]
+        if asked[index[k]] and high - p[k] > _STRIP:
+            wide.append((p[k], high, omega[index[k]]))
+    if not wide:
+        return [f"{rest} is stable nowhere there."]
+    low, high, where = max(wide, key=lambda strip: strip[1] - strip[0])
+    count = counted(len({w for *_, w in wide}), "value")
+    on = " and on" if high == p_max else ""
+    widest = f"in the widest strip from p = {low:.9g} to {high:.9g}{on}, at omega = {where:.6g}"
+    return [f"{rest} is stable at {count} of omega, {widest}."]

@@ -12,6 +12,7 @@ import xarray as xr
 from pendmap import _core, grid
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
+from pendmap.separatrices import loop, separatrix
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
 
@@ -19,42 +20,55 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.model import Pendulum, Rig
+    from pendmap.separatrices import Orbit
 
     Floats = NDArray[np.float64]
 
 __all__ = ["melnikov"]
 
-_REACH, _SPACING = 42.0, 0.2
-"""Times along the separatrix: the trapezoidal rule on an analytic integrand without ends errs by
-``exp(-pi^2/spacing)``; friction's integrand falls as ``exp(-|t|)`` alone."""
+_PHASES, _FINE = (8, 16, 32, 64), 4096
+"""Phases of the drive at which its work is computed, until its Fourier series ends in rounding, and
+to which that series goes on."""
 
-_PHASES, _FINE = 32, 4096
-"""Phases of the drive at which its work is computed, and to which its Fourier series goes on."""
+_FASTEST = 14.0
+"""A drive that is faster than this many times the orbit's rate at upright rest does less work than
+``exp(-pi/2 14)`` of its power: that is rounding."""
 
 _RANGE = (0.2, 4.0, 191)
 """Frequencies of the curve in the figure, where none are given."""
 
 _ROUNDING = 1e-13
-"""A threshold below this is that of a motion that loses nothing."""
+"""A threshold below this is that of a motion that loses nothing, a torque below this is none."""
 _LINEAR = 1e-9
+_RESOLVED = 1e-9
+"""The drive's work is told from rounding where it is more than this part of its absolute power."""
 
 
 def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dataset:
     """Return the amplitude of the drive at which homoclinic tangles begin, to first order.
 
-    Along the separatrix ``th = 2 atan(sinh t)``, ``th' = 2/cosh t`` of ``th'' + sin th = 0``, and
-    its mirror image, all that the model has besides gravity does the work
+    Along an orbit of the pendulum without losses that leaves upright rest and comes back to it, all
+    that the model has besides does the work
 
     ``M(t0) = W + p D(t0)``,
 
-    ``W`` that of damping, friction, torque and effects, ``p D`` that of a drive with phase ``t0``.
-    Manifolds of the upright rest cross where ``M`` has simple zeros: for ``p`` above
-    ``-W / max D``. With viscous damping, Coulomb friction and a torque, forward (+) and backward
-    (-),
+    ``W`` that of damping, friction and effects, ``p D`` that of a drive with phase ``t0``.
+    Manifolds of upright rest cross where ``M`` has simple zeros: for ``p`` above ``|W| / max D``.
 
-    ``p = (4 gamma + pi theta_r -/+ pi torque) sinh(pi omega/2) / (pi omega^2)``.
+    *Without a torque* the orbits are the separatrix ``th = 2 atan(sinh t)``, ``th' = 2/cosh t`` of
+    ``th'' + sin th = 0`` and its mirror image, forward (+) and backward (-). A torque weaker than
+    the losses is a perturbation like them. With viscous damping and Coulomb friction
 
-    Both integrals are computed from the model's own acceleration, so that effects count too. The
+    ``p = |4 gamma + pi theta_r -/+ pi torque| sinh(pi omega/2) / (pi omega^2)``.
+
+    *A torque that keeps up a rotation*, as it gives more in a turn than the losses take, belongs to
+    the pendulum without losses: in the tilted potential the orbit is the loop from upright rest
+    ``pi - asin(torque)`` into the well and back (:func:`pendmap.separatrices.loop`). The formula
+    above stands beside it: there manifolds of neighbouring upright rests cross (heteroclinic), to
+    first order in the torque too. Under damping the limit of a small torque is that formula. The
+    loop has no limit: its two ways interfere with a phase that grows as ``omega ln(1/torque)``.
+
+    All integrals are computed from the model's own acceleration, so that effects count too. The
     true tangency differs at the second order in damping.
 
     Parameters
@@ -67,16 +81,17 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     Returns
     -------
     xarray.Dataset
-        ``p_melnikov`` over ``omega`` and ``branch`` (forward, backward); nan where a torque keeps
-        up the rotation on that branch, so that no drive is needed. The attributes
-        ``p_melnikov``, ``p_forward`` and ``p_backward`` hold the values at the model's own
-        frequency, ``p_tangency`` is nan: to be computed by following manifolds.
+        ``p_melnikov`` over ``omega`` and ``branch`` (forward, backward, before them loop where the
+        torque keeps up a rotation); nan where the drive's work cannot be told from rounding. The
+        attributes hold the values at the model's own frequency: ``p_forward``, ``p_backward``,
+        ``p_loop`` (nan without a loop) and ``p_melnikov``, that of the loop where there is one,
+        else the lower of the others. ``p_tangency`` is nan: to be computed by following manifolds.
 
     Raises
     ------
     InputError
-        If a value is outside its range, an effect cannot be in a map, or the work of the drive is
-        not proportional to ``p``.
+        If a value is outside its range, an effect cannot be in a map, the work of the drive is not
+        proportional to ``p``, or a torque of 1 or more leaves no rest.
 
     References
     ----------
@@ -89,22 +104,27 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         omega = np.linspace(*_RANGE)
     frequencies = grid.frequencies(omega)
     try:
-        own = _thresholds(pendulum, pendulum.omega)
-        curve = np.array([_thresholds(pendulum, float(w)) for w in frequencies])
+        orbits, sense = _orbits(pendulum)
+        own, *curve = (
+            [_threshold(pendulum, float(w), orbit) for orbit in orbits.values()]
+            for w in (pendulum.omega, *frequencies)
+        )
     except ValueError as error:
         raise InputError(str(error)) from None
-    first = float(np.nanmin(own)) if np.isfinite(own).any() else math.nan
+    at = dict(zip(orbits, own, strict=True))
+    known = [p for p in own if math.isfinite(p)]
+    first = at["loop"] if "loop" in at else min(known, default=math.nan)
     dataset = xr.Dataset(
         {
             "p_melnikov": (
                 ("omega", "branch"),
-                curve,
+                np.array(curve),
                 {"units": "1", "long_name": "amplitude of the drive over gravity"},
             )
         },
         coords={
             "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
-            "branch": ("branch", np.array(["forward", "backward"])),
+            "branch": ("branch", np.array(list(orbits))),
         },
     )
     dataset.attrs = {
@@ -114,80 +134,121 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         "own_p": pendulum.p,
         "own_omega": pendulum.omega,
         "p_melnikov": first,
-        "p_forward": float(own[0]),
-        "p_backward": float(own[1]),
+        "p_forward": at["forward"],
+        "p_backward": at["backward"],
+        "p_loop": at.get("loop", math.nan),
         "p_tangency": math.nan,
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(pendulum, own), *of_motion(model.effects, "the threshold is")]
+    lines = [*_summary(pendulum, at, first, sense), *of_motion(model.effects, "the threshold is")]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
 
 
-def _thresholds(pendulum: Pendulum, omega: float) -> Floats:
-    """Return the threshold of the forward and of the backward branch at one frequency."""
-    driven = [dataclasses.replace(pendulum, p=p, omega=omega) for p in (1.0, 2.0)]
-    still = dataclasses.replace(pendulum, p=0.0, omega=omega)
-    t = np.arange(-_REACH, _REACH + _SPACING / 2, _SPACING)
-    theta, speed = 2 * np.arctan(np.sinh(t)), 2 / np.cosh(t)
-    period = driven[0].period
-    found = []
-    for sense in (1.0, -1.0):
-        way = (sense * theta, sense * speed)
-
-        def power(of: Pendulum, at: float, way: tuple[Floats, Floats] = way) -> Floats:
-            """The power of everything but gravity, integrated."""
-            acceleration = _core.acceleration(of.parameters, t + at, *way)
-            return way[1] * (acceleration + np.sin(way[0]))
-
-        lost = _SPACING * float(power(still, 0.0).sum())
-        starts = period * np.arange(_PHASES) / _PHASES
-        work, twice = (
-            np.array([_SPACING * float(power(one, at).sum()) - lost for at in starts])
-            for one in driven
+def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
+    """Return the orbits by name, and the sense of the rotation that a torque keeps up, or none."""
+    still = dataclasses.replace(pendulum, p=0.0)
+    forward = separatrix()
+    orbits = {"forward": forward, "backward": forward.mirrored()}
+    won = {name: _work(still, orbit, 0.0) for name, orbit in orbits.items()}
+    # A torque gives 2 pi times itself on one branch and takes it on the other.
+    torque = (won["forward"] - won["backward"]) / (4 * math.pi)
+    if abs(torque) >= 1 - _ROUNDING:
+        raise InputError(
+            f"torque must be above -1 and below 1 for Melnikov's criterion, got {torque:.6g}: "
+            "a larger one leaves no upright rest"
         )
-        if np.abs(twice - 2 * work).max() > _LINEAR * np.abs(twice).max():
-            raise InputError(
-                "effects: the work of the drive along the separatrix is not proportional to p; "
-                "Melnikov's criterion to first order needs that"
-            )
-        found.append(_threshold(lost, work))
-    return np.array(found)
+    sense = max(won, key=lambda name: won[name])
+    if won[sense] <= _ROUNDING or abs(torque) <= _ROUNDING:
+        return orbits, ""
+    return {"loop": loop(torque), **orbits}, sense
 
 
-def _threshold(lost: float, work: Floats) -> float:
-    """Return the ``p`` at which ``lost + p work`` first has a zero for some phase."""
-    if lost > 0:
+def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
+    """Return the power of all that the orbit's own equation lacks: a row for each of the phases."""
+    theta, speed = (np.tile(column, at.size) for column in (orbit.theta, orbit.speed))
+    tau = (orbit.time + at[:, None]).ravel()
+    acceleration = _core.acceleration(pendulum.parameters, tau, theta, speed)
+    return (speed * (acceleration + np.sin(theta) - orbit.torque)).reshape(at.size, -1)
+
+
+def _work(pendulum: Pendulum, orbit: Orbit, at: float) -> float:
+    return float((_power(pendulum, orbit, np.array([at])) @ orbit.weight)[0])
+
+
+def _threshold(pendulum: Pendulum, omega: float, orbit: Orbit) -> float:
+    """Return the ``p`` at which ``W + p D`` first has a zero for some phase; nan if unresolved."""
+    still, driven, twice = (
+        dataclasses.replace(pendulum, p=p, omega=omega) for p in (0.0, 1.0, 2.0)
+    )
+    passive = _power(still, orbit, np.zeros(1))
+    won = float((passive @ orbit.weight)[0])
+    for count in _PHASES:
+        starts = driven.period * np.arange(count) / count
+        power = _power(driven, orbit, starts) - passive
+        work = power @ orbit.weight
+        scale = float((np.abs(power) @ orbit.weight).max())
+        terms = np.abs(np.fft.rfft(work)) / count
+        if terms[-2:].max() <= _ROUNDING * scale:
+            break
+    again = _power(twice, orbit, starts[:2]) @ orbit.weight - won
+    if np.abs(again - 2 * work[:2]).max() > _LINEAR * scale:
+        raise InputError(
+            "effects: the work of the drive along the separatrix is not proportional to p; "
+            "Melnikov's criterion to first order needs that"
+        )
+    if abs(won) <= _ROUNDING:
+        return 0.0
+    if omega > _FASTEST * orbit.rate:
         return math.nan
-    terms = np.fft.rfft(work)
-    dense = np.fft.irfft(terms, _FINE) * (_FINE / work.size)
+    greatest = _greatest(-math.copysign(1.0, won) * work)
+    return abs(won) / greatest if greatest > _RESOLVED * scale else math.nan
+
+
+def _greatest(work: Floats) -> float:
+    """Return the greatest value of a function given at evenly spaced phases."""
+    dense = np.fft.irfft(np.fft.rfft(work), _FINE) * (_FINE / work.size)
     k = int(np.argmax(dense))
     before, top, after = dense[k - 1], dense[k], dense[(k + 1) % _FINE]
     bend = before - 2 * top + after
-    greatest = top - (after - before) ** 2 / (8 * bend) if bend else top
-    if greatest <= 0:
-        return math.nan
-    found = -lost / float(greatest)
-    return found if found > _ROUNDING else 0.0
+    return float(top - (after - before) ** 2 / (8 * bend) if bend else top)
 
 
-def _summary(pendulum: Pendulum, own: Floats) -> list[str]:
-    at = f"at omega = {pendulum.omega:g}"
+def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str) -> list[str]:
+    where = f"at omega = {pendulum.omega:g}"
+    known = {name: p for name, p in own.items() if math.isfinite(p)}
+    apart = {name: p for name, p in known.items() if name != "loop"}
     lines = []
-    if np.isfinite(own).all() and abs(own[0] - own[1]) <= _LINEAR * abs(own[0]):
-        lines.append(f"Homoclinic tangles from p = {own[0]:.9g} on, {at} (Melnikov, first order).")
+    if sense:
+        lines.append(f"The torque keeps up the rotation {sense}: it belongs to the potential.")
+    if sense and "loop" in known:
+        lines.append(
+            f"Homoclinic tangles on the loop of upright rest from p = {first:.9g} on, {where} "
+            "(Melnikov, first order)."
+        )
+    if sense and apart:
+        said = ", ".join(f"{name} from p = {p:.9g}" for name, p in apart.items())
+        lines.append(
+            f"Manifolds of neighbouring upright rests cross {said} on (heteroclinic, the torque "
+            "too to first order)."
+        )
+    elif len(apart) > 1 and np.ptp(list(apart.values())) <= _LINEAR * first:
+        lines.append(
+            f"Homoclinic tangles from p = {first:.9g} on, {where} (Melnikov, first order)."
+        )
     else:
-        for value, name in zip(own, ("forward", "backward"), strict=True):
-            lines.append(
-                f"Homoclinic tangles {name} from p = {value:.9g} on, {at} (Melnikov, first order)."
-                if math.isfinite(value)
-                else f"The torque keeps up the rotation {name}: that branch has no threshold."
-            )
-    if not np.nanmax(own, initial=0.0):
+        lines += [
+            f"Homoclinic tangles {name} from p = {p:.9g} on, {where} (Melnikov, first order)."
+            for name, p in apart.items()
+        ]
+    if hidden := [name for name in own if name not in known]:
+        names = " and ".join(hidden)
+        lines.append(f"No threshold {where} ({names}): rounding hides the drive's work.")
+    if first == 0:
         return [*lines, "Without damping nothing attracts, and there are no basins."]
-    if np.isfinite(own).any() and pendulum.p and np.nanmin(own) > 0:
-        ratio = abs(pendulum.p) / float(np.nanmin(own))
+    if math.isfinite(first) and pendulum.p:
+        ratio = abs(pendulum.p) / first
         side = "above" if ratio > 1 else "below"
         lines.append(f"The pendulum's own p = {pendulum.p:g} lies {side}: {ratio:.3g} of it.")
     lines.append("Tangles make boundaries of basins fractal; chaos that lasts needs more.")

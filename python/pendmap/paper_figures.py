@@ -177,7 +177,14 @@ def _critical() -> xr.Dataset:
 
     square = np.linspace(_SQUARES[0], _SQUARES[1], _COLUMNS)[::-1]
     p_max = _HIGHEST / _SQUARES[0]
-    return tongues(Pendulum(gamma=0.1), 1 / np.sqrt(square), p_max, plane="e-alpha2", refine=True)
+    return tongues(
+        Pendulum(gamma=0.1),
+        1 / np.sqrt(square),
+        p_max,
+        plane="e-alpha2",
+        inverted=False,
+        refine=True,
+    )
 
 
 def _strange() -> list[tuple[float, float, str]]:

@@ -261,7 +261,7 @@ def _curves(
     above = p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0)
     p_max = max(float(p.bare[-1]), min(float(above), MOST_P))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
-    found = tongues(model, frequency, p_max, refine=True, progress=progress)
+    found = tongues(model, frequency, p_max, inverted=False, refine=True, progress=progress)
     scale = omega.values[-1] / omega.bare[-1]
     return {
         "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),

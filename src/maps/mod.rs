@@ -14,7 +14,8 @@
 //! - [`bifurcation`]: along one parameter, all attractors, and one followed up and down
 //! - [`orbits`]: all closed orbits of one period and winding: `vanishing` and `approach` find
 //!   where Newton's method begins
-//! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials
+//! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials; `continued`
+//!   where a torque makes it an orbit
 //! - [`bounds`]: how many periods a trajectory is given to settle
 //! - [`control`]: progress, cancellation, threads
 
@@ -25,6 +26,7 @@ pub mod bifurcation;
 pub mod bounds;
 pub mod cell;
 mod chebyshev;
+mod continued;
 pub mod control;
 pub mod ensemble;
 pub mod growth;

@@ -1,18 +1,23 @@
-//! Where rest loses and gains stability: critical amplitudes of the drive, by Floquet.
+//! Where rest, hanging or inverted, loses and gains stability: critical amplitudes, by Floquet.
 //!
-//! The derivative `M` of the stroboscopic map at hanging rest is the monodromy matrix of the
-//! linearised equation, eq. 1.3 with damping. Rest changes where a multiplier passes +1,
+//! The derivative `M` of the stroboscopic map at rest is the monodromy matrix of the linearised
+//! equation, eq. 1.3 with damping, with the opposite sign of gravity upright. Rest changes where a multiplier passes +1,
 //! `1 - tr M + det M = 0`, or -1, `1 + tr M + det M = 0`. As `p` stands in the linear equation linearly,
 //! `M` is an entire function of it: its Chebyshev series on an interval soon says all about it.
+//!
+//! Under a constant torque rest is a periodic orbit; `continued` follows it.
 //!
 //! Without damping the two boundaries of a narrow tongue are nearly a double zero of that. The drive is
 //! even in time then, so that `m11 = m22` and, on a boundary, `m12 m21 = m11^2 - 1 = 0`: one is a
 //! simple zero of `m12`, the other of `m21`, however narrow the tongue (Magnus & Winkler 1966, Hill's
 //! equation, section 1.1).
 
+use std::f64::consts::PI;
+
 use rayon::prelude::*;
 
 use super::chebyshev::{Interpolant, Values};
+use super::continued;
 use super::control::{Control, pool};
 use crate::error::Error;
 use crate::model::Pendulum;
@@ -25,12 +30,30 @@ pub const MOST_P: f64 = 100.0;
 const GROWTH: f64 = 8.0;
 /// Entries, or products of multipliers, that differ by less than this part are alike.
 const ALIKE: f64 = 1e-9;
-/// A load on the pendulum hanging at rest up to this is none.
-const NO_LOAD: f64 = 1e-14;
+/// A load on the pendulum at rest up to this is none.
+const NO_LOAD: f64 = 1e-13;
 /// Times in a period, and share of gravity of the drive, at which that is looked at.
 const TIMES: usize = 16;
 
-/// What happens at a critical amplitude.
+/// The two places where gravity has no torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Balance {
+    /// Angle 0.
+    Hanging,
+    /// Angle pi.
+    Inverted,
+}
+
+impl Balance {
+    /// Its angle.
+    #[must_use]
+    pub fn angle(self) -> f64 {
+        if self == Self::Hanging { 0.0 } else { PI }
+    }
+}
+
+/// What happens at a critical amplitude. Under a torque the orbit that continues rest ceases where its
+/// multiplier is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
     /// Amplitude of the drive.
@@ -51,21 +74,35 @@ pub struct Curve {
     /// Whether rest is stable between `p = 0` and the first.
     pub stable_at_first: bool,
     /// Where the oscillation that is born at the first loss of stability turns back: below that `p`
-    /// it is not. `None` where it is born toward larger `p`.
+    /// it is not. `None` where it is born toward larger `p`, and under a torque.
     pub fold: Option<Fold>,
+}
+
+impl Curve {
+    /// Where rest is stable.
+    pub(super) fn stable_intervals(&self, p_max: f64) -> Vec<[f64; 2]> {
+        let inner = self.critical.iter().map(|c| c.p);
+        let ends: Vec<f64> = [0.0].into_iter().chain(inner).chain([p_max]).collect();
+        let above = self.critical.iter().map(|c| c.stable[1]);
+        let stable = [self.stable_at_first].into_iter().chain(above);
+        let of_both = ends.windows(2).zip(stable).filter(|(_, yes)| *yes);
+        of_both.map(|(both, _)| [both[0], both[1]]).collect()
+    }
 }
 
 /// A function of the monodromy matrix and its product that vanishes at critical amplitudes.
 type Vanishing = fn(Values<5>) -> f64;
 
-/// All critical amplitudes up to `p_max` at each of the frequencies, with `folds` if asked for.
+/// All critical amplitudes of a balance up to `p_max` at each of the frequencies, with `folds` of
+/// oscillations of hanging rest if asked for.
 ///
 /// # Errors
 /// [`Error::Range`] for a `p_max` or frequency out of range, [`Error::NotMappable`] for effects that no
-/// map can have, [`Error::NoRest`] where hanging at rest is no solution, or friction holds it,
+/// map can have, [`Error::NoRest`] where rest is no solution, or friction holds it,
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn tongues(
     pendulum: &Pendulum,
+    balance: Balance,
     omegas: &[f64],
     p_max: f64,
     folds: bool,
@@ -78,12 +115,18 @@ pub fn tongues(
     if let Some(value) = omegas.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
         return Err(Error::Range { name: "omega", value: *value, allowed: "above 0" });
     }
-    check(pendulum, omegas, p_max)?;
+    let mut level = pendulum.clone();
+    level.torque = 0.0;
+    check(&level, balance, omegas, p_max)?;
     control.begin(omegas.len());
     pool(threads)?.install(|| {
         let one = |omega: &f64| {
             control.check()?;
-            let curve = along(pendulum, *omega, p_max, folds);
+            let moved = pendulum.torque != 0.0;
+            let mut curve = along(&level, balance, *omega, p_max, folds && !moved);
+            if moved {
+                curve = continued::curve(pendulum, balance, &curve, p_max);
+            }
             control.add(1);
             Ok(curve)
         };
@@ -92,14 +135,14 @@ pub fn tongues(
 }
 
 /// The same pendulum under another drive.
-fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
+pub(super) fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
     let mut other = pendulum.clone();
     (other.drive.p, other.drive.omega, other.drive.phase) = (p, omega, 0.0);
     other
 }
 
-/// Whether hanging at rest is a solution under all these drives, and nothing holds it.
-fn check(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Result<(), Error> {
+/// Whether rest is a solution under all these drives, and nothing holds it.
+fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> Result<(), Error> {
     pendulum.check_mappable()?;
     if pendulum.has_friction() {
         let why = "friction holds it whatever the drive: rest never loses its stability";
@@ -109,11 +152,11 @@ fn check(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Result<(), Error> {
         let driven = under(pendulum, p_max, *omega);
         let loaded = (0..TIMES).any(|k| {
             let tau = driven.period() * k as f64 / TIMES as f64;
-            driven.acceleration(tau, 0.0, 0.0).abs() > NO_LOAD
+            driven.acceleration(tau, balance.angle(), 0.0).abs() > NO_LOAD
         });
         if loaded {
             let why =
-                "a torque or a sideways drive moves it, and eq. 1.3 is not its linear equation";
+                "a sideways drive or an effect moves it, and eq. 1.3 is not its linear equation";
             return Err(Error::NoRest { why });
         }
     }
@@ -121,26 +164,27 @@ fn check(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Result<(), Error> {
 }
 
 /// Entries of the monodromy matrix by rows, and its determinant.
-fn monodromy(pendulum: &Pendulum, p: f64, omega: f64) -> Values<5> {
+fn monodromy(pendulum: &Pendulum, balance: Balance, p: f64, omega: f64) -> Values<5> {
     // Without drive a period is another one: so little of it changes nothing.
-    let image = PoincareMap::new(&under(pendulum, p.max(f64::MIN_POSITIVE), omega)).once([0.0; 2]);
+    let map = PoincareMap::new(&under(pendulum, p.max(f64::MIN_POSITIVE), omega));
+    let image = map.once([balance.angle(), 0.0]);
     let m = image.derivative;
     let product = image.product.unwrap_or(m.determinant());
     [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)], product]
 }
 
 /// `1 - m tr M + det M`: zero where `m`, 1 or -1, is a multiplier.
-fn gap(multiplier: f64, [a, _, _, d, product]: Values<5>) -> f64 {
+pub(super) fn gap(multiplier: f64, [a, _, _, d, product]: Values<5>) -> f64 {
     1.0 - multiplier * (a + d) + product
 }
 
-fn is_stable(m: Values<5>) -> bool {
+pub(super) fn is_stable(m: Values<5>) -> bool {
     let within = gap(1.0, m) > 0.0 && gap(-1.0, m) > 0.0;
     within && m[4] < 1.0 + ALIKE
 }
 
-fn along(pendulum: &Pendulum, omega: f64, p_max: f64, folds: bool) -> Curve {
-    let at = |p: f64| monodromy(pendulum, p, omega);
+fn along(pendulum: &Pendulum, balance: Balance, omega: f64, p_max: f64, folds: bool) -> Curve {
+    let at = |p: f64| monodromy(pendulum, balance, p, omega);
     // Solutions grow by about the exponential of the period times the root of p.
     let period = std::f64::consts::TAU / omega;
     let parts = (0.4 * period * p_max.sqrt() / GROWTH).ceil().max(1.0) as usize;
@@ -189,7 +233,9 @@ fn along(pendulum: &Pendulum, omega: f64, p_max: f64, folds: bool) -> Curve {
     let onset = critical.iter().find(|c| c.stable == [true, false]);
     let mirrored = pendulum.is_mirror_symmetric();
     let fold = onset
-        .filter(|c| folds && c.p > 0.0 && (mirrored || c.multiplier > 0.0))
+        .filter(|c| {
+            folds && balance == Balance::Hanging && c.p > 0.0 && (mirrored || c.multiplier > 0.0)
+        })
         .and_then(|c| fold_of_onset(&under(pendulum, c.p, omega), c.multiplier));
     Curve { omega, critical, stable_at_first: between[0], fold }
 }

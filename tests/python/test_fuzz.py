@@ -25,7 +25,7 @@ def test_what_is_drawn_ends_well(tmp_path: Path) -> None:
 def test_the_same_seed_draws_the_same_case() -> None:
     fuzz_cases.SEEDS.setdefault("basins.nc", b"")
     for kind in ("options", "model", "formula", "experiment", "table", "fault"):
-        one, again = (fuzz_cases.KINDS[kind](random.Random("7")) for _ in range(2))
+        one, again = (fuzz_cases.KINDS[kind](random.Random("7")) for _ in range(2))  # noqa: S311
         assert one == again
 
 

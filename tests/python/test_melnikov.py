@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
 import pendmap
 from drawn import made, named
 from pendmap import Effect, Pendulum, Rig
+from pendmap.separatrices import loop
 from recordings import recorded
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from conftest import Run
 
@@ -95,11 +99,167 @@ def test_drag_takes_what_its_work_along_the_separatrix_is() -> None:
     assert abs(found - expected) < 1e-9
 
 
-def test_a_torque_that_keeps_up_the_rotation_has_no_threshold() -> None:
-    found = pendmap.melnikov(Pendulum(gamma=0.01, omega=1.0, torque=0.3), [1.0])
-    assert math.isnan(found.attrs["p_forward"])
+def loop_by_scipy(gamma: float, omega: float, theta_r: float, torque: float) -> tuple[float, float]:
+    """Return the loop's threshold, and how far it goes, from upright rest's unstable manifold."""
+    c = math.sqrt(1 - torque**2)
+
+    def slope(t: float, y: NDArray[np.float64]) -> list[float]:
+        # The distance u from upright rest, its rate, and the integrals up to here.
+        u, rate = y[:2]
+        power = -(torque * math.cos(u) + c * math.sin(u)) * rate
+        push = c * math.sin(u) - 2 * torque * math.sin(u / 2) ** 2
+        drive = [power * math.cos(omega * t), power * math.sin(omega * t)]
+        return [rate, push, rate**2, abs(rate), *drive]
+
+    def turned(_: float, y: NDArray[np.float64]) -> float:
+        return float(y[1])
+
+    turned.terminal = True  # type: ignore[attr-defined]
+    turned.direction = -1  # type: ignore[attr-defined]
+    start = [1e-13, 1e-13 * math.sqrt(c), 0, 0, 0, 0]
+    run = solve_ivp(slope, (0, 400), start, "DOP853", None, events=turned, rtol=1e-13, atol=1e-22)
+    end, (far, _, action, way, even, odd) = run.t[-1], run.y[:, -1]
+    # Of the drive's phases the work is greatest where it is odd about the turning point.
+    work = math.cos(omega * end) * odd - math.sin(omega * end) * even
+    return (gamma * 2 * action + theta_r * 2 * way) / abs(2 * work), far
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_loop_of_any_torque_is_scipys(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    torque = float(random.uniform(0.1, 0.97)) * (-1) ** seed
+    gamma, omega = float(random.uniform(0.001, 0.06)), float(random.uniform(0.5, 2.5))
+    theta_r = 0.01 * float(random.uniform())
+    model = Pendulum(gamma=gamma, omega=omega, theta_r=theta_r, torque=torque, phase=0.4)
+    found = pendmap.melnikov(model, [omega])
+    expected, far = loop_by_scipy(gamma, omega, theta_r, abs(torque))
+    assert abs(found.attrs["p_loop"] / expected - 1) < 1e-9, (torque, gamma, omega, theta_r)
+    assert found.attrs["p_melnikov"] == found.attrs["p_loop"]
+    orbit = loop(torque)
+    assert abs(np.ptp(orbit.theta) - far) < 1e-8
+    # Its energy is that of the saddle all along.
+    energy = orbit.speed**2 / 2 - np.cos(orbit.theta) - torque * orbit.theta
+    assert np.ptp(energy) < 1e-13
+
+
+def test_the_loop_by_an_integral_over_the_angle() -> None:
+    # What viscous damping takes is the action, the area inside the loop.
+    for torque in (1e-9, 1e-3, 0.4, 0.9, 0.9999):
+        orbit = loop(torque)
+        low, high = orbit.theta.min(), orbit.theta.max()
+        level = -math.cos(math.pi - math.asin(torque)) - torque * (math.pi - math.asin(torque))
+
+        def speed(th: float, level: float = level, torque: float = torque) -> float:
+            return math.sqrt(max(0.0, 2 * (level + math.cos(th) + torque * th)))
+
+        area = 2 * quad(speed, low, high, epsabs=1e-13, limit=400)[0]
+        assert (orbit.speed**2) @ orbit.weight == pytest.approx(area, rel=1e-8, abs=1e-12)
+
+
+def gap_of_manifolds(p: float, gamma: float, omega: float, torque: float) -> float:
+    """Return how far the unstable manifold of the upright orbit passes the stable one, at most."""
+    period = math.tau / omega
+
+    def slope(t: float, y: NDArray[np.float64]) -> list[float]:
+        gravity = 1 + p * math.cos(omega * t)
+        return [y[1], torque - gamma * y[1] - gravity * math.sin(y[0])]
+
+    def tangent(t: float, y: NDArray[np.float64]) -> list[float]:
+        k = -(1 + p * math.cos(omega * t)) * math.cos(y[0])
+        return [*slope(t, y), y[4], y[5], k * y[2] - gamma * y[4], k * y[3] - gamma * y[5]]
+
+    point = np.array([math.pi - math.asin(torque), 0.0])
+    for _ in range(6):
+        run = solve_ivp(
+            tangent,
+            (0, period),
+            [*point, 1, 0, 0, 1],
+            "DOP853",
+            dense_output=True,
+            rtol=1e-11,
+            atol=1e-12,
+        )
+        monodromy = run.y[2:, -1].reshape(2, 2)
+        point = point - np.linalg.solve(monodromy - np.eye(2), run.y[:2, -1] - point)
+    values, vectors = np.linalg.eig(monodromy)
+    heights: list[list[float]] = []
+    phases = np.arange(16) / 16 * period
+    for growing in (True, False):
+        way = vectors[:, values.argmax() if growing else values.argmin()].real
+        hits = []
+        for t in phases:
+            here = run.sol(t)
+            ahead = here[2:].reshape(2, 2) @ way
+            start = here[:2] - 1e-5 * ahead / np.linalg.norm(ahead) * np.sign(ahead[0])
+
+            def bottom(_: float, y: NDArray[np.float64]) -> float:
+                return float(y[0] - math.asin(torque))
+
+            bottom.terminal = True  # type: ignore[attr-defined]
+            # Both pass the bottom of the well in the positive sense on their way to the saddle.
+            bottom.direction = 1 if growing else -1  # type: ignore[attr-defined]
+            span = (t, t + (60 if growing else -60))
+            end = solve_ivp(
+                slope, span, start, "DOP853", None, events=bottom, rtol=1e-10, atol=1e-12
+            )
+            hits.append((end.t[-1] % period, end.y[1, -1]))
+        hits.sort()
+        t, v = np.array([*hits, (hits[0][0] + period, hits[0][1])]).T
+        curve = CubicSpline(t, v, bc_type="periodic", extrapolate="periodic")
+        heights.append(curve(np.linspace(0, period, 1000)))
+    return float((heights[0] - heights[1]).max())
+
+
+def test_the_manifolds_of_the_loop_touch_where_it_says() -> None:
+    low, high = (gap_of_manifolds(p, 0.02, 2.0, 0.5) for p in (0.0672, 0.0680))
+    assert low < 0 < high
+    touching = 0.0672 - low * 0.0008 / (high - low)
+    found = pendmap.melnikov(Pendulum(gamma=0.02, omega=2.0, torque=0.5), [2.0])
+    assert found.attrs["p_melnikov"] == pytest.approx(touching, rel=2e-3)
+
+
+def test_a_torque_that_keeps_up_the_rotation_tilts_the_potential() -> None:
+    found = pendmap.melnikov(Pendulum(gamma=0.1, omega=2.0, torque=0.2), [2.0])
+    assert found["branch"].values.tolist() == ["loop", "forward", "backward"]
+    assert abs(found.attrs["p_melnikov"] - 0.34596) < 1e-5
+    # Forward manifolds of neighbours touch at 0.2142, by integration with scipy.
+    assert abs(found.attrs["p_forward"] / 0.2142 - 1) < 0.03
     assert "keeps up the rotation forward" in found.attrs["summary"]
-    assert found.attrs["p_melnikov"] == found.attrs["p_backward"]
+    assert "heteroclinic" in found.attrs["summary"]
+
+
+def test_a_bias_torque_is_a_torque_and_a_weak_one_a_perturbation() -> None:
+    bias = (Effect("bias_torque", {"torque": 0.2}),)
+    own, other = (
+        pendmap.melnikov(model, [1.0]).attrs
+        for model in (Pendulum(torque=0.2), Pendulum(effects=bias))
+    )
+    assert other["p_melnikov"] == pytest.approx(own["p_melnikov"], rel=1e-9)
+    drag = (Effect("quadratic_drag", {"q": 0.05}),)
+    tilted, damped = (
+        pendmap.melnikov(Pendulum(torque=0.4, omega=2.0, effects=effects), [1.0]).attrs["p_loop"]
+        for effects in (drag, ())
+    )
+    assert tilted > damped
+    # As the torque goes to 0 under damping what is known without it comes back.
+    for torque in (1e-3, 1e-6, 1e-9):
+        found = pendmap.melnikov(Pendulum(gamma=0.1, omega=2.0, torque=torque), [1.0])
+        assert found.attrs["p_melnikov"] == pytest.approx(formula(0.1, 2.0), rel=10 * torque)
+
+
+@pytest.mark.parametrize("torque", [1.0, -1.0, 1.3])
+def test_no_rest_no_loop(torque: float) -> None:
+    with pytest.raises(pendmap.InputError, match="torque must be above -1 and below 1"):
+        pendmap.melnikov(Pendulum(torque=torque), [1.0])
+
+
+def test_thresholds_that_rounding_hides_are_not_given() -> None:
+    fast = pendmap.melnikov(Pendulum(gamma=0.1, omega=14.0), [14.0, 30.0])
+    assert fast.attrs["p_melnikov"] == pytest.approx(formula(0.1, 14.0), rel=1e-6)
+    assert np.isnan(fast["p_melnikov"].values[1]).all()
+    said = pendmap.melnikov(Pendulum(gamma=0.1, omega=30.0), [1.0]).attrs
+    assert math.isnan(said["p_melnikov"])
+    assert "rounding hides" in said["summary"]
 
 
 def test_in_si_it_is_the_same() -> None:
@@ -113,12 +273,13 @@ def test_what_is_refused() -> None:
 
 
 def test_figure_recording_and_file(tmp_path: Path) -> None:
-    found = pendmap.melnikov(
-        Pendulum(gamma=0.1, theta_r=0.02, torque=0.01), np.linspace(0.3, 4, 30)
-    )
-    assert any("backward" in text for text in named(made(found)))
-    assert "/melnikov/data/forward" in recorded(found, tmp_path).static
-    assert pendmap.load(pendmap.save(found, tmp_path / "m.nc")).equals(found)
+    for torque, name in ((0.01, "forward"), (0.4, "loop")):
+        model = Pendulum(gamma=0.1, theta_r=0.02, torque=torque)
+        found = pendmap.melnikov(model, np.linspace(0.3, 4, 30))
+        texts = named(made(found))
+        assert all(any(word in text for text in texts) for word in ("backward", name))
+        assert f"/melnikov/data/{name}" in recorded(found, tmp_path).static
+        assert pendmap.load(pendmap.save(found, tmp_path / "m.nc")).equals(found)
 
 
 def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
 from drawn import made
-from pendmap import Effect, Pendulum, Rig, asymptotic, figures
+from pendmap import Effect, Formula, Pendulum, Rig, asymptotic, figures
 from pendmap.pictures import tongues as drawn
 from recordings import recorded
 
@@ -30,7 +30,7 @@ DAMPED = Pendulum(gamma=0.1)
 
 
 def found_at(model: Pendulum, omega: float, p_max: float = 6.0) -> list[tuple[float, int]]:
-    found = pendmap.tongues(model, omega, p_max)
+    found = pendmap.tongues(model, omega, p_max, inverted=False)
     return list(zip(found["p"].values, found["multiplier"].values, strict=True))
 
 
@@ -88,27 +88,63 @@ def test_narrow_tongues_are_not_missed() -> None:
     # The strip between two tongues at omega = 0.6, 0.0026 wide, is in the reference values.
 
 
+def largest_multiplier(p: float, omega: float, gamma: float, gravity: float = 1.0) -> float:
+    """Return that of rest by scipy; a gravity of -1 is that of inverted rest."""
+    ends = []
+    for start in ((1.0, 0.0), (0.0, 1.0)):
+        run = solve_ivp(
+            lambda t, y: [y[1], -gamma * y[1] - gravity * (1 + p * math.cos(omega * t)) * y[0]],
+            (0.0, math.tau / omega),
+            start,
+            rtol=1e-10,
+            atol=1e-12,
+        )
+        ends.append(run.y[:, -1])
+    return float(np.abs(np.linalg.eigvals(np.array(ends).T)).max())
+
+
 def test_stable_means_that_motions_decay() -> None:
     omega = 0.8
     found = pendmap.tongues(DAMPED, omega)
     edges = [0.0, *found["p"].values, 6.0]
     stable = [int(found["stable_at_first"][0]), *found["stable_above"].values]
-
-    def largest(p: float) -> float:
-        ends = []
-        for start in ((1.0, 0.0), (0.0, 1.0)):
-            run = solve_ivp(
-                lambda t, y: [y[1], -0.1 * y[1] - (1 + p * math.cos(omega * t)) * y[0]],
-                (0.0, math.tau / omega),
-                start,
-                rtol=1e-10,
-                atol=1e-12,
-            )
-            ends.append(run.y[:, -1])
-        return float(np.abs(np.linalg.eigvals(np.array(ends).T)).max())
-
     for low, high, yes in zip(edges[:-1], edges[1:], stable, strict=True):
-        assert (largest((low + high) / 2) < 1) == bool(yes)
+        assert (largest_multiplier((low + high) / 2, omega, 0.1) < 1) == bool(yes)
+
+
+def test_inverted_rest_is_stable_between_the_known_amplitudes() -> None:
+    # From the linear equation by scipy.
+    known = {6.0: (8.58866407032, 18.0218486957), 10.0: (14.2045148229, 47.0869701821)}
+    found = pendmap.tongues(DAMPED, list(known), 60.0)
+    for k, expected in enumerate(known.values()):
+        mine = found["inverted_index"].values == k
+        assert np.allclose(found["inverted_p"].values[mine], expected, atol=1e-9, rtol=0)
+        assert found["inverted_multiplier"].values[mine].tolist() == [1, -1]
+        assert found["inverted_stable_above"].values[mine].tolist() == [1, 0]
+    assert "from p = 14.2045148 to 47.086970" in found.attrs["summary"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_inverted_rest_is_stable_where_its_motions_decay(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    omega, gamma = float(random.uniform(1.2, 9.0)), float(random.choice([0.0, 0.02, 0.5]))
+    found = pendmap.tongues(Pendulum(gamma=gamma), omega, 30.0)
+    edges = [0.0, *found["inverted_p"].values, 30.0]
+    stable = [0, *found["inverted_stable_above"].values]
+    assert 1 in stable
+    for low, high, yes in zip(edges[:-1], edges[1:], stable, strict=True):
+        for p in random.uniform(low, high, 4):
+            assert (largest_multiplier(p, omega, gamma, -1.0) < 1 + 1e-6) == bool(yes), p
+
+
+def test_where_upright_is_no_rest_hanging_rest_is_looked_at_alone() -> None:
+    push = Formula("push", "a*(1 - cos(theta))", {"a": 2})
+    pushed = Pendulum(gamma=0.1, effects=(push(a=0.1),))
+    found = pendmap.tongues(pushed, 6.0, 20.0)
+    assert found.attrs["inverted"] == 0
+    assert found.sizes["inverted"] == 0
+    assert found.sizes["critical"] > 0
+    assert "nverted" not in found.attrs["summary"]
 
 
 @pytest.mark.parametrize("name", list(asymptotic.CURVES))
@@ -186,14 +222,16 @@ def test_the_figure_in_both_planes(whole: xr.Dataset, plane: str) -> None:
     figure = made(whole.assign_attrs(plane=plane))
     axes = figure.axes[0]
     assert ("e = p" in axes.get_ylabel()) == (plane == "e-alpha2")
-    assert any("multiplier" in text.get_text() for text in figure.legends[0].get_texts())
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    for name in ("multiplier", "hanging rest is stable", "inverted rest is stable"):
+        assert any(name in text for text in texts)
 
 
 @pytest.mark.usefixtures("strict_recordings")
 def test_the_recording_has_both_planes(whole: xr.Dataset, tmp_path: Path) -> None:
     back = recorded(whole, tmp_path)
     for root in ("tongues", "paper"):
-        for name in ("plus", "minus", "undamped", "own"):
+        for name in ("plus", "minus", "inverted_plus", "inverted_minus", "undamped", "own"):
             assert f"/{root}/data/{name}" in back.static
 
 
@@ -246,7 +284,7 @@ def test_steep_strips_of_stability_are_shaded_between_frequencies_too() -> None:
 
 
 def tongues_of(omega: NDArray[np.float64]) -> xr.Dataset:
-    return pendmap.tongues(DAMPED, omega, 6.0)
+    return pendmap.tongues(DAMPED, omega, 6.0, inverted=False)
 
 
 def test_json_lists_the_frequencies_that_were_asked_for(pendmap_command: Run) -> None:
@@ -255,6 +293,7 @@ def test_json_lists_the_frequencies_that_were_asked_for(pendmap_command: Run) ->
         for more in ((), ("--plot", "noses.png"))
     ]
     assert told[0]["curves"] == told[1]["curves"]
+    assert told[0]["inverted"] == told[1]["inverted"]
     assert told[0]["asymptotic"] == told[1]["asymptotic"]
 
 
@@ -267,6 +306,8 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("tongues", "--omega", "2:2:1", "--json")
     (curve,) = json.loads(run.stdout)["curves"]
     assert {"omega", "p", "multiplier"} <= curve.keys()
+    (upright,) = json.loads(run.stdout)["inverted"]
+    assert upright["stable_above"] == [True, False]
     assert curve["omega"] == 2.0
     refused = pendmap_command("tongues", "--theta-r", 0.1)
     assert refused.returncode == 2

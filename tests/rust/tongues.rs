@@ -2,14 +2,15 @@
 
 use pendmap::error::Error;
 use pendmap::maps::control::Control;
-use pendmap::maps::tongues::{Curve, tongues};
+use pendmap::maps::tongues::{Balance, Curve, tongues};
 use pendmap::model::Pendulum;
 
 use crate::support::driven;
 use crate::truths::{list, number, table, truths};
 
 fn at(pendulum: &Pendulum, omegas: &[f64], p_max: f64) -> Vec<Curve> {
-    tongues(pendulum, omegas, p_max, true, 0, &Control::default()).expect("curves")
+    tongues(pendulum, Balance::Hanging, omegas, p_max, true, 0, &Control::default())
+        .expect("curves")
 }
 
 #[test]
@@ -46,9 +47,29 @@ fn the_fold_below_a_subcritical_onset() {
 }
 
 #[test]
+fn inverted_rest_is_stable_between_the_known_amplitudes() {
+    // From the linear equation by scipy.
+    for (omega, low, high) in
+        [(6.0, 8.588664070320945, 18.02184869565419), (10.0, 14.204514822924187, 47.08697018214781)]
+    {
+        let control = Control::default();
+        let pendulum = driven(0.1, 1.0, omega);
+        let found = tongues(&pendulum, Balance::Inverted, &[omega], 60.0, true, 0, &control);
+        let curve = &found.expect("curves")[0];
+        assert!(!curve.stable_at_first && curve.fold.is_none());
+        let [first, second] = curve.critical[..2] else { panic!("two borders: {curve:?}") };
+        assert!((first.p - low).abs() < 1e-9 && first.stable == [false, true], "{first:?}");
+        assert!((second.p - high).abs() < 1e-9 && second.stable == [true, false], "{second:?}");
+        assert!(first.multiplier > 0.0 && second.multiplier < 0.0);
+    }
+}
+
+#[test]
 fn what_is_asked_for_wrongly_is_refused() {
     let control = Control::default();
-    let ask = |pendulum: &Pendulum, p_max: f64| tongues(pendulum, &[2.0], p_max, true, 0, &control);
+    let ask = |pendulum: &Pendulum, p_max: f64| {
+        tongues(pendulum, Balance::Hanging, &[2.0], p_max, true, 0, &control)
+    };
     let plain = driven(0.1, 1.0, 2.0);
     assert!(matches!(ask(&plain, 0.0), Err(Error::Range { name: "p_max", .. })));
     let rubbing = plain.clone().with_friction(0.1).expect("in range");

@@ -23,8 +23,9 @@ __all__ = ["command"]
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Compute the amplitude at which homoclinic tangles begin, by Melnikov's criterion.
 
-    First order, with Coulomb friction, torque and effects. Writes melnikov.nc, melnikov.png and
-    melnikov.rrd if no output is named. --json alone writes no file.
+    First order, with Coulomb friction and effects. A torque that keeps up a rotation tilts the
+    potential: the threshold is that of the loop of upright rest. Writes melnikov.nc, melnikov.png
+    and melnikov.rrd if no output is named. --json alone writes no file.
     """
     file = given["model"]
     model = model_from(given)
@@ -38,5 +39,5 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the JSON object of Melnikov's threshold; p_tangency is not computed yet."""
     a = dataset.attrs
-    names = ("units", "p_melnikov", "p_tangency", "p_forward", "p_backward")
+    names = ("units", "p_melnikov", "p_tangency", "p_forward", "p_backward", "p_loop")
     return {**{name: a[name] for name in names}, "summary": a["summary"].split("\n")}

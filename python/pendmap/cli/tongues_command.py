@@ -1,4 +1,4 @@
-"""``pendmap tongues``: critical curves of rest."""
+"""``pendmap tongues``: critical curves of rest, hanging and inverted."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ __all__ = ["command"]
 @progress_options
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
-    """Find where hanging rest loses its stability: critical curves of eq. 1.3, exact.
+    """Find where rest, hanging and inverted, is stable: critical curves of eq. 1.3, exact.
 
     Also without damping; folds of the oscillation born there; curves by perturbation beside. For
     files, frequencies are added where curves turn, end or bend; --json lists those asked for.
@@ -61,22 +61,25 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
 
     a = dataset.attrs
     omega = [float(w) for w in dataset["omega"].values]
-    curves, undamped = (
+    curves, undamped, inverted = (
         [
             {"omega": w, "p": [p for p, _ in row], "multiplier": [m for _, m in row]}
             for w, row in zip(omega, by_frequency(dataset, prefix, len(omega)), strict=True)
         ]
-        for prefix in ("", "undamped_")
+        for prefix in ("", "undamped_", "inverted_")
     )
-    stable = dataset["stable_above"].values
     asked = dataset["asked"].values.astype(bool)
+    for prefix, rest in (("", curves), ("inverted_", inverted)):
+        stable = dataset[f"{prefix}stable_above"].values
+        for k, curve in enumerate(rest):
+            mine = dataset[f"{prefix}index"].values == k
+            curve["stable_above"] = [bool(s) for s in stable[mine]]
     for k, curve in enumerate(curves):
-        mine = dataset["index"].values == k
-        curve["stable_above"] = [bool(s) for s in stable[mine]]
         curve["fold"] = float(dataset["fold"].values[k])
     return {
         "units": a["units"],
         "curves": [curve for curve, mine in zip(curves, asked, strict=True) if mine],
+        "inverted": [curve for curve, mine in zip(inverted, asked, strict=True) if mine],
         "undamped": [curve for curve, mine in zip(undamped, asked, strict=True) if mine],
         "asymptotic": {
             str(name): dataset["asymptotic"].values[k][asked].tolist()

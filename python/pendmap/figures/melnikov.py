@@ -11,6 +11,7 @@ from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
 from pendmap.pictures import layers as layering
+from pendmap.pictures.melnikov import highest
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,11 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["figure"]
 
 _LOOKS: dict[str, tuple[str, Any]] = {
+    "loop": (style.INK, "-"),
     "forward": ("#d55e00", "-"),
     "backward": ("#0072b2", (0, (5, 2))),
 }
-_HIGH = 12.0
-"""Largest threshold shown, in units of the least."""
 
 
 def figure(
@@ -41,20 +41,20 @@ def figure(
         raise InputError(f"colormap {colormap!r}: this figure has no colour map")
     a = dataset.attrs
     omega, p = dataset["omega"].values, dataset["p_melnikov"].values
-    known = p[np.isfinite(p)]
-    least = float(known.min()) if known.size else 1.0
     own = (float(a["own_omega"]), abs(float(a["own_p"])))
-    top = max(min(float(known.max()) if known.size else 1.0, _HIGH * least), 1.15 * own[1], 1e-3)
+    top = highest(dataset)
     x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
-    apart = np.abs(p[:, 0] - p[:, 1])
-    alike = bool(np.isfinite(apart).any()) and np.nanmax(apart) < 1e-9 * max(least, 1e-9)
-    there = [name for k, name in enumerate(_LOOKS) if np.isfinite(p[:, k]).any()]
-    branches = there[:1] if alike else there
+    at = {str(name): p[:, k] for k, name in enumerate(dataset["branch"].values)}
+    apart = np.abs(at["forward"] - at["backward"])
+    alike = bool(np.isfinite(apart).any()) and np.nanmax(apart) < 1e-9 * top
+    there = [name for name, values in at.items() if np.isfinite(values).any()]
+    looped = "loop" in at
+    branches = ["forward"] if alike and not looped else there
     handles, texts = [], []
     for name in branches:
         colour, look = _LOOKS[name]
         handles.append(Line2D([], [], color=colour, linestyle=look, linewidth=1.6))
-        texts.append("threshold, both branches" if alike else f"threshold, {name}")
+        texts.append(_said(name, looped=looped, alike=alike))
     handles.append(Line2D([], [], color=style.INK, marker="*", markersize=9, linestyle="none"))
     texts.append("this pendulum")
     sheet = Sheet(
@@ -71,11 +71,10 @@ def figure(
     axes = sheet.axes[0]
     for name in branches:
         colour, look = _LOOKS[name]
-        values = dataset["p_melnikov"].sel(branch=name).values
-        axes.plot(omega, values, color=colour, linestyle=look, linewidth=1.6)
-        axes.fill_between(omega, values, top, color=colour, alpha=0.10, linewidth=0)
+        axes.plot(omega, at[name], color=colour, linestyle=look, linewidth=1.6)
+        axes.fill_between(omega, at[name], top, color=colour, alpha=0.10, linewidth=0)
     axes.plot(*own, marker="*", color=style.INK, markersize=9, clip_on=False, zorder=4)
-    damped = np.nanmax(dataset["p_melnikov"].values, initial=0.0) > 0
+    damped = np.nanmax(at.get("loop", p), initial=0.0) > 0
     follows = "fractal boundaries of basins" if damped else "chaos; no basins without damping"
     axes.text(
         0.5,
@@ -92,3 +91,11 @@ def figure(
     axes.set_xlabel("\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0")
     axes.set_ylabel("p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g")
     return sheet.figure
+
+
+def _said(name: str, *, looped: bool, alike: bool) -> str:
+    if name == "loop":
+        return "homoclinic, loop of upright rest"
+    if looped:
+        return f"heteroclinic, {name}"
+    return "threshold, both branches" if alike else f"threshold, {name}"

@@ -1,4 +1,4 @@
-"""The figure of critical curves: stable regions, boundaries, folds, asymptotic curves."""
+"""The figure of critical curves: where rest is stable, boundaries, folds, asymptotic curves."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
-_STABLE = "#e3ecd8"
+_STABLE, _INVERTED = "#e3ecd8", "#9a6fb0"
 _FOLD = "#009e73"
 _LOOKS: tuple[Any, ...] = ("-.", "--", ":")
 
@@ -37,7 +37,7 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
     size: tuple[float, float] | None,
     dpi: float,
     colormap: str | None,
-    title: str = "Where hanging rest is stable",
+    title: str = "Where rest is stable, hanging and inverted",
     marks: Sequence[tuple[float, float, str]] = (),
 ) -> Figure:
     """Return the figure of critical curves; see :func:`pendmap.figures.draw`.
@@ -66,12 +66,16 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
     # Edges of the same colour: without them a seam shows between neighbours.
     areas = PolyCollection(chart.stable, facecolors=_STABLE, edgecolors=_STABLE, linewidths=0.3)
     axes.add_collection(areas)
+    # A hatch shows what lies below it, and no seams.
+    upright = PolyCollection(
+        chart.inverted, facecolors="none", edgecolors=_INVERTED, hatch="////", linewidths=0
+    )
+    axes.add_collection(upright)
     axes.add_collection(LineCollection(chart.undamped, colors=style.QUIET, linewidths=0.6))
     for multiplier, colour in drawn.COLOURS.items():
         thick = 1.5 if multiplier < 0 else 1.1
-        axes.add_collection(
-            LineCollection(chart.lines[multiplier], colors=colour, linewidths=thick)
-        )
+        both = [*chart.lines[multiplier], *chart.inverted_lines[multiplier]]
+        axes.add_collection(LineCollection(both, colors=colour, linewidths=thick))
     for look, (near, far) in zip(_LOOKS, chart.asymptotic.values(), strict=True):
         axes.plot(near[:, 0], near[:, 1], linestyle=look, color=style.INK, linewidth=1.0)
         axes.plot(far[:, 0], far[:, 1], linestyle=look, color=style.INK, linewidth=0.5, alpha=0.45)
@@ -103,13 +107,16 @@ def _ends_in_view(chart: drawn.Chart) -> bool:
 
 def _legend(chart: drawn.Chart, *, own: bool, damped: bool) -> tuple[list[Any], list[str]]:
     entries: list[tuple[Any, str]] = [
-        (Patch(facecolor=_STABLE, edgecolor=style.QUIET, linewidth=0.4), "rest is stable"),
+        (Patch(facecolor=_STABLE, edgecolor=style.QUIET, linewidth=0.4), "hanging rest is stable"),
         (
             Line2D([], [], color=drawn.COLOURS[-1], linewidth=1.5),
             "exact, multiplier \N{MINUS SIGN}1 (period 2)",
         ),
         (Line2D([], [], color=drawn.COLOURS[1], linewidth=1.1), "exact, multiplier +1 (period 1)"),
     ]
+    if chart.inverted:
+        hatched = Patch(facecolor="none", edgecolor=_INVERTED, hatch="////", linewidth=0)
+        entries.insert(1, (hatched, "inverted rest is stable"))
     if damped:
         bare = Line2D([], [], color=style.QUIET, linewidth=0.6)
         entries.append((bare, "exact, without damping"))

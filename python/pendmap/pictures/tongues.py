@@ -59,7 +59,9 @@ class Chart:
     undamped : list of ndarray
         Those without damping.
     stable : list of ndarray, shape (m, 2)
-        Polygons in which rest is stable.
+        Polygons in which hanging rest is stable.
+    inverted_lines, inverted : dict, list of ndarray
+        Lines and polygons of inverted rest.
     beyond : ndarray, shape (m, 2)
         The edge of what was computed.
     fold : ndarray, shape (m, 2)
@@ -76,6 +78,8 @@ class Chart:
     lines: dict[int, list[Floats]]
     undamped: list[Floats]
     stable: list[Floats]
+    inverted_lines: dict[int, list[Floats]]
+    inverted: list[Floats]
     beyond: Floats
     fold: Floats
     asymptotic: dict[str, tuple[Floats, Floats]]
@@ -105,9 +109,10 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
     bare = by_frequency(dataset, "undamped_", omega.size)
     lines = {m: [to(line) for line in joined(omega, damped, m)] for m in COLOURS}
     undamped = [to(_tipped(line, m, omega)) for m in COLOURS for line in joined(omega, bare, m)]
-    flags = dataset["stable_above"].values
     first = dataset["stable_at_first"].values
-    stable = [to(area) for area in _stable(omega, dataset, flags, first, p_max)]
+    stable = [to(area) for area in _stable(omega, dataset, "", first, p_max)]
+    upright = by_frequency(dataset, "inverted_", omega.size)
+    inverted = _stable(omega, dataset, "inverted_", np.zeros_like(first), p_max)
     error = dataset["asymptotic_error"].values
     asymptotic = {}
     for k, name in enumerate(dataset["curve"].values):
@@ -125,6 +130,8 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
         lines,
         undamped,
         stable,
+        {m: [to(line) for line in joined(omega, upright, m)] for m in COLOURS},
+        [to(area) for area in inverted],
         edge,
         to(np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0]),
         asymptotic,
@@ -229,7 +236,7 @@ def _ahead(line: list[tuple[float, float]], w: float) -> float:
 def _stable(
     omega: Floats,
     dataset: xr.Dataset,
-    above: npt.NDArray[np.int8],
+    prefix: str,
     first: npt.NDArray[np.int8],
     p_max: float,
 ) -> list[Floats]:
@@ -238,12 +245,13 @@ def _stable(
     Between the same curves strips follow one another in their order, however steep they are; where
     a curve begins or ends, those that overlap.
     """
-    index, p = dataset["index"].values, dataset["p"].values
+    names = (f"{prefix}{name}" for name in ("index", "p", "multiplier", "stable_above"))
+    index, p, multiplier, above = (dataset[name].values for name in names)
     intervals: list[list[tuple[float, float]]] = []
     curves: list[tuple[int, ...]] = []
     for k in range(omega.size):
         mine = index == k
-        curves.append(tuple(dataset["multiplier"].values[mine]))
+        curves.append(tuple(multiplier[mine]))
         edges = [0.0, *p[mine], p_max]
         is_stable = [int(first[k]), *above[mine]]
         pairs = zip(edges[:-1], edges[1:], is_stable, strict=True)

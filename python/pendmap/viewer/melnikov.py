@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pendmap.pictures.melnikov import highest
 from pendmap.viewer import frame
 from pendmap.viewer.panel import Panel
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["blueprint", "log"]
 
-_COLOURS = {"forward": (213, 94, 0), "backward": (0, 114, 178)}
+_COLOURS = {"loop": (40, 40, 40), "forward": (213, 94, 0), "backward": (0, 114, 178)}
 _OWN = (204, 121, 167)
 
 
@@ -28,14 +29,15 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
 
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log the threshold of both branches and the pendulum's point."""
+    """Log the threshold of each branch and the pendulum's point."""
     frame.summary(stream, dataset)
     panel = _panel(dataset)
     panel.log(stream, "melnikov")
     omega = dataset["omega"].values
-    for name, colour in _COLOURS.items():
+    for name in dataset["branch"].values:
+        colour = _COLOURS[str(name)]
         curve = np.stack([omega, dataset["p_melnikov"].sel(branch=name).values], axis=-1)
-        panel.strips(stream, f"melnikov/data/{name}", [curve], colour, 1.6)
+        panel.strips(stream, f"melnikov/data/{name}", panel.within([curve]), colour, 1.6)
     own = [float(dataset.attrs["own_omega"]), abs(float(dataset.attrs["own_p"]))]
     points = rr.Points2D([own], colors=[_OWN], radii=rr.Radius.ui_points(5.0))
     stream.log("melnikov/data/own", points, static=True)
@@ -43,6 +45,4 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 def _panel(dataset: xr.Dataset) -> Panel:
     x = np.append(dataset["omega"].values, float(dataset.attrs["own_omega"]))
-    values = dataset["p_melnikov"].values.ravel()
-    y = np.concatenate([values, [0.0, abs(float(dataset.attrs["own_p"]))]])
-    return Panel.holding(x, y, "omega", "p")
+    return Panel.holding(x, np.array([0.0, highest(dataset)]), "omega", "p")

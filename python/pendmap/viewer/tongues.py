@@ -20,6 +20,7 @@ __all__ = ["blueprint", "log"]
 
 _ROOTS = {"omega-p": ("tongues", "Frequency and amplitude"), "e-alpha2": ("paper", "Eq. 1.4")}
 _CURVES = {1: ("plus", (213, 94, 0)), -1: ("minus", (0, 114, 178))}
+_INVERTED = {1: (230, 159, 0), -1: (86, 180, 233)}
 _FOLD, _BARE, _OWN = (0, 158, 115), (150, 150, 150), (204, 121, 167)
 
 
@@ -46,13 +47,18 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
         for multiplier, (name, colour) in _CURVES.items():
             lines = panel.within(chart.lines[multiplier])
             panel.strips(stream, f"{root}/data/{name}", lines, colour, 1.5)
+            upright = panel.within(chart.inverted_lines[multiplier])
+            panel.strips(
+                stream, f"{root}/data/inverted_{name}", upright, _INVERTED[multiplier], 1.5
+            )
         panel.strips(stream, f"{root}/data/fold", panel.within([chart.fold]), _FOLD, 1.5)
         own = np.array([chart.own], dtype=np.float32)
         points = rr.Points2D(own, colors=[_OWN], radii=rr.Radius.ui_points(5.0))
         stream.log(f"{root}/data/own", points, static=True)
     legend = [
-        "- blue: multiplier -1, an oscillation of period 2 is born",
+        "- blue: multiplier -1 of hanging rest, an oscillation of period 2 is born",
         "- vermillion: multiplier +1, one of period 1",
+        "- sky blue and orange: the same of inverted rest, stable from orange up to sky blue",
         "- green: its fold, where it is born toward smaller p",
         "- grey: without damping",
         "- purple: this pendulum",
