@@ -95,7 +95,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     -------
     xarray.Dataset
         Over ``critical``, a critical amplitude each: ``index`` of its frequency, ``p``,
-        ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above). Over
+        ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above) and
+        ``critical_omega``, its frequency. Over
         ``omega``: ``asked`` (0 where the frequency was added), ``stable_at_first`` (below the
         first), ``fold`` (nan where none) and the point ``fold_theta``, ``fold_velocity`` of the
         oscillation there, ``fold_sought`` (0 where the frequency was added and no fold ends). The
@@ -156,6 +157,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     variables: dict[str, Any] = {
         **_columns(found, "critical", ""),
         **_columns(undamped, "undamped", "undamped_"),
+        **{
+            f"{table}_omega": (table, np.repeat(frequencies, [len(row["p"]) for row in rows]))
+            for table, rows in (("critical", found), ("undamped", undamped))
+        },
         "asked": ("omega", np.isin(frequencies, asked).astype(np.int8)),
         "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
         "fold_sought": ("omega", looked.astype(np.int8)),

@@ -80,7 +80,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     xarray.Dataset
         Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
         ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
-        ``entry_branch``; branches over ``branch``: ``branch_kind``, ``branch_w``,
+        ``entry_value`` and ``entry_branch``; branches over ``branch``: ``branch_kind``, ``branch_w``,
         ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the entry that
         the sweep is on, -1 where that is none of them; its points there over ``loose``.
 
@@ -158,6 +158,7 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
     }
     data: dict[str, Any] = {
         **entries(raw, which, units),
+        "entry_value": ("entry", value, axis.attributes),
         "entry_branch": ("entry", found.of_entry),
         "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
         "branch_w": ("branch", raw["w"][ends[:, 0]]),
@@ -180,8 +181,9 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
         "loose_velocity": ("loose", units.given(loose["velocity"], VELOCITY), speed),
     }
     coordinates = {
-        axis.name: (axis.name, axis.values, axis.attributes),
+        **axis.coordinates,
         "kind": ("kind", np.array(kinds, dtype=str)),
+        "entry": ("entry", np.arange(which.size)),
     }
     return xr.Dataset(data, coords=coordinates)
 

@@ -201,8 +201,13 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
         "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
         **entries(raw, which, units),
     }
-    coordinates = {axis.name: (axis.name, axis.values, axis.attributes) for axis in (columns, rows)}
-    return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
+    coordinates = {
+        **columns.coordinates,
+        **rows.coordinates,
+        "kind": ("kind", np.array(kinds, dtype=str)),
+        "set": ("set", np.arange(len(sets))),
+    }
+    return xr.Dataset(data, coords=coordinates)
 
 
 def _curves(model: Pendulum | Rig, *axes: Varied) -> dict[str, Any]:
@@ -247,7 +252,7 @@ def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[s
     rate = {"units": units.of_rate}
     speed = {"units": units.of_velocity}
     return {
-        "entry_cell": ("entry", raw["cell"]),
+        "entry_cell": ("entry", raw["cell"], {"comment": "of the whole result, row by row"}),
         "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
         "entry_n": ("entry", raw["n"], {"comment": "0: no meaning"}),
         "entry_w": ("entry", raw["w"]),

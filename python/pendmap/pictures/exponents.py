@@ -16,7 +16,7 @@ from pendmap.words import written
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["sliding", "title", "value"]
+__all__ = ["elapsed", "sliding", "title", "value"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -47,6 +47,12 @@ def value(dataset: xr.Dataset) -> str:
     return f"\N{GREEK SMALL LETTER LAMDA} = {said} {per}"
 
 
+def elapsed(dataset: xr.Dataset) -> tuple[float, float]:
+    """Return the first and the last period of a curve, one apart at least."""
+    periods = dataset["elapsed"].values
+    return float(periods[0]), float(max(periods[-1], periods[0] + 1))
+
+
 def sliding(dataset: xr.Dataset) -> tuple[Floats, Floats]:
     """Return where windows end along the start's own trajectory, and their exponents.
 
@@ -56,10 +62,10 @@ def sliding(dataset: xr.Dataset) -> tuple[Floats, Floats]:
         Of ``window`` periods each; of fewer where the trajectory is shorter.
     """
     a = dataset.attrs
-    growth = dataset["growth"].values
-    width = min(int(a["window"]), growth.size - 1)
-    gained = growth[width:] - growth[:-width]
-    return (
-        dataset["elapsed"].values[width:].astype(float),
-        gained / (width * float(a["forcing_period"])),
-    )
+    growth, elapsed = dataset["growth"].values, dataset["elapsed"].values
+    width = min(int(a["window"]), int(elapsed[-1] - elapsed[0]))
+    # Of a selection only those periods have an exponent that begin at one that is there too.
+    begin = np.searchsorted(elapsed, elapsed - width)
+    whole = (elapsed[begin] == elapsed - width) & (width > 0)
+    gained = growth[whole] - growth[begin[whole]]
+    return elapsed[whole].astype(float), gained / (max(width, 1) * float(a["forcing_period"]))
