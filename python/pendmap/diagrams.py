@@ -80,9 +80,9 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     xarray.Dataset
         Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
         ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
-        ``entry_value`` and ``entry_branch``; branches over ``branch``: ``branch_kind``, ``branch_w``,
-        ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the entry that
-        the sweep is on, -1 where that is none of them; its points there over ``loose``.
+        ``entry_value`` and ``entry_branch``; branches over ``branch``: ``branch_kind``,
+        ``branch_w``, ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the
+        entry that the sweep is on, -1 where that is none of them; its points there over ``loose``.
 
     Raises
     ------

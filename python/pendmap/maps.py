@@ -85,9 +85,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         attractors over ``attractor``, their stroboscopic points over ``point``; parameters, shares
         and the error reached as attributes. The bounds of the cells are the coordinates
         ``theta_bounds`` and ``velocity_bounds``. A selection of cells keeps shares, attributes and
-        summary of the whole map; figures and recordings of it count its own cells. ``fraction`` is the basin stability of an attractor in
-        this window (Menck et al. 2013, Nature Physics 9, 89), ``stderr`` its standard error as if
-        the starts were drawn at random, more than that of a grid. ``basin_entropy``,
+        summary of the whole map; figures and recordings of it count its own cells. ``fraction`` is
+        the basin stability of an attractor in this window (Menck et al. 2013, Nature Physics 9,
+        89), ``stderr`` its standard error as if the starts were drawn at random, more than that of
+        a grid. ``basin_entropy``,
         ``boundary_basin_entropy`` and ``uncertainty_exponent`` say how the basins are interwoven:
         see :func:`pendmap.basin_entropy` and :func:`pendmap.uncertainty_exponent`; the counts
         behind the exponent, from 10,000 cells on, are ``uncertain`` of ``uncertainty_tried``

@@ -276,7 +276,12 @@ def undecided(attributes: Mapping[str, Any]) -> list[str]:
 def _summary(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     count = dataset.sizes["set"]
-    lines = [f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."]
+    spans = [
+        f"{name} = {dataset[name].values[0]:g} to {dataset[name].values[-1]:g}"
+        for name in (a["columns"], a["rows"])
+    ]
+    said = f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."
+    lines = [f"{', '.join(spans)}: {said}"]
     for k in range(min(count, _LISTED)):
         kinds = json.loads(str(dataset["regime_kinds"].values[k]))
         lines.append(f"{100 * float(dataset['regime_share'][k]):.3g} %: {', '.join(kinds)}.")

@@ -61,6 +61,8 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
             bound = bound.split(";")[0] if unlimited else bound  # no bound helps
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     a = dataset.attrs
+    if "theta" in dataset.dims:
+        lines.insert(0, _window(dataset))
     if plane != "conservative":
         lines += unlimited
     lines += of_motion(pendulum.effects, "this map is")
@@ -123,6 +125,16 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
     alone = dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]"
     still: xr.DataArray = hangs & (dataset[f"{of}velocity"] == 0) & alone
     return still
+
+
+def _window(dataset: xr.Dataset) -> str:
+    """Say which starts the numbers are of: a selection of the map keeps them."""
+    said = []
+    for name in ("theta", "velocity"):
+        low, high = dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]
+        unit = str(dataset[name].attrs["units"]).removeprefix("1")
+        said.append(f"{name} = {low:.6g} to {high:.6g} {unit}".rstrip())
+    return f"{', '.join(said)}: {counted(dataset.attrs['cells'], 'start')}."
 
 
 def _conservative(dataset: xr.Dataset) -> str:

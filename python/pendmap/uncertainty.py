@@ -148,7 +148,7 @@ def uncertainty_exponent(
     ------
     InputError
         If these are no labels of a plane; if there is no boundary, or too few distances; of a
-        dataset without counts (no basins, or ``check=False``).
+        dataset without counts (no basins, or ``check=False``) or of a part of a map.
 
     References
     ----------
@@ -286,6 +286,11 @@ def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
             "this dataset has no counts of uncertain starts: allowed are maps of pendmap.basins "
             "of 10,000 cells or more whose labels tell basins apart, made with check=True; or "
             "dataset['label']"
+        )
+    if dataset["label"].size != dataset.attrs["cells"]:
+        raise InputError(
+            "this is a part of a map, and the counts of uncertain starts are of the whole: allowed "
+            "are the whole map, or labels on a grid, dataset['label']"
         )
     found = fitted_map(dataset)
     if found is None:

@@ -30,7 +30,6 @@ from pendmap.figures.of_records import (
     write_report,
 )
 from pendmap.figures.written import SUFFIXES, written
-from pendmap.pictures.layers import refuse_lists
 from pendmap.pictures.selection import shown
 
 if TYPE_CHECKING:
@@ -138,7 +137,6 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         raise InputError(
             f"cannot draw a dataset of kind {kind!r}; kinds that can be drawn: {known}"
         )
-    refuse_lists(dataset)
     dataset = shown(dataset)
     return written(
         path,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.model import Effect
+from pendmap.model import effects_of
 from pendmap.model.rig import COUNTERPARTS
 from pendmap.model.units import Units
 from pendmap.pictures import names
@@ -26,7 +25,6 @@ __all__ = [
     "layers",
     "named",
     "parameters",
-    "refuse_lists",
     "reliable",
     "settles",
     "symbol",
@@ -72,18 +70,6 @@ def reliable(dataset: xr.Dataset) -> bool:
 def finite_time(dataset: xr.Dataset) -> bool:
     """Whether labels tell nothing: one chaotic attractor takes every start, or nothing attracts."""
     return bool(dataset.attrs.get("layers") == "finite_time")
-
-
-def refuse_lists(dataset: xr.Dataset) -> None:
-    """Refuse what ``pendmap.basins_of`` returns: a list of starts is no map.
-
-    Raises
-    ------
-    InputError
-        If the dataset has no grid.
-    """
-    if dataset.attrs.get("kind") == "basins" and "theta" not in dataset.dims:
-        raise InputError("a list of starts is no map: only basins on a grid can be drawn")
 
 
 def settles(dataset: xr.Dataset) -> bool:
@@ -216,7 +202,6 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
         for key, (symbol, unit) in symbols.items()
         if key in attrs and key not in never and (key in always or float(attrs[key]) != 0.0)
     ]
-    effects = json.loads(attrs.get("effects", "[]"))
-    acting = [Effect(entry["name"], entry["parameters"]).title(units, without) for entry in effects]
+    acting = [effect.title(units, without) for effect in effects_of(attrs)]
     said = ",  ".join(text.replace("_", " ").replace("-", "\N{MINUS SIGN}") for text in acting)
     return ";   ".join([",  ".join(parts), *([said] if said else [])])

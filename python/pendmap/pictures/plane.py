@@ -106,7 +106,8 @@ def _cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
     narrowest = max(float(widths.min()), _FINE * whole / limit)
     shown = min(limit, math.ceil(_FINE * whole / narrowest))
     centres = bounds[0] + (np.arange(shown) + 0.5) * (whole / shown)
-    return np.clip(np.searchsorted(bounds, centres, side="right") - 1, 0, count - 1)
+    inside: npt.NDArray[np.intp] = np.searchsorted(bounds[1:-1], centres, side="right")
+    return inside
 
 
 def copies(points: Floats, low: float, high: float) -> Floats:

@@ -231,8 +231,9 @@ def named(dataset: xr.Dataset, name: str) -> str:
 
 def layer(dataset: xr.Dataset, name: str, limit: int) -> npt.NDArray[np.float64]:
     """Return the image of a layer that is no picture of kinds, as of :func:`plane.pixels`."""
-    own = dataset["share"].sel(kind=name[len("share ") :]) if name[:6] == "share " else dataset[name]
-    return np.asarray(plane.pixels(dataset, own, limit), dtype=np.float64)
+    of_kind = name.removeprefix("share ")
+    values = dataset[name] if of_kind == name else dataset["share"].sel(kind=of_kind)
+    return np.asarray(plane.pixels(dataset, values, limit), dtype=np.float64)
 
 
 def said(dataset: xr.Dataset, name: str) -> str:

@@ -49,10 +49,12 @@ def shown(dataset: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     InputError
-        If an axis has no values or only one without a range, or a table that others refer to is
-        not whole.
+        If it is a list of starts, an axis has no values or only one without a range, or a table
+        that others refer to is not whole.
     """
     kind = str(dataset.attrs["kind"])
+    if kind == "basins" and "theta" not in dataset.coords:
+        raise InputError("a list of starts is no map: only basins on a grid can be drawn")
     axes = _axes(dataset)
     for name in axes:
         if name not in dataset.dims:
@@ -87,9 +89,7 @@ def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
 def _rising(dataset: xr.Dataset, keys: tuple[str, ...]) -> xr.Dataset:
     """Return a dataset whose coordinates of numbers, and those of kinds, rise."""
     numbers = [
-        name
-        for name in dataset.indexes
-        if name == "kind" or dataset[name].dtype.kind in "iuf"
+        name for name in dataset.indexes if name == "kind" or dataset[name].dtype.kind in "iuf"
     ]
     for name in [*numbers, *(key for key in keys if key in dataset)]:
         values = dataset[name].values
@@ -181,9 +181,7 @@ def _tongues(dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
-def _places(
-    dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]
-) -> npt.NDArray[np.intp]:
+def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
     """Return where the rows of a table with these numbers stand; -1 of -1, which is none."""
     own = dataset[table].values
     place = np.searchsorted(own, numbers)

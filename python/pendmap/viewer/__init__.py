@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
 from pendmap.files import whole_file
-from pendmap.pictures.layers import refuse_lists
 from pendmap.pictures.selection import shown
 from pendmap.viewer import (
     basins,
@@ -121,7 +120,6 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     if kind not in _KINDS:
         known = ", ".join(_KINDS)
         raise InputError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
-    refuse_lists(dataset)
     dataset = shown(dataset)
     layout, log = _KINDS[kind]
     with whole_file(path, SUFFIXES) as part, frame.strict():

@@ -140,7 +140,9 @@ def _settle(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame
 
 def _exponent(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
     """Log the finite-time exponent."""
-    values = plane.pixels(dataset, dataset["finite_time_exponent"], CELLS).astype(np.float32, copy=False)
+    values = plane.pixels(dataset, dataset["finite_time_exponent"], CELLS).astype(
+        np.float32, copy=False
+    )
     absent = ~np.isfinite(values)
     sample = plane.pixels(dataset, dataset["finite_time_exponent"], SAMPLE)
     known = sample[np.isfinite(sample)]
