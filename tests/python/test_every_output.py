@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import pendmap
-from pendmap import cli, figures, viewer
+from pendmap import cli, figures
 from pendmap.figures import style
 from pendmap.model import effects_of
 
@@ -20,12 +20,11 @@ MODELS = {
     "plain": "gamma = 0.1\np = 0.6\nomega = 2.0\n",
     "effects of the library": """gamma = 0.1\np = 0.6\nomega = 2.0
 [[effect]]\nname = "quadratic_drag"\nparameters = { q = 0.02 }
-[[effect]]\nname = "drive_second_harmonic"\nparameters = { e = 0.05, ph = 0.3 }
+[[effect]]\nname = "drive_second_harmonic"\nparameters = { e = 0.05, phase = 0.3 }
 """,
     "a formula": """gamma = 0.05\np = 0.6\nomega = 2.0
-[[formula]]\nname = "root_drag"\nterm = "-k*sqrt(abs(v))*sign(v)"
-parameters = { k = { power = 1.5 } }
-[[effect]]\nname = "root_drag"\nparameters = { k = 0.02 }
+[[formula]]\nname = "own_drag"\nterm = "-q*v*abs(v)"\nparameters = { q = 0 }
+[[effect]]\nname = "own_drag"\nparameters = { q = 0.02 }
 """,
     "a rig in SI": """w0 = 6.2\nc_over_m = 0.6\nstroke_mm = 20\nfrequency_hz = 1.9
 [[formula]]\nname = "own_power"\nterm = "-q*abs(v)^n*sign(v)"
@@ -43,16 +42,18 @@ COMMANDS = {
     "basins": ("--grid", "6", "--max-periods", "300"),
     "map": ("--vary", "gamma", "0.3:0.6:3", "--p", "0.3:0.6:2", "--starts", "2"),
     "bifurcation": ("--vary", "p", "0.3:0.6:4", "--starts", "2"),
-    "orbit": ("--grid", "12"),
+    "orbit": ("--grid", "5"),
     "lyapunov": ("--max-periods", "300"),
     "lifetime": ("--starts", "100", "--max-periods", "300"),
     "tongues": ("--omega", "1.5:2.5:4", "--p-max", "2"),
-    "melnikov": ("--omega", "1:2:3"),
+    "melnikov": ("--omega", "1.5"),
 }
 REFUSED = {
-    ("a direct drive", "tongues"): "tongues",
+    ("Coulomb friction", "tongues"): "friction holds it whatever the drive",
+    ("a direct drive", "tongues"): "a sideways drive moves it",
+    ("a direct drive", "melnikov"): "not proportional to p",
 }
-"""What has no meaning: rest is no solution, or nothing is there to be expanded in."""
+"""What has no meaning, and why."""
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -75,13 +76,14 @@ def test_every_output_of_every_command_takes_every_model(
         cli.run()
     out, err = capsys.readouterr()
     there = {path.name for path in tmp_path.iterdir()} - {"model.toml"}
-    if end.value.code:
-        assert (end.value.code, len(err.splitlines()), there) == (2, 1, set()), err
-        pytest.fail(f"{model} {command}: {err}")
+    if (model, command) in REFUSED:
+        assert (end.value.code, len(err.splitlines()), there) == (2, 1, set())
+        assert REFUSED[model, command] in err
+        return
+    assert not end.value.code, err
     assert there == {"a.nc", "a.png", "a.rrd"}
     assert json.loads(out)
     result = pendmap.load(tmp_path / "a.nc")
     known = pendmap.load_model(tmp_path / "model.toml")
     assert effects_of(result.attrs) == known.effects
     figures.draw(result, tmp_path / "again.png")
-    viewer.record(result, tmp_path / "again.rrd")
