@@ -207,6 +207,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["Nothing attracts, as far as was seen."]
     lines += undecided(a)
+    where = dataset["undecided"].values > 0
+    if where.any():
+        lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")
     lines.append(
         f"{counted(a['starts'], 'start')} a value; {counted(a['points'], 'point')}; error after 5 "
         f"periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from scipy.ndimage import find_objects, label
 
 from pendmap import _core, checks
 from pendmap.cell_search import STARTS, CellSearch
@@ -31,9 +32,12 @@ if TYPE_CHECKING:
     from pendmap.model.units import Units
     from pendmap.varied import Varied
 
-__all__ = ["entries", "parameter_map", "undecided"]
+__all__ = ["entries", "parameter_map", "undecided", "undecided_cells"]
 
 _LISTED = 10
+_PLACES = 3
+"""Groups of cells with undecided starts that a summary names."""
+
 _FREQUENCIES = 81
 
 
@@ -273,6 +277,34 @@ def undecided(attributes: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return where a result has undecided starts: groups of cells that touch, the largest first.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A map over two parameters, or a bifurcation diagram.
+
+    Returns
+    -------
+    list of dict
+        ``ranges``, the first and the last value of each parameter, by its name; ``cells``, how
+        many have undecided starts; ``undecided``, their share of the starts of these.
+    """
+    share = dataset["undecided"]
+    groups, _ = label(share.values > 0, structure=np.ones((3,) * share.ndim))
+    found = []
+    for number, box in enumerate(find_objects(groups), 1):
+        mine = groups == number
+        ranges = {
+            str(name): (float(dataset[name].values[part][0]), float(dataset[name].values[part][-1]))
+            for name, part in zip(reversed(share.dims), reversed(box), strict=True)
+        }
+        part = float(share.values[mine].mean())
+        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": part})
+    return sorted(found, key=lambda one: -one["cells"])
+
+
 def _summary(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     count = dataset.sizes["set"]
@@ -289,6 +321,15 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
     lines += undecided(a)
+    places = undecided_cells(dataset)
+    if places:
+        listed = "; ".join(
+            ", ".join(f"{name} = {low:.4g} to {high:.4g}" for name, (low, high) in one["ranges"])
+            + f" ({counted(one['cells'], 'cell')})"
+            for one in ({**p, "ranges": list(p["ranges"].items())} for p in places[:_PLACES])
+        )
+        more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
+        lines.append(f"Cells with undecided starts: {listed}{more}.")
     lines.append(
         f"{counted(a['starts'], 'start')} a cell; {counted(a['searched_again'], 'cell')} searched "
         f"again for what a neighbour has; error after 5 periods {a['reached_error']:.2g}; "

@@ -21,6 +21,8 @@ FORMAT_VERSION: Final = 1
 """Version of the layout of the datasets, in their attribute ``format_version``."""
 SUFFIXES: Final = (".nc", ".zarr")
 """The kinds of file a result is stored in."""
+_NEEDED: Final = ("kind", "format_version")
+"""Attributes by which a dataset is known as a result."""
 _LARGE: Final = 4096
 
 
@@ -50,8 +52,8 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
         raise InputError(
-            f"{target}: what shall be saved is not a result of pendmap: allowed are the datasets "
-            "that basins, basins_of and simulate return"
+            f"{target}: what shall be saved is not a result of pendmap: allowed are datasets of "
+            f"pendmap that have the attributes {' and '.join(_NEEDED)}"
         )
     if target.suffix.lower() == ".zarr":
         return _save_zarr(dataset, target)
@@ -61,7 +63,7 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def _is_result(dataset: xr.Dataset) -> bool:
-    return {"format_version", "kind"} <= set(dataset.attrs)
+    return set(_NEEDED) <= set(dataset.attrs)
 
 
 def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:

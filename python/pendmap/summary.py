@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.model.units import TIME, Units
-from pendmap.words import counted, written
+from pendmap.words import counted, with_error, written
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -150,7 +150,7 @@ def _only_chaos(dataset: xr.Dataset) -> str:
     name = str(dataset["attractor"].values[0])
     exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
     return (
-        f"One chaotic attractor takes everything: {name}, exponent {exponent:.4f} +- {error:.4f} "
+        f"One chaotic attractor takes everything: {name}, exponent {with_error(exponent, error)} "
         f"{Units.of(a).per_time}; nothing captured a sampled trajectory within "
         f"{a['chaos_bound']} periods.\n"
         "Labels tell nothing here: net turns and the finite-time exponent after "
@@ -164,11 +164,13 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
     units = Units.of(dataset.attrs)
     unit = f" {units.of_rate}" if units.si else ""
     for k, name in enumerate(names):
-        row = {key: dataset[key].values[k] for key in ("fraction", "stderr", "twin", "exponent")}
+        keys = ("fraction", "stderr", "twin", "exponent", "exponent_stderr")
+        row = {key: dataset[key].values[k] for key in keys}
         twin = int(row["twin"])
         mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
         held = not math.isfinite(row["exponent"])
-        rate = "held by friction" if held else f"exponent {row['exponent']:.4f}{unit}"
+        value = with_error(row["exponent"], row["exponent_stderr"])
+        rate = "held by friction" if held else f"exponent {value}{unit}"
         lines.append(
             f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
             f"{rate}{mirror}."

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.pictures.legend import typeset
-from pendmap.words import written
+from pendmap.words import with_error
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,8 +40,7 @@ def value(dataset: xr.Dataset) -> str:
     exponent, error = float(a["exponent"]), float(a["stderr"])
     if not math.isfinite(exponent):
         return ""
-    said = f"{exponent:.2g}" if math.isnan(error) else written(exponent, error)
-    said += f" \N{PLUS-MINUS SIGN} {written(error, error)}" if error > 0 else ""
+    said = with_error(exponent, error, "\N{PLUS-MINUS SIGN}")
     said = said.replace("-", "\N{MINUS SIGN}")
     per = names.per_time(Units.of(a))
     return f"\N{GREEK SMALL LETTER LAMDA} = {said} {per}"

@@ -12,7 +12,7 @@ from pendmap.model import effects_of
 from pendmap.model.rig import COUNTERPARTS
 from pendmap.model.units import Units
 from pendmap.pictures import names
-from pendmap.words import counted
+from pendmap.words import counted, with_error
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -110,8 +110,7 @@ def exponents(dataset: xr.Dataset) -> str:
     errors = dataset["exponent_stderr"].values[chaotic] if "exponent_stderr" in dataset else without
     known = [x for x in values if math.isfinite(x)]
     if len(known) == len(errors) == 1 and math.isfinite(errors[0]):
-        digits = max(0, 1 - math.floor(math.log10(max(errors[0], 1e-9))))
-        listed = f"{known[0]:.{digits}f} \N{PLUS-MINUS SIGN} {errors[0]:.{digits}f}"
+        listed = with_error(known[0], errors[0], "\N{PLUS-MINUS SIGN}")
     else:
         listed = ", ".join(f"{x:.3g}" for x in known)
     return f"largest exponent {listed} {names.per_time(Units.of(dataset.attrs))}" if known else ""
