@@ -61,7 +61,8 @@ def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
     clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
     mean = with_error(a["mean_periods"], a["stderr"])
     said = (
-        f"Transient chaos lives for {mean} periods on average ({clock}): the tail of {counted(a['tail_captured'], 'capture')} after period "
+        f"Transient chaos lives for {mean} periods on average ({clock}): the tail of "
+        f"{counted(a['tail_captured'], 'capture')} after period "
         f"{a['from_period']}."
     )
     lines = [said]

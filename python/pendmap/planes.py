@@ -305,6 +305,15 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return sorted(found, key=lambda one: -one["cells"])
 
 
+def _said(place: dict[str, Any]) -> str:
+    """Say where a group of cells is, and of how many."""
+    spans = [
+        f"{name} = {low:.4g}" + (f" to {high:.4g}" if high > low else "")
+        for name, (low, high) in place["ranges"].items()
+    ]
+    return f"{', '.join(spans)} ({counted(place['cells'], 'cell')})"
+
+
 def _summary(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     count = dataset.sizes["set"]
@@ -323,11 +332,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     lines += undecided(a)
     places = undecided_cells(dataset)
     if places:
-        listed = "; ".join(
-            ", ".join(f"{name} = {low:.4g} to {high:.4g}" for name, (low, high) in one["ranges"])
-            + f" ({counted(one['cells'], 'cell')})"
-            for one in ({**p, "ranges": list(p["ranges"].items())} for p in places[:_PLACES])
-        )
+        listed = "; ".join(_said(place) for place in places[:_PLACES])
         more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
         lines.append(f"Cells with undecided starts: {listed}{more}.")
     lines.append(

@@ -15,14 +15,24 @@ from pendmap.files import held_interrupts, whole_file
 if TYPE_CHECKING:
     import os
 
-__all__ = ["FORMAT_VERSION", "SUFFIXES", "load", "save"]
+__all__ = ["FORMAT_VERSION", "KINDS", "SUFFIXES", "load", "save"]
 
 FORMAT_VERSION: Final = 1
 """Version of the layout of the datasets, in their attribute ``format_version``."""
 SUFFIXES: Final = (".nc", ".zarr")
 """The kinds of file a result is stored in."""
-_NEEDED: Final = ("kind", "format_version")
-"""Attributes by which a dataset is known as a result."""
+KINDS: Final = {
+    "basins": ("basins", "basins_of"),
+    "bifurcation": ("bifurcation",),
+    "lifetime": ("lifetime",),
+    "lyapunov": ("lyapunov",),
+    "melnikov": ("melnikov",),
+    "orbits": ("orbit",),
+    "parameter_map": ("parameter_map",),
+    "tongues": ("tongues",),
+    "trajectory": ("simulate",),
+}
+"""The kinds of result, and the functions that return each."""
 _LARGE: Final = 4096
 
 
@@ -51,9 +61,10 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """
     target = Path(path)
     if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
+        made = {name for functions in KINDS.values() for name in functions}
         raise InputError(
-            f"{target}: what shall be saved is not a result of pendmap: allowed are datasets of "
-            f"pendmap that have the attributes {' and '.join(_NEEDED)}"
+            f"{target}: what shall be saved is not a result of pendmap: allowed are the datasets "
+            f"that {', '.join(sorted(made))} return"
         )
     if target.suffix.lower() == ".zarr":
         return _save_zarr(dataset, target)
@@ -63,7 +74,7 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def _is_result(dataset: xr.Dataset) -> bool:
-    return set(_NEEDED) <= set(dataset.attrs)
+    return {"format_version", "kind"} <= set(dataset.attrs)
 
 
 def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:

@@ -6,16 +6,17 @@ import contextlib
 import functools
 import json
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.errors import InputError
 from pendmap.files import held_interrupts
 from pendmap.notebook import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
-    from pathlib import Path
 
     import xarray as xr
 
@@ -73,7 +74,8 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
 def write_all(files: Iterable[tuple[Callable[[Path], Path], Path]]) -> list[str]:
     """Write files one after the other and return their names.
 
-    An interrupt takes effect between two files and names those that are complete.
+    An interrupt takes effect between two files and names those that are complete. What is refused
+    leaves none: those written before are taken away.
     """
     written: list[str] = []
     try:
@@ -82,6 +84,10 @@ def write_all(files: Iterable[tuple[Callable[[Path], Path], Path]]) -> list[str]
                 written.append(str(write(path)))
     except KeyboardInterrupt:
         raise KeyboardInterrupt(*written) from None
+    except InputError:
+        for name in written:
+            Path(name).unlink(missing_ok=True)
+        raise
     return written
 
 
