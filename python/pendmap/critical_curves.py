@@ -54,7 +54,7 @@ NEAR = 0.05
 """An asymptotic curve that is off by less than this part is near the exact one."""
 
 
-def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
+def tongues(  # noqa: C901, PLR0913, PLR0915 (a sequence; physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     omega: ArrayLike | None = None,
     p_max: float = P_MAX,
@@ -81,9 +81,9 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     which is the one with multiplier +1. Where rest sheds two oscillations of period 1, a torque
     makes one of them the continuation of rest, without a critical amplitude.
 
-    Without a torque, where hanging rest first loses its stability an oscillation is born, with period 1 (multiplier
-    +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its fold: between fold
-    and critical curve it is there beside a rest that is stable.
+    Without a torque, where hanging rest first loses its stability an oscillation is born, with
+    period 1 (multiplier +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its
+    fold: between fold and critical curve it is there beside a rest that is stable.
 
     Parameters
     ----------
@@ -111,7 +111,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     -------
     xarray.Dataset
         Over ``critical``, a critical amplitude each: ``index`` of its frequency, ``p``,
-        ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above). Over
+        ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above) and
+        ``critical_omega``, its frequency. Over
         ``omega``: ``asked`` (0 where the frequency was added), ``stable_at_first`` (below the
         first), ``fold`` (nan where none) and the point ``fold_theta``, ``fold_velocity`` of the
         oscillation there, ``fold_sought`` (0 where the frequency was added and no fold ends). The
@@ -119,8 +120,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``undamped``. Of inverted rest, which is unstable without drive: ``inverted_index``,
         ``inverted_p``, ``inverted_multiplier``, ``inverted_stable_above`` over ``inverted``; none,
         and the attribute ``inverted`` 0, where upright is no rest. Under a torque, when the
-        attribute ``moved`` is 1, there are no folds and none without damping. Over ``curve`` and ``omega``:
-        ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by
+        attribute ``moved`` is 1, there are no folds and none without damping. Over ``curve`` and
+        ``omega``: ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by
         (:mod:`pendmap.asymptotic`).
 
     Raises
@@ -140,11 +141,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(f"plane is {checks.shown(plane)}: allowed are {', '.join(PLANES)}")
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     refine, inverted = checks.flag("refine", refine), checks.flag("inverted", inverted)
-    if pendulum.theta_r > 0:
-        raise InputError(
-            f"theta_r is {pendulum.theta_r:g}: friction holds hanging rest whatever the drive, and "
-            "it never loses its stability: allowed is 0"
-        )
+    _check_free(pendulum)
     began = time.perf_counter()
 
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
@@ -187,6 +184,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         **_columns(found, "critical", ""),
         **_columns(undamped, "undamped", "undamped_"),
         **_columns(upright, "inverted", "inverted_"),
+        **{
+            f"{table}_omega": (table, np.repeat(frequencies, [len(row["p"]) for row in rows]))
+            for table, rows in (("critical", found), ("undamped", undamped), ("inverted", upright))
+        },
         "asked": ("omega", np.isin(frequencies, asked).astype(np.int8)),
         "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
         "fold_sought": ("omega", looked.astype(np.int8)),
@@ -226,6 +227,15 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = [*_summary(dataset), *of_motion(model.effects, "curves are")]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
+
+
+def _check_free(pendulum: Pendulum) -> None:
+    """Refuse friction, under which no stability is lost."""
+    if pendulum.theta_r > 0:
+        raise InputError(
+            f"theta_r is {pendulum.theta_r:g}: friction holds hanging rest whatever the drive, and "
+            "it never loses its stability: allowed is 0"
+        )
 
 
 def _folds_to_their_ends(

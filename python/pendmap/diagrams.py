@@ -80,10 +80,10 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     xarray.Dataset
         Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
         ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
-        ``entry_branch``; ``undecided``, ``failed`` and ``chaos_periods`` over the parameter as of
-        that function; branches over ``branch``: ``branch_kind``, ``branch_w``,
-        ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the entry that
-        the sweep is on, -1 where that is none of them; its points there over ``loose``.
+        ``entry_value`` and ``entry_branch``; ``undecided``, ``failed`` and ``chaos_periods`` over
+        the parameter as of that function; branches over ``branch``: ``branch_kind``,
+        ``branch_w``, ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the
+        entry that the sweep is on, -1 where that is none of them; its points there over ``loose``.
 
     Raises
     ------
@@ -159,6 +159,7 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
     }
     data: dict[str, Any] = {
         **entries(raw, which, units),
+        "entry_value": ("entry", value, axis.attributes),
         "entry_branch": ("entry", found.of_entry),
         "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
         "branch_w": ("branch", raw["w"][ends[:, 0]]),
@@ -182,8 +183,9 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
         "loose_velocity": ("loose", units.given(loose["velocity"], VELOCITY), speed),
     }
     coordinates = {
-        axis.name: (axis.name, axis.values, axis.attributes),
+        **axis.coordinates,
         "kind": ("kind", np.array(kinds, dtype=str)),
+        "entry": ("entry", np.arange(which.size)),
     }
     return xr.Dataset(data, coords=coordinates)
 
@@ -207,6 +209,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["Nothing attracts, as far as was seen."]
     lines += [*chaos(a), *undecided(a)]
+    where = dataset["undecided"].values > 0
+    if where.any():
+        lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")
     lines.append(
         f"{counted(a['starts'], 'start')} a value; {counted(a['points'], 'point')}; error after 5 "
         f"periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "

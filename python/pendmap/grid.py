@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,9 +12,11 @@ from pendmap import checks
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Axis", "Grid", "frequencies", "starts"]
+__all__ = ["Axis", "Grid", "coordinate", "frequencies", "starts"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,9 +50,9 @@ class Axis:
         return self.low + (index + 0.5) * ((self.high - self.low) / self.count)
 
     @property
-    def bounds(self) -> dict[str, float]:
-        """The outer edges, as attributes of a coordinate."""
-        return {"low": self.low, "high": self.high}
+    def edges(self) -> NDArray[np.float64]:
+        """Edges of the cells, shape (count + 1,)."""
+        return np.linspace(self.low, self.high, self.count + 1)
 
     @property
     def as_tuple(self) -> tuple[float, float, int]:
@@ -100,6 +102,35 @@ class Grid:
     def cells(self) -> int:
         """Number of cells."""
         return self.theta.count * self.velocity.count
+
+
+def coordinate(
+    name: str,
+    centres: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    attributes: Mapping[str, str],
+) -> dict[str, Any]:
+    """Return a coordinate of cells and, by the CF conventions, the bounds of each cell.
+
+    Bounds are a coordinate of their own: a selection of cells takes along those of its cells.
+
+    Parameters
+    ----------
+    name : str
+        Name of the axis and of its dimension.
+    centres : ndarray, shape (N,)
+        Its values.
+    edges : ndarray, shape (N + 1,)
+        Edges of its cells.
+    attributes : mapping
+        Units and long name.
+    """
+    bounds = f"{name}_bounds"
+    pairs = np.stack([edges[:-1], edges[1:]], axis=1)
+    return {
+        name: (name, centres, {**attributes, "bounds": bounds}),
+        bounds: ((name, "bound"), pairs),
+    }
 
 
 def frequencies(values: ArrayLike) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from pendmap import survival
 from pendmap.model.units import Units
-from pendmap.words import counted
+from pendmap.words import counted, with_error
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +19,7 @@ def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     """Return the lines about the lifetimes ``dataset`` of the starts of the map ``found``."""
     a, units = dataset.attrs, Units.of(dataset.attrs)
     lines: list[str] = []
-    exponent = f"{a['exponent']:.4f} +- {a['exponent_stderr']:.4f} {units.per_time}"
+    exponent = f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
         name = str(found["attractor"].values[0])
         lines.append(
@@ -63,12 +63,11 @@ def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
 
 def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
     a, units = dataset.attrs, Units.of(dataset.attrs)
-    mean, error = a["mean_periods"], a["stderr"]
-    places = max(0, 1 - math.floor(math.log10(error)))
     clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
+    mean = with_error(a["mean_periods"], a["stderr"])
     said = (
-        f"Transient chaos lives for {mean:.{places}f} +- {error:.{places}f} periods on average "
-        f"({clock}): the tail of {counted(a['tail_captured'], 'capture')} after period "
+        f"Transient chaos lives for {mean} periods on average ({clock}): the tail of "
+        f"{counted(a['tail_captured'], 'capture')} after period "
         f"{a['from_period']}."
     )
     lines = [said]
@@ -79,8 +78,8 @@ def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
             "its mean depends on where it begins."
         )
     line = (
-        f"On the chaotic saddle: exponent {exponent}, {a['exponent_per_period']:.4f} per period; "
-        f"rate of escape {a['escape_rate']:.5f}, entropy {a['entropy']:.4f} per period"
+        f"On the chaotic saddle: exponent {exponent}, {a['exponent_per_period']:.4g} per period; "
+        f"rate of escape {a['escape_rate']:.4g}, entropy {a['entropy']:.4g} per period"
     )
     if math.isfinite(a["saddle_dimension"]):
         line += f"; dimension {a['saddle_dimension']:.3f}"

@@ -10,7 +10,7 @@ import xarray as xr
 from pendmap import _core, checks
 from pendmap.basin_dataset import cells, complete, uncertain_starts
 from pendmap.errors import InputError
-from pendmap.grid import Grid, starts
+from pendmap.grid import Grid, coordinate, starts
 from pendmap.model import without_dimensions
 from pendmap.model.units import VELOCITY
 
@@ -85,9 +85,12 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     xarray.Dataset
         ``label``, ``settle_periods`` and ``net_turns`` over (velocity, theta), the table of
         attractors over ``attractor``, their stroboscopic points over ``point``; parameters, shares
-        and the error reached as attributes. ``fraction`` is the basin stability of an attractor in
-        this window (Menck et al. 2013, Nature Physics 9, 89), ``stderr`` its standard error as if
-        the starts were drawn at random, more than that of a grid. ``basin_entropy``,
+        and the error reached as attributes. The bounds of the cells are the coordinates
+        ``theta_bounds`` and ``velocity_bounds``. A selection of cells keeps shares, attributes and
+        summary of the whole map; figures and recordings of it count its own cells. ``fraction`` is
+        the basin stability of an attractor in this window (Menck et al. 2013, Nature Physics 9,
+        89), ``stderr`` its standard error as if the starts were drawn at random, more than that of
+        a grid. ``basin_entropy``,
         ``boundary_basin_entropy`` and ``uncertainty_exponent`` say how the basins are interwoven:
         see :func:`pendmap.basin_entropy` and :func:`pendmap.uncertainty_exponent`; the counts
         behind the exponent, from 10,000 cells on, are ``uncertain`` of ``uncertainty_tried``
@@ -122,19 +125,18 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     dims = ("velocity", "theta")
     dataset = xr.Dataset(
         cells(raw, dims, shape, units),
-        coords={
-            "theta": (
-                "theta",
-                grid.theta.centres,
-                {"units": "rad", "long_name": "initial angle"} | grid.theta.bounds,
-            ),
-            "velocity": (
-                "velocity",
-                grid.velocity.centres,
-                {"units": units.of_velocity, "long_name": f"initial velocity {units.derivative}"}
-                | grid.velocity.bounds,
-            ),
-        },
+        coords=coordinate(
+            "theta",
+            grid.theta.centres,
+            grid.theta.edges,
+            {"units": "rad", "long_name": "initial angle"},
+        )
+        | coordinate(
+            "velocity",
+            grid.velocity.centres,
+            grid.velocity.edges,
+            {"units": units.of_velocity, "long_name": f"initial velocity {units.derivative}"},
+        ),
     )
     dataset = dataset.assign(uncertain_starts(raw))
     return complete(dataset, raw, model, choices, seconds)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from scipy.ndimage import find_objects, label
 
 from pendmap import _core, checks
 from pendmap.cell_search import STARTS, CellSearch
@@ -33,11 +34,22 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], object]
 
-__all__ = ["CHAOS_PERIODS", "chaos", "entries", "parameter_map", "undecided"]
+
+__all__ = [
+    "CHAOS_PERIODS",
+    "chaos",
+    "entries",
+    "parameter_map",
+    "undecided",
+    "undecided_cells",
+]
 
 CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
 """Comment of the variable ``chaos_periods``."""
 _LISTED = 10
+_PLACES = 3
+"""Groups of cells with undecided starts that a summary names."""
+
 _FREQUENCIES = 81
 _STEPS = 10_000
 """Parts of a computation that are told apart where two parts are one."""
@@ -219,8 +231,13 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
         "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
         **entries(raw, which, units),
     }
-    coordinates = {axis.name: (axis.name, axis.values, axis.attributes) for axis in (columns, rows)}
-    return xr.Dataset(data, coords={**coordinates, "kind": ("kind", np.array(kinds, dtype=str))})
+    coordinates = {
+        **columns.coordinates,
+        **rows.coordinates,
+        "kind": ("kind", np.array(kinds, dtype=str)),
+        "set": ("set", np.arange(len(sets))),
+    }
+    return xr.Dataset(data, coords=coordinates)
 
 
 def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
@@ -288,7 +305,7 @@ def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[s
     rate = {"units": units.of_rate}
     speed = {"units": units.of_velocity}
     return {
-        "entry_cell": ("entry", raw["cell"]),
+        "entry_cell": ("entry", raw["cell"], {"comment": "of the whole result, row by row"}),
         "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
         "entry_n": ("entry", raw["n"], {"comment": "0: no meaning"}),
         "entry_w": ("entry", raw["w"]),
@@ -321,10 +338,52 @@ def undecided(attributes: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return where a result has undecided starts: groups of cells that touch, the largest first.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A map over two parameters, or a bifurcation diagram.
+
+    Returns
+    -------
+    list of dict
+        ``ranges``, the first and the last value of each parameter, by its name; ``cells``, how
+        many have undecided starts; ``undecided``, their share of the starts of these.
+    """
+    share = dataset["undecided"]
+    groups, _ = label(share.values > 0, structure=np.ones((3,) * share.ndim))
+    found = []
+    for number, box in enumerate(find_objects(groups), 1):
+        mine = groups == number
+        ranges = {
+            str(name): (float(dataset[name].values[part][0]), float(dataset[name].values[part][-1]))
+            for name, part in zip(reversed(share.dims), reversed(box), strict=True)
+        }
+        part = float(share.values[mine].mean())
+        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": part})
+    return sorted(found, key=lambda one: -one["cells"])
+
+
+def _said(place: dict[str, Any]) -> str:
+    """Say where a group of cells is, and of how many."""
+    spans = [
+        f"{name} = {low:.4g}" + (f" to {high:.4g}" if high > low else "")
+        for name, (low, high) in place["ranges"].items()
+    ]
+    return f"{', '.join(spans)} ({counted(place['cells'], 'cell')})"
+
+
 def _summary(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     count = dataset.sizes["set"]
-    lines = [f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."]
+    spans = [
+        f"{name} = {dataset[name].values[0]:g} to {dataset[name].values[-1]:g}"
+        for name in (a["columns"], a["rows"])
+    ]
+    said = f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."
+    lines = [f"{', '.join(spans)}: {said}"]
     for k in range(min(count, _LISTED)):
         kinds = json.loads(str(dataset["regime_kinds"].values[k]))
         lines.append(f"{100 * float(dataset['regime_share'][k]):.3g} %: {', '.join(kinds)}.")
@@ -332,6 +391,11 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
     lines += [*chaos(a), *undecided(a)]
+    places = undecided_cells(dataset)
+    if places:
+        listed = "; ".join(_said(place) for place in places[:_PLACES])
+        more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
+        lines.append(f"Cells with undecided starts: {listed}{more}.")
     lines.append(
         f"{counted(a['starts'], 'start')} a cell; {counted(a['searched_again'], 'cell')} searched "
         f"again for what a neighbour has; error after 5 periods {a['reached_error']:.2g}; "

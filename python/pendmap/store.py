@@ -15,7 +15,7 @@ import xarray as xr
 from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
-__all__ = ["FORMAT_VERSION", "SUFFIXES", "check_replaceable", "load", "save"]
+__all__ = ["FORMAT_VERSION", "KINDS", "SUFFIXES", "check_replaceable", "load", "save"]
 
 FORMAT_VERSION: Final = 1
 """Version of the layout of the datasets, in their attribute ``format_version``."""
@@ -23,6 +23,18 @@ SUFFIXES: Final = (".nc", ".zarr")
 """The kinds of file a result is stored in."""
 _MARKS: Final = frozenset(("format_version", "kind"))
 """Attributes by which a dataset says that it is a result."""
+KINDS: Final = {
+    "basins": ("basins", "basins_of"),
+    "bifurcation": ("bifurcation",),
+    "lifetime": ("lifetime",),
+    "lyapunov": ("lyapunov",),
+    "melnikov": ("melnikov",),
+    "orbits": ("orbit",),
+    "parameter_map": ("parameter_map",),
+    "tongues": ("tongues",),
+    "trajectory": ("simulate",),
+}
+"""The kinds of result, and the functions that return each."""
 _LARGE: Final = 4096
 _ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
 """Names of the files of a stored result: descriptions and chunks."""
@@ -53,9 +65,10 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """
     target = Path(path)
     if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
+        made = {name for functions in KINDS.values() for name in functions}
         raise InputError(
             f"{target}: what shall be saved is not a result of pendmap: allowed are the datasets "
-            "that basins, basins_of and simulate return"
+            f"that {', '.join(sorted(made))} return"
         )
     if target.suffix.lower() == ".zarr":
         return _save_zarr(dataset, target)

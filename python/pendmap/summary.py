@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.model.units import TIME, Units
-from pendmap.words import counted, written
+from pendmap.words import counted, with_error, written
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -61,6 +61,8 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
             bound = bound.split(";")[0] if unlimited else bound  # no bound helps
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     a = dataset.attrs
+    if "theta" in dataset.dims:
+        lines.insert(0, _window(dataset))
     if plane != "conservative":
         lines += unlimited
         if not unlimited and a["undecided"] > 0:
@@ -151,6 +153,16 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
     return still
 
 
+def _window(dataset: xr.Dataset) -> str:
+    """Say which starts the numbers are of: a selection of the map keeps them."""
+    said = []
+    for name in ("theta", "velocity"):
+        low, high = dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]
+        unit = str(dataset[name].attrs["units"]).removeprefix("1")
+        said.append(f"{name} = {low:.6g} to {high:.6g} {unit}".rstrip())
+    return f"{', '.join(said)}: {counted(dataset.attrs['cells'], 'start')}."
+
+
 def _conservative(dataset: xr.Dataset) -> str:
     return (
         "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
@@ -173,7 +185,7 @@ def _only_chaos(dataset: xr.Dataset) -> str:
     name = str(dataset["attractor"].values[0])
     exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
     return (
-        f"One chaotic attractor takes everything: {name}, exponent {exponent:.4f} +- {error:.4f} "
+        f"One chaotic attractor takes everything: {name}, exponent {with_error(exponent, error)} "
         f"{Units.of(a).per_time}; nothing captured a sampled trajectory within "
         f"{a['chaos_bound']} periods. All {a['searched_starts']} sampled starts end there: another "
         f"attractor takes at most {100 * most_missed(a['searched_starts']):.2g} % of them (95 %).\n"
@@ -188,11 +200,13 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
     units = Units.of(dataset.attrs)
     unit = f" {units.of_rate}" if units.si else ""
     for k, name in enumerate(names):
-        row = {key: dataset[key].values[k] for key in ("fraction", "stderr", "twin", "exponent")}
+        keys = ("fraction", "stderr", "twin", "exponent", "exponent_stderr")
+        row = {key: dataset[key].values[k] for key in keys}
         twin = int(row["twin"])
         mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
         held = not math.isfinite(row["exponent"])
-        rate = "held by friction" if held else f"exponent {row['exponent']:.4f}{unit}"
+        value = with_error(row["exponent"], row["exponent_stderr"])
+        rate = "held by friction" if held else f"exponent {value}{unit}"
         lines.append(
             f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
             f"{rate}{mirror}."

@@ -16,7 +16,7 @@ from pendmap.model import Units, without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY
 from pendmap.store import FORMAT_VERSION
 from pendmap.summary import of_motion
-from pendmap.words import counted
+from pendmap.words import counted, with_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -276,7 +276,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
         lines.append(
             f"Largest Lyapunov exponent of this stretch, {units.clock} = "
             f"{a['exponent_from']:.6g} to {units.seconds(format(a['exponent_to'], '.6g'))}: "
-            f"{value:.5f} +- {error:.5f} {units.per_time}. Transients are included; basins gives "
+            f"{with_error(value, error)} {units.per_time}. Transients are included; basins gives "
             "the exponents of the attractors."
         )
     return "\n".join(lines)

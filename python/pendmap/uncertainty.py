@@ -122,8 +122,8 @@ def uncertainty_exponent(
     counts are independent. Where the map shows every change of label that a pilot meets, most
     starts are drawn near those, each with its weight, and the counts are those of as many starts
     drawn evenly as tell the share as precisely. Of labels on a grid the distances are 1, 2, 3, 4,
-    6, ... cells, along both axes at once, from every cell. Labels on a grid tell nothing below a cell: where filaments
-    are thinner, the exponent is that of what is seen.
+    6, ... cells, along both axes at once, from every cell. Labels on a grid tell
+    nothing below a cell: where filaments are thinner, the exponent is that of what is seen.
 
     The law is fitted by its binomial likelihood to the smallest distances, to all of them up to
     where it breaks (a misfit less likely than 1 %), and the interval is widened by what misfit
@@ -150,7 +150,7 @@ def uncertainty_exponent(
     ------
     InputError
         If these are no labels of a plane; if there is no boundary, or too few distances; of a
-        dataset without counts (no basins, or ``check=False``).
+        dataset without counts (no basins, or ``check=False``) or of a part of a map.
 
     References
     ----------
@@ -288,6 +288,11 @@ def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
             "this dataset has no counts of uncertain starts: allowed are maps of pendmap.basins "
             "of 10,000 cells or more whose labels tell basins apart, made with check=True; or "
             "dataset['label']"
+        )
+    if dataset["label"].size != dataset.attrs["cells"]:
+        raise InputError(
+            "this is a part of a map, and the counts of uncertain starts are of the whole: allowed "
+            "are the whole map, or labels on a grid, dataset['label']"
         )
     found = fitted_map(dataset)
     if found is None:

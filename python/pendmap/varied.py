@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap import _core, checks
 from pendmap.errors import InputError
+from pendmap.grid import coordinate
 from pendmap.model import without_dimensions
 from pendmap.model.rig import COUNTERPARTS
 
@@ -58,8 +59,18 @@ class Varied:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of a coordinate."""
+        """Attributes of a quantity that takes its values."""
         return {"units": self.unit or "1", "long_name": self.name}
+
+    @property
+    def coordinates(self) -> dict[str, Any]:
+        """It as the coordinate of a dataset; with more values than one, with their bounds."""
+        x = self.values
+        if x.size == 1:
+            return {self.name: (self.name, x, self.attributes)}
+        half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
+        edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
+        return coordinate(self.name, x, edges, self.attributes)
 
 
 _SYMBOLS = {

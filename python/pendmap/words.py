@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-__all__ = ["counted", "moment", "written"]
+__all__ = ["counted", "moment", "with_error", "written"]
 
 DIGITS: Final = 5
 """Digits of a number whose uncertainty is not known."""
@@ -34,4 +34,17 @@ def written(value: float, width: float) -> str:
     if not width:
         return f"{value:.{DIGITS}g}"
     places = max(1 - math.floor(math.log10(width)), 0)
-    return f"{value:.{places}f}" if places <= PLACES else f"{value:.3g}"
+    if places > PLACES:
+        return f"{value:.3g}"
+    text = f"{value:.{places}f}"
+    return text if float(text) else text.removeprefix("-")  # no minus zero
+
+
+def with_error(value: float, error: float, sign: str = "+-") -> str:
+    """Return ``0.2736 +- 0.0013``; the number alone where its error is 0, or not known.
+
+    A number without an error has five digits, however small it is.
+    """
+    if not (math.isfinite(error) and error > 0):
+        return written(value, 0.0)
+    return f"{written(value, error)} {sign} {written(error, error)}"

@@ -3,43 +3,27 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from unittest import mock
 
 from matplotlib import rc_context
 from matplotlib.text import Text
 
-from pendmap.figures import (
-    basins,
-    diagrams,
-    exponents,
-    lifetimes,
-    melnikov,
-    orbits,
-    planes,
-    style,
-    tongues,
-    trajectory,
-)
+from pendmap import figures
+from pendmap.figures import style
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
     from matplotlib.figure import Figure
 
 
 def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
-    kinds = {
-        "basins": basins,
-        "bifurcation": diagrams,
-        "orbits": orbits,
-        "parameter_map": planes,
-        "lifetime": lifetimes,
-        "lyapunov": exponents,
-        "melnikov": melnikov,
-        "tongues": tongues,
-        "trajectory": trajectory,
-    }
-    draw = kinds[dataset.attrs["kind"]].figure
+    made: list[Callable[[float], Figure]] = []
+    with mock.patch.object(figures, "written", lambda _, build, **__: made.append(build)):
+        figures.draw(dataset, "a.png", layer=layer)
     with rc_context(style.RC):
-        figure = draw(dataset, layer=layer, size=None, dpi=100.0, colormap=None)
+        figure = made[0](100.0)
         figure.canvas.draw()
     return figure
 

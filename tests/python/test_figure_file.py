@@ -122,7 +122,7 @@ def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_large_maps_are_never_converted_whole(tmp_path: Path) -> None:
     peaks = []
-    for side in (1000, 4000):
+    for side in (1200, 4000):
         dataset = enlarged(synthetic.painted(synthetic.USUAL[:3], (10, 10), undecided=4), side)
         figures.draw(dataset, tmp_path / "warm.png")
         tracemalloc.start()

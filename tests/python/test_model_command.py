@@ -45,11 +45,11 @@ def test_maps_from_the_command_are_in_rad_per_second(tmp_path: Path, pendmap_com
     assert run.returncode == 0, run.stderr
     assert json.loads(run.stdout)["units"] == "SI"
     stored = pendmap.load(tmp_path / "m.nc")
-    assert stored.velocity.attrs["high"] == pytest.approx(3 * 6.2)
+    assert stored.velocity_bounds.values[-1, 1] == pytest.approx(3 * 6.2)
     window = ("--theta=-1:1:5", "--velocity=-2:2:5")
     run = pendmap_command("basins", "--model", "model.toml", *window, "--json", "--out", "m.nc")
     assert run.returncode == 0, run.stderr
-    assert pendmap.load(tmp_path / "m.nc").velocity.attrs["high"] == 2.0
+    assert pendmap.load(tmp_path / "m.nc").velocity_bounds.values[-1, 1] == 2.0
 
 
 @pytest.mark.parametrize(

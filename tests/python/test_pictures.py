@@ -14,13 +14,20 @@ import synthetic
 from pendmap.pictures import layers, legend, plane
 
 
-def test_thinning_keeps_at_most_the_limit_and_copies_nothing() -> None:
-    array = xr.DataArray(np.arange(1000 * 70).reshape(1000, 70), dims=("velocity", "theta"))
-    thin = plane.thinned(array, 100)
-    assert thin.shape == (100, 70)
-    assert np.shares_memory(thin, array.values)
-    assert plane.thinned(array, 1000) is not None
-    assert (plane.thinned(array, 1000) == array.values).all()
+def test_a_pixel_has_the_cell_that_its_centre_lies_in() -> None:
+    axes = {"velocity": np.arange(1000.0), "theta": np.arange(70.0)}
+    cells = np.arange(1000 * 70).reshape(1000, 70)
+    dataset = xr.Dataset({"label": (("velocity", "theta"), cells)}, coords=axes)
+    thin = plane.pixels(dataset, dataset["label"], 300)
+    assert thin.shape == (300, 70)
+    assert (thin == cells[((np.arange(300) + 0.5) / 0.3).astype(int)]).all()
+    assert np.shares_memory(plane.pixels(dataset, dataset["label"], 1000), cells)
+    uneven = dataset.isel(velocity=[0, 1, 5])
+    shown = plane.pixels(uneven, uneven["label"], 300)
+    edges = plane.edges(uneven, "velocity")
+    assert edges == pytest.approx([-0.5, 0.5, 3.0, 7.0])
+    at = edges[0] + (np.arange(len(shown)) + 0.5) * (edges[-1] - edges[0]) / len(shown)
+    assert (shown[:, 0] == np.where(at < 0.5, 0, np.where(at < 3.0, 70, 350))).all()
 
 
 def test_a_curve_is_cut_exactly_at_the_wrap() -> None:

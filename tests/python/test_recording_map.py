@@ -197,4 +197,7 @@ def test_a_map_beyond_the_largest_image_is_thinned(
     dataset = synthetic.painted(synthetic.USUAL[:3], (32, 40), undecided=5)
     back = recorded(dataset, tmp_path)
     labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
-    assert (labels == dataset["label"].values[::2, 1::3] + 1).all()
+    rows, columns = ((np.arange(16) + 0.5) * (n / 16) for n in (32, 40))
+    assert (
+        labels == dataset["label"].values[np.ix_(rows.astype(int), columns.astype(int))] + 1
+    ).all()

@@ -142,7 +142,7 @@ def test_maps_are_the_same_in_both_units() -> None:
         assert there[name].values == pytest.approx(5 * bare[name].values, abs=1e-8), name
     assert there.period.values == pytest.approx(bare.period.values / 5)
     assert there.velocity.attrs["units"] == there.point_velocity.attrs["units"] == "rad/s"
-    assert (there.velocity.attrs["low"], there.velocity.attrs["high"]) == (-15.0, 15.0)
+    assert there.velocity_bounds.values[[0, -1], [0, 1]].tolist() == [-15.0, 15.0]
     assert there.exponent.attrs["units"] == "1/s"
     assert there.period.attrs["units"] == "s"
     starts = [0.1, 1.0, 2.5], [3.0, -10.0, 12.0]

@@ -48,6 +48,8 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the JSON object of a bifurcation diagram."""
+    from pendmap.planes import undecided_cells
+
     a = dataset.attrs
     kinds = dataset["kind"].values
     rows = zip(
@@ -76,5 +78,6 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "varied": a["varied"],
         "branches": branches,
         **{name: a[name] for name in names},
+        "undecided_at": undecided_cells(dataset),
         "summary": a["summary"].split("\n"),
     }

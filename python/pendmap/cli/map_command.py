@@ -48,6 +48,8 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the JSON object of a map over two parameters."""
+    from pendmap.planes import undecided_cells
+
     a = dataset.attrs
     regimes = [
         {"kinds": json.loads(str(kinds)), "share": float(share)}
@@ -71,5 +73,6 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "rows": a["rows"],
         "regimes": regimes,
         **{name: a[name] for name in names},
+        "undecided_at": undecided_cells(dataset),
         "summary": a["summary"].split("\n"),
     }

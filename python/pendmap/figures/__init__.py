@@ -30,7 +30,7 @@ from pendmap.figures.of_records import (
     write_report,
 )
 from pendmap.figures.written import SUFFIXES, written
-from pendmap.pictures.layers import refuse_lists
+from pendmap.pictures.selection import shown
 
 if TYPE_CHECKING:
     import os
@@ -95,7 +95,9 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
         ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
         ``pendmap.melnikov`` or ``pendmap.simulate`` returned;
-        ``attrs["kind"]`` tells which.
+        ``attrs["kind"]`` tells which. Of a selection (a range, every k-th value, reversed,
+        transposed) the picture shows the cells that are there, at their coordinates, with their
+        shares.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
@@ -135,7 +137,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         raise InputError(
             f"cannot draw a dataset of kind {kind!r}; kinds that can be drawn: {known}"
         )
-    refuse_lists(dataset)
+    dataset = shown(dataset)
     return written(
         path,
         lambda dpi: _KINDS[kind](dataset, layer=layer, size=size, dpi=dpi, colormap=colormap),

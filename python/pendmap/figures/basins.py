@@ -62,8 +62,8 @@ def figure(
         style.colour_map(colormap)
         if shown == ("labels",):
             raise InputError(f"colormap {colormap!r}: labels are coloured by attractor")
-    theta = plane.cell_edges(dataset["theta"])
-    velocity = plane.cell_edges(dataset["velocity"])
+    theta = plane.outer_edges(dataset, "theta")
+    velocity = plane.outer_edges(dataset, "velocity")
     units = Units.of(dataset.attrs)
     slow, fast = (units.bare(bound, VELOCITY) for bound in velocity)
     extent = (*theta, *velocity)
@@ -97,7 +97,7 @@ def figure(
     for one, axes, bar in zip(shown, sheet.axes, sheet.bars, strict=False):
         if one == "labels":
             colours = legend.colours(dataset)
-            _image(axes, colours[plane.thinned(dataset["label"], limit) + 1], extent)
+            _image(axes, colours[plane.pixels(dataset, dataset["label"], limit) + 1], extent)
             _attractors(axes, listed, extent)
         else:
             _scalar(axes, bar, dataset, one, extent=extent, limit=limit, colormap=colormap)
@@ -182,8 +182,8 @@ def _scalar(  # noqa: PLR0913 (where to draw, what, and how)
     colormap: str | None,
 ) -> None:
     """Draw one scalar layer; cells without a value keep the colour of their label."""
-    values = plane.thinned(dataset[layering.VARIABLES[layer]], limit).astype(np.float32)
-    label = plane.thinned(dataset["label"], limit)
+    values = plane.pixels(dataset, dataset[layering.VARIABLES[layer]], limit).astype(np.float32)
+    label = plane.pixels(dataset, dataset["label"], limit)
     absent = (values < 0) if layer == "settle" else ~np.isfinite(values) | (label < 0)
     if absent.any():
         _image(axes, legend.colours(dataset)[label + 1], extent)

@@ -114,13 +114,13 @@ def _growth(axes: Axes, dataset: xr.Dataset, _: Units) -> None:
     axes.plot(periods, growth, color=_LINE, lw=1.1)
     rate = float(dataset.attrs["per_period"])
     if math.isfinite(rate) and math.isfinite(dataset.attrs["stderr"]):
-        begin = min(transient, periods.size - 1)
+        begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
         # Beside a line of so many decades the constant matters little: it meets the end.
         last = growth[-1] if transient else rate * periods[-1]
         line = last + rate * (periods[begin:] - periods[-1])
         axes.plot(periods[begin:], line, color=_MEAN, lw=1.6, ls=(0, (4, 2)))
     axes.margins(x=0.0, y=0.06)
-    axes.set_xlim(0, max(periods[-1], 1))
+    axes.set_xlim(*drawn.elapsed(dataset))
     style.scale(axes, "x", axes.get_xlim(), "periods since the start")
     low, high = axes.get_ylim()
     style.scale(axes, "y", (low, high), "ln |\N{GREEK SMALL LETTER DELTA}x|")
@@ -159,7 +159,7 @@ def _sliding(axes: Axes, dataset: xr.Dataset, units: Units) -> None:
     if math.isfinite(dataset.attrs["exponent"]):
         axes.axhline(dataset.attrs["exponent"], color=_MEAN, lw=1.6, ls=(0, (4, 2)), zorder=2)
     axes.margins(y=0.08)
-    axes.set_xlim(0, max(float(dataset["elapsed"].values[-1]), 1.0))
+    axes.set_xlim(*drawn.elapsed(dataset))
     style.scale(axes, "x", axes.get_xlim(), "periods since the start, last of each")
     style.scale(axes, "y", axes.get_ylim(), _rate(units))
 

@@ -114,7 +114,8 @@ def _survival(axes: Axes, dataset: xr.Dataset) -> None:
     axes.set_yscale("log")
     drawn_low = min(float(one.share[one.share > 0].min()) for one in drawn.curves(dataset))
     axes.set_ylim(max(0.5 / float(dataset.attrs["starts"]), 0.5 * drawn_low), 1.5)
-    axes.set_xlim(0, max(float(drawn.curves(dataset)[0].periods[-1]), 1.0))
+    periods = drawn.curves(dataset)[0].periods
+    axes.set_xlim(periods[0], max(periods[-1], periods[0] + 1.0))
     style.scale(axes, "x", axes.get_xlim(), "periods")
     axes.set_ylabel("share alive", labelpad=2)
 

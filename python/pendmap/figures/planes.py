@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
+CELLS = 1200
+"""Rows and columns of a layer that are drawn at most, unless the panel has more pixels."""
+
 _LEADING = ("kinds", "exponent")
 _RATIO = 0.85
 _STRIPE = 0.045
@@ -96,7 +99,8 @@ def figure(
                 interpolation="nearest",
             )
         else:
-            _scalar(axes, bar, dataset, one, extent=extent, colormap=colormap)
+            values = drawn.layer(dataset, one, max(CELLS, sheet.pixels))
+            _scalar(axes, bar, dataset, one, values, extent=extent, colormap=colormap)
         for style_, lines in curves.values():
             for line in lines:
                 axes.plot(*line.T, linestyle=style_, **_CURVE)
@@ -118,11 +122,11 @@ def _scalar(  # noqa: PLR0913 (where to draw, what, and how)
     bar: Axes | None,
     dataset: xr.Dataset,
     one: str,
+    values: npt.NDArray[np.float64],
     *,
     extent: tuple[float, float, float, float],
     colormap: str | None,
 ) -> None:
-    values = np.asarray(drawn.layer(dataset, one).values, dtype=float)
     if one == "period":
         values = np.where(values > 0, values, np.nan)
     axes.set_facecolor("#d9d9d9")

@@ -8,7 +8,7 @@
 from pendmap.model.effects import Effect
 from pendmap.model.files import load_model, save_model
 from pendmap.model.formula import Formula, load_formulas
-from pendmap.model.pendulum import PRESETS, Pendulum
+from pendmap.model.pendulum import PRESETS, Pendulum, effects_of
 from pendmap.model.rig import Rig, without_dimensions
 from pendmap.model.units import Units
 
@@ -19,6 +19,7 @@ __all__ = [
     "Pendulum",
     "Rig",
     "Units",
+    "effects_of",
     "load_formulas",
     "load_model",
     "save_model",

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.model.effects import Effect
-from pendmap.model.formula import FormulaKey
+from pendmap.model.formula import Formula, FormulaKey
 from pendmap.model.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-__all__ = ["PRESETS", "Kernel", "Pendulum", "checked_effects"]
+__all__ = ["PRESETS", "Kernel", "Pendulum", "checked_effects", "effects_of"]
 
 Kernel = tuple[
     float, float, float, float, float, float, float, list[tuple[str | FormulaKey, list[float]]]
@@ -225,6 +225,16 @@ def effects_json(effects: tuple[Effect, ...]) -> str:
             for e in effects
         ]
     )
+
+
+def effects_of(attributes: Mapping[Any, Any]) -> tuple[Effect, ...]:
+    """Return the effects that a result's attributes name, formulas included."""
+    found = []
+    for entry in json.loads(attributes.get("effects", "[]")):
+        table = entry.get("formula")
+        own = None if table is None else Formula(**table)
+        found.append(Effect(entry["name"], entry["parameters"], formula=own))
+    return tuple(found)
 
 
 PRESETS: Final = {

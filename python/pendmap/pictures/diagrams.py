@@ -67,11 +67,10 @@ def families(dataset: xr.Dataset) -> list[Family]:
 
     Chaos is among the :data:`MOST` that are named, however rare.
     """
-    kind, n, w, cell = (dataset[f"entry_{key}"].values for key in ("kind", "n", "w", "cell"))
+    kind, n, w, value = (dataset[f"entry_{key}"].values for key in ("kind", "n", "w", "value"))
     keys = np.stack([kind, n, w], axis=1)
     every, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     which = which.reshape(-1)
-    values = dataset[str(dataset.attrs["varied"])].values
     owner = dataset["point_entry"].values
     points = np.stack(
         [dataset[f"point_{key}"].values for key in ("value", "theta", "velocity")], axis=1
@@ -84,7 +83,7 @@ def families(dataset: xr.Dataset) -> list[Family]:
         word, period, turns = every[k]
         called = _name(str(dataset["kind"].values[word]), int(period), int(turns))
         mine = which == k
-        exponents = np.stack([values[cell[mine]], dataset["entry_exponent"].values[mine]], axis=1)
+        exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
         shade = palette.colour(called) if len(found) < MOST else palette.UNNAMED
         found.append(
             Family(
@@ -117,7 +116,7 @@ def name(dataset: xr.Dataset) -> str:
 
 def across(dataset: xr.Dataset) -> tuple[float, float]:
     """Return the outer edges of the parameter's values."""
-    return plane.cell_edges(dataset[str(dataset.attrs["varied"])])
+    return plane.outer_edges(dataset, str(dataset.attrs["varied"]))
 
 
 def title(dataset: xr.Dataset) -> str:

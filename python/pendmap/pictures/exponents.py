@@ -11,12 +11,12 @@ import numpy.typing as npt
 from pendmap.model.units import Units
 from pendmap.pictures import names
 from pendmap.pictures.legend import typeset
-from pendmap.words import written
+from pendmap.words import with_error
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["sliding", "title", "value"]
+__all__ = ["elapsed", "sliding", "title", "value"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -40,11 +40,16 @@ def value(dataset: xr.Dataset) -> str:
     exponent, error = float(a["exponent"]), float(a["stderr"])
     if not math.isfinite(exponent):
         return ""
-    said = f"{exponent:.2g}" if math.isnan(error) else written(exponent, error)
-    said += f" \N{PLUS-MINUS SIGN} {written(error, error)}" if error > 0 else ""
+    said = with_error(exponent, error, "\N{PLUS-MINUS SIGN}")
     said = said.replace("-", "\N{MINUS SIGN}")
     per = names.per_time(Units.of(a))
     return f"\N{GREEK SMALL LETTER LAMDA} = {said} {per}"
+
+
+def elapsed(dataset: xr.Dataset) -> tuple[float, float]:
+    """Return the first and the last period of a curve, one apart at least."""
+    periods = dataset["elapsed"].values
+    return float(periods[0]), float(max(periods[-1], periods[0] + 1))
 
 
 def sliding(dataset: xr.Dataset) -> tuple[Floats, Floats]:
@@ -56,10 +61,10 @@ def sliding(dataset: xr.Dataset) -> tuple[Floats, Floats]:
         Of ``window`` periods each; of fewer where the trajectory is shorter.
     """
     a = dataset.attrs
-    growth = dataset["growth"].values
-    width = min(int(a["window"]), growth.size - 1)
-    gained = growth[width:] - growth[:-width]
-    return (
-        dataset["elapsed"].values[width:].astype(float),
-        gained / (width * float(a["forcing_period"])),
-    )
+    growth, elapsed = dataset["growth"].values, dataset["elapsed"].values
+    width = min(int(a["window"]), int(elapsed[-1] - elapsed[0]))
+    # Of a selection only those periods have an exponent that begin at one that is there too.
+    begin = np.searchsorted(elapsed, elapsed - width)
+    whole = (elapsed[begin] == elapsed - width) & (width > 0)
+    gained = growth[whole] - growth[begin[whole]]
+    return elapsed[whole].astype(float), gained / (max(width, 1) * float(a["forcing_period"]))

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.model import Effect
+from pendmap.model import effects_of
 from pendmap.model.rig import COUNTERPARTS
 from pendmap.model.units import Units
 from pendmap.pictures import names
-from pendmap.words import counted
+from pendmap.words import counted, with_error
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -26,7 +25,6 @@ __all__ = [
     "layers",
     "named",
     "parameters",
-    "refuse_lists",
     "reliable",
     "settles",
     "symbol",
@@ -74,18 +72,6 @@ def finite_time(dataset: xr.Dataset) -> bool:
     return bool(dataset.attrs.get("layers") == "finite_time")
 
 
-def refuse_lists(dataset: xr.Dataset) -> None:
-    """Refuse what ``pendmap.basins_of`` returns: a list of starts is no map.
-
-    Raises
-    ------
-    InputError
-        If the dataset has no grid.
-    """
-    if dataset.attrs.get("kind") == "basins" and "theta" not in dataset.dims:
-        raise InputError("a list of starts is no map: only basins on a grid can be drawn")
-
-
 def settles(dataset: xr.Dataset) -> bool:
     """Whether any start settles on an attractor."""
     return int(dataset["settle_periods"].max()) >= 0
@@ -124,8 +110,7 @@ def exponents(dataset: xr.Dataset) -> str:
     errors = dataset["exponent_stderr"].values[chaotic] if "exponent_stderr" in dataset else without
     known = [x for x in values if math.isfinite(x)]
     if len(known) == len(errors) == 1 and math.isfinite(errors[0]):
-        digits = max(0, 1 - math.floor(math.log10(max(errors[0], 1e-9))))
-        listed = f"{known[0]:.{digits}f} \N{PLUS-MINUS SIGN} {errors[0]:.{digits}f}"
+        listed = with_error(known[0], errors[0], "\N{PLUS-MINUS SIGN}")
     else:
         listed = ", ".join(f"{x:.3g}" for x in known)
     return f"largest exponent {listed} {names.per_time(Units.of(dataset.attrs))}" if known else ""
@@ -216,7 +201,6 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
         for key, (symbol, unit) in symbols.items()
         if key in attrs and key not in never and (key in always or float(attrs[key]) != 0.0)
     ]
-    effects = json.loads(attrs.get("effects", "[]"))
-    acting = [Effect(entry["name"], entry["parameters"]).title(units, without) for entry in effects]
+    acting = [effect.title(units, without) for effect in effects_of(attrs)]
     said = ",  ".join(text.replace("_", " ").replace("-", "\N{MINUS SIGN}") for text in acting)
     return ";   ".join([",  ".join(parts), *([said] if said else [])])

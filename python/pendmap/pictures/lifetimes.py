@@ -87,14 +87,15 @@ def curves(dataset: xr.Dataset) -> list[Curve]:
         return [Curve("", "", np.array([0.0, float(a["chaos_bound"])]), np.ones(2))]
     lasting = round(float(a["chaotic_share"]) * starts)
     everything = starts - int(a["failed"]) - lasting - captured.sum(axis=0)
+    total = np.rint(dataset["fraction"].values * starts).astype(np.int64)
     made = [Curve("", "", periods, _shares(everything, starts))]
     whole = int(a["censored"]) <= FEW * starts
     for k in range(dataset.sizes["attractor"] if whole else 0):
         own = captured[k]
-        if own[-1]:
+        if own.any():
             row = dataset.isel(attractor=k)
             name, kind = str(row["attractor"].values), str(row["kind"].values)
-            made.append(Curve(name, kind, periods, _shares(own[-1] - own, starts)))
+            made.append(Curve(name, kind, periods, _shares(total[k] - own, starts)))
     return made
 
 
@@ -104,13 +105,16 @@ def _shares(count: npt.NDArray[np.int64], starts: int) -> Floats:
 
 
 def fit(dataset: xr.Dataset) -> Fit | None:
-    """Return the fitted tail, None where there is no transient chaos."""
+    """Return the fitted tail, None where there is no transient chaos, or it begins later."""
     a = dataset.attrs
     if not a["transient_chaos"]:
         return None
     mean, error, begin = (float(a[key]) for key in ("mean_periods", "stderr", "from_period"))
     everything = curves(dataset)[0]
     last = everything.periods[-1]
+    begin = max(begin, everything.periods[0])
+    if begin > last:
+        return None
     periods = np.linspace(begin, max(last, begin + 1), 200)
     first = float(np.interp(begin, everything.periods, np.nan_to_num(everything.share)))
     low, share, high = (
@@ -118,7 +122,7 @@ def fit(dataset: xr.Dataset) -> Fit | None:
         for way in (-1, 0, 1)
     )
     said = f"{written(mean, error)} \N{PLUS-MINUS SIGN} {written(error, error)} periods"
-    text = f"tail from period {begin:.0f}: mean lifetime {said}"
+    text = f"tail from period {a['from_period']}: mean lifetime {said}"
     return Fit(periods, share, low, high, text)
 
 

@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 __all__ = [
     "angle_ticks",
     "broken_at_wrap",
-    "cell_edges",
     "copies",
+    "edges",
+    "outer_edges",
     "padded",
+    "pixels",
     "plain_ticks",
     "shifted",
     "short_ticks",
-    "thinned",
     "wrapped",
 ]
 
@@ -38,31 +39,75 @@ FURTHEST = 1000
 NARROW = 1e-4
 """Width of a window, relative to its distance from 0, under which its ticks have an offset."""
 
+_FINE = 8
+"""Pixels of the narrowest cell where cells are not equally wide."""
+
 MOST_COPIES = 100
 """Copies of a point, 2 pi apart, that are told apart in a window."""
 
 
-def cell_edges(axis: xr.DataArray) -> tuple[float, float]:
-    """Return the outer edges of an axis of cells.
+def edges(dataset: xr.Dataset, name: str) -> Floats:
+    """Return the edges of the cells along a rising axis of N values, shape (N + 1,).
 
-    Its attributes ``low`` and ``high``, or else half a cell beyond its equidistant centres, where a
-    lone cell counts as 1 wide.
+    The outer edges are those of the outermost cells, and between two cells the edge is half-way
+    from one to the other. Cells have the bounds that the axis names (CF conventions); without them
+    each reaches half-way to its neighbours, and a lone cell is 1 wide.
     """
-    if "low" in axis.attrs and "high" in axis.attrs:
-        return float(axis.attrs["low"]), float(axis.attrs["high"])
+    axis = dataset[name]
     x = np.asarray(axis.values, dtype=float)
-    half = 0.5 * (x[-1] - x[0]) / (x.size - 1) if x.size > 1 else 0.5
-    return float(x[0] - half), float(x[-1] + half)
+    bounds = axis.attrs.get("bounds")
+    if bounds in dataset:
+        pairs = np.sort(np.asarray(dataset[bounds].transpose(name, ...).values, dtype=float))
+        first, last = pairs[0, 0], pairs[-1, 1]
+        between = 0.5 * (pairs[:-1, 1] + pairs[1:, 0])
+    elif x.size > 1:
+        between = 0.5 * (x[:-1] + x[1:])
+        first, last = 2 * x[0] - between[0], 2 * x[-1] - between[-1]
+    else:
+        first, between, last = x[0] - 0.5, x[:0], x[0] + 0.5
+    return np.array([first, *between, last])
 
 
-def thinned(array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
-    """Return every k-th row and column, k the smallest that leaves at most ``limit`` of each.
+def outer_edges(dataset: xr.Dataset, name: str) -> tuple[float, float]:
+    """Return the first and the last of the edges of the cells along an axis."""
+    every = edges(dataset, name)
+    return float(every[0]), float(every[-1])
 
-    The cells are chosen before anything is converted, so that a large map is never copied whole.
+
+def pixels(dataset: xr.Dataset, array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
+    """Return an array over cells as an image: each pixel has the cell that its centre lies in.
+
+    A pixel is a cell where cells are equally wide; else the narrowest has eight pixels. There are
+    at most ``limit`` along an axis, and they are chosen before anything is converted, so that a
+    large map is never copied whole.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What the array is of, its axes rising.
+    array : xarray.DataArray
+        Values over two axes.
+    limit : int
+        Rows and columns at most.
     """
-    strides = {d: -(-n // limit) for d, n in array.sizes.items()}
-    cut = {d: slice((k - 1) // 2, None, k) for d, k in strides.items()}
-    return np.asarray(array.isel(cut).values)
+    cells = {str(d): _cells(edges(dataset, str(d)), limit) for d in array.dims}
+    return np.asarray(array.isel(cells).values)
+
+
+def _cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
+    """Return the cell of each pixel between these edges."""
+    count, whole = bounds.size - 1, float(bounds[-1] - bounds[0])
+    widths = np.diff(bounds)
+    rounding = 8 * np.finfo(float).eps * float(np.abs(bounds).max())
+    if np.ptp(widths) <= 1e-6 * widths.mean() + rounding:
+        if count <= limit:
+            return slice(None)
+        return ((np.arange(limit) + 0.5) * (count / limit)).astype(np.intp)
+    narrowest = max(float(widths.min()), _FINE * whole / limit)
+    shown = min(limit, math.ceil(_FINE * whole / narrowest))
+    centres = bounds[0] + (np.arange(shown) + 0.5) * (whole / shown)
+    inside: npt.NDArray[np.intp] = np.searchsorted(bounds[1:-1], centres, side="right")
+    return inside
 
 
 def copies(points: Floats, low: float, high: float) -> Floats:

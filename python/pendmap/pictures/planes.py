@@ -159,7 +159,7 @@ def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]
     listed = kinds(dataset)
     own = {member: k for k, kind in enumerate(listed) for member in kind.members}
     groups = [sorted({own[name] for name in one}) for one in sets(dataset)]
-    regime = plane.thinned(dataset["regime"], size)
+    regime = plane.pixels(dataset, dataset["regime"], size)
     rows, columns = regime.shape
     factor = [max(1, round(size / count)) for count in (rows, columns)]
     large = np.repeat(np.repeat(regime, factor[0], axis=0), factor[1], axis=1)
@@ -185,7 +185,7 @@ def axes(dataset: xr.Dataset) -> tuple[str, str]:
 def edges(dataset: xr.Dataset) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the outer edges of columns and rows."""
     across, up = (str(dataset.attrs[which]) for which in ("columns", "rows"))
-    return plane.cell_edges(dataset[across]), plane.cell_edges(dataset[up])
+    return plane.outer_edges(dataset, across), plane.outer_edges(dataset, up)
 
 
 def curves(dataset: xr.Dataset) -> dict[str, tuple[Stroke, list[npt.NDArray[np.float64]]]]:
@@ -229,11 +229,11 @@ def named(dataset: xr.Dataset, name: str) -> str:
     return name
 
 
-def layer(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the values of a layer that is no picture of kinds."""
-    if name.startswith("share "):
-        return dataset["share"].sel(kind=name.removeprefix("share "))
-    return dataset[name]
+def layer(dataset: xr.Dataset, name: str, limit: int) -> npt.NDArray[np.float64]:
+    """Return the image of a layer that is no picture of kinds, as of :func:`plane.pixels`."""
+    of_kind = name.removeprefix("share ")
+    values = dataset[name] if of_kind == name else dataset["share"].sel(kind=of_kind)
+    return np.asarray(plane.pixels(dataset, values, limit), dtype=np.float64)
 
 
 def said(dataset: xr.Dataset, name: str) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError
 from pendmap.files import whole_file
-from pendmap.pictures.layers import refuse_lists
+from pendmap.pictures.selection import shown
 from pendmap.viewer import (
     basins,
     diagrams,
@@ -101,8 +101,7 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     ``/growth/data/own``, ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or,
     of a closed orbit, ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a
     lifetime: ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
-    ``/tail/data/{mean,error,fitted}`` and ``/legend``. Of a trajectory:
-    with ``path`` and ``points``, ``/legend`` and ``/summary``. Of critical curves:
+    ``/tail/data/{mean,error,fitted}`` and ``/legend``. Of critical curves:
     ``/tongues/data/{plus,minus,undamped,fold,own}`` and the same under ``/paper`` in the plane of
     eq. 1.4. Of Melnikov's criterion: ``/melnikov/data/{forward,backward,own}``. Of a trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
@@ -112,11 +111,10 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.lyapunov``, ``pendmap.lifetime`` or
-        ``pendmap.simulate`` returned;
-        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.simulate``, ``pendmap.tongues`` or
-        ``pendmap.melnikov`` returned;
-        ``attrs["kind"]`` tells which.
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
+        ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
+        ``pendmap.melnikov`` or ``pendmap.simulate`` returned; ``attrs["kind"]`` tells which. Of a
+        selection the recording shows the cells that are there, as :func:`pendmap.figures.draw`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 
@@ -136,7 +134,7 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     if kind not in _KINDS:
         known = ", ".join(_KINDS)
         raise InputError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
-    refuse_lists(dataset)
+    dataset = shown(dataset)
     layout, log = _KINDS[kind]
     with (
         whole_file(path, SUFFIXES) as part,

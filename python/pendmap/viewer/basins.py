@@ -78,7 +78,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
-    theta, velocity = (plane.cell_edges(dataset[axis]) for axis in ("theta", "velocity"))
+    theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
     return frame.Frame(theta, velocity, Units.of(dataset.attrs))
 
 
@@ -111,7 +111,7 @@ def _image(
 
 def _labels(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
     """Log the labels, shifted by 1: 0 failed, 1 undecided, 2 the first attractor."""
-    label = plane.thinned(dataset["label"], CELLS)
+    label = plane.pixels(dataset, dataset["label"], CELLS)
     colours = legend.colours(dataset)
     kind = np.uint8 if len(colours) <= np.iinfo(np.uint8).max else np.uint16
     shifted = np.add(label, 1, dtype=np.int16).astype(kind)
@@ -128,9 +128,9 @@ def _labels(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame
 
 def _settle(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
     """Log the periods to settle; cells that never do have 0, and their label's colour on top."""
-    settle = plane.thinned(dataset["settle_periods"], CELLS)
+    settle = plane.pixels(dataset, dataset["settle_periods"], CELLS)
     absent = settle < 0
-    sample = plane.thinned(dataset["settle_periods"], SAMPLE)
+    sample = plane.pixels(dataset, dataset["settle_periods"], SAMPLE)
     known = sample[sample >= 0]
     low, high = 0.0, max(1.0, float(np.quantile(known, 0.995)) if known.size else 1.0)
     kind = np.uint16 if int(settle.max()) <= np.iinfo(np.uint16).max else np.float32
@@ -140,9 +140,11 @@ def _settle(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame
 
 def _exponent(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
     """Log the finite-time exponent."""
-    values = plane.thinned(dataset["finite_time_exponent"], CELLS).astype(np.float32, copy=False)
+    values = plane.pixels(dataset, dataset["finite_time_exponent"], CELLS).astype(
+        np.float32, copy=False
+    )
     absent = ~np.isfinite(values)
-    sample = plane.thinned(dataset["finite_time_exponent"], SAMPLE)
+    sample = plane.pixels(dataset, dataset["finite_time_exponent"], SAMPLE)
     known = sample[np.isfinite(sample)]
     low, high = (float(q) for q in np.quantile(known, [0.005, 0.995])) if known.size else (0.0, 1.0)
     if high <= low:
@@ -172,15 +174,15 @@ def _scalar(
 
 def _turns(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
     """Log the net turns as classes, each named by its number: class = turns + offset."""
-    turns = plane.thinned(dataset["net_turns"], CELLS)
-    label = plane.thinned(dataset["label"], CELLS)
+    turns = plane.pixels(dataset, dataset["net_turns"], CELLS)
+    label = plane.pixels(dataset, dataset["label"], CELLS)
     most = int(min(max(-int(turns.min()), int(turns.max()), 1), _TURNS_MOST))
     offset = most + 1
     classes = np.clip(turns, -most, most)
     classes += offset
     classes = classes.astype(np.uint16)
     classes[label < 0] = 0
-    sample = plane.thinned(dataset["net_turns"], SAMPLE)
+    sample = plane.pixels(dataset, dataset["net_turns"], SAMPLE)
     top = max(1.0, float(np.quantile(np.abs(sample), 0.98)))
     span = np.arange(-most, most + 1)
     colours = palette.diverging(span / top)
@@ -207,7 +209,7 @@ def _cover(
     """Log the labels, shifted by 2, of cells without a value over a layer; 0 shows through."""
     if not absent.any():
         return
-    label = plane.thinned(dataset["label"], CELLS)
+    label = plane.pixels(dataset, dataset["label"], CELLS)
     cover = np.where(absent, label + 2, 0).astype(np.uint16)
     colours = legend.colours(dataset)
     path = f"{ROOTS[layer]}/data/without"

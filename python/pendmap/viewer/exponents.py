@@ -96,7 +96,7 @@ def _panels(dataset: xr.Dataset) -> dict[str, tuple[Panel, str]]:
     rate = f"\N{GREEK SMALL LETTER LAMDA} ({names.per_time(units)})"
     window = dataset.attrs["window"]
     growth = np.append(dataset["growth"].values, 0.0)
-    elapsed = np.append(dataset["elapsed"].values, 0.0)
+    elapsed = np.array(drawn.elapsed(dataset))
     panels = {
         "growth": (
             Panel.holding(elapsed, growth, "periods since the start", "ln |dx|"),
@@ -106,7 +106,7 @@ def _panels(dataset: xr.Dataset) -> dict[str, tuple[Panel, str]]:
     lines = [line for own in _exponents(dataset).values() for line in own]
     all_of = np.concatenate(lines)
     if dataset.sizes["window"]:
-        x, said = "log10 of the periods averaged", f"Mean over {dataset.sizes['trajectory']}"
+        x, said = "log10 of the periods averaged", f"Mean over {dataset.attrs['trajectories']}"
         panel = Panel.holding(all_of[:, 0], all_of[:, 1], x, rate)
         panels["average"] = panel, f"{said} trajectories"
         density = _density(dataset)

@@ -69,6 +69,8 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
         if name in dataset
     )
     content.update(np.ascontiguousarray(dataset[telling].values).data)
+    for name in sorted(map(str, dataset.indexes)):  # which part of a result it is
+        content.update(repr((name, dataset[name].values.tolist())).encode())
     return identified(content.hexdigest())
 
 

@@ -20,6 +20,9 @@ __all__ = ["blueprint", "log"]
 SIZE, STRIPE = 1200, 8
 """Pixels of the picture of kinds, and of a stripe in it."""
 
+CELLS = 4096
+"""Rows and columns of an image at most: graphics processors take no larger ones for sure."""
+
 _FIELDS = ("exponent", "attractors", "undecided")
 
 
@@ -50,7 +53,8 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     stream.log("kinds/data/kinds", rr.SegmentationImage(image, opacity=1.0), static=True)
     curves = drawn.curves(dataset)
     for k, (_, parts) in enumerate(curves.values()):
-        strips = frame.pieces(parts)
+        (left, right), (bottom, top) = drawn.edges(dataset)
+        strips = frame.pieces(parts, (left, bottom), (right, top))
         if strips:
             thin = rr.Radius.ui_points(1.0)
             curve = rr.LineStrips2D(strips, colors=[(20, 20, 20)], radii=thin, draw_order=50.0)
@@ -61,7 +65,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
         lines += ["", f"Black lines: {'; '.join(curves)}."]
     frame.text(stream, "legend", "\n".join(lines))
     for one in _FIELDS:
-        values = np.asarray(dataset[one].values, dtype=np.float64)
+        values = drawn.layer(dataset, one, CELLS)
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
         if one == "exponent" and finite.size:

@@ -1,0 +1,89 @@
+"""Every model goes through every command that takes models, to every kind of output."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+import pendmap
+from pendmap import cli, figures
+from pendmap.figures import style
+from pendmap.model import effects_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MODELS = {
+    "plain": "gamma = 0.1\np = 0.6\nomega = 2.0\n",
+    "effects of the library": """gamma = 0.1\np = 0.6\nomega = 2.0
+[[effect]]\nname = "quadratic_drag"\nparameters = { q = 0.02 }
+[[effect]]\nname = "drive_second_harmonic"\nparameters = { e = 0.05, phase = 0.3 }
+""",
+    "a formula": """gamma = 0.05\np = 0.6\nomega = 2.0
+[[formula]]\nname = "own_drag"\nterm = "-q*v*abs(v)"\nparameters = { q = 0 }
+[[effect]]\nname = "own_drag"\nparameters = { q = 0.02 }
+""",
+    "a rig in SI": """w0 = 6.2\nc_over_m = 0.6\nstroke_mm = 20\nfrequency_hz = 1.9
+[[formula]]\nname = "own_power"\nterm = "-q*abs(v)^n*sign(v)"
+[formula.parameters]\nq = { power = "2 - n" }\nn = { power = 0 }
+[[effect]]\nname = "own_power"\nparameters = { q = 0.01, n = 1.5 }
+""",
+    "Coulomb friction": "gamma = 0.05\np = 0.6\nomega = 2.0\ntheta_r = 0.05\n",
+    "a direct drive": """gamma = 0.5\nomega = 0.6667
+[[formula]]\nname = "drive"\nterm = "f*cos(phase)"\nparameters = { f = { power = 2 } }
+[[effect]]\nname = "drive"\nparameters = { f = 0.3 }
+""",
+}
+COMMANDS = {
+    "simulate": ("--until", "20"),
+    "basins": ("--grid", "6", "--max-periods", "300"),
+    "map": ("--vary", "gamma", "0.3:0.6:3", "--p", "0.3:0.6:2", "--starts", "2"),
+    "bifurcation": ("--vary", "p", "0.3:0.6:4", "--starts", "2"),
+    "orbit": ("--grid", "5"),
+    "lyapunov": ("--max-periods", "300"),
+    "lifetime": ("--starts", "100", "--max-periods", "300"),
+    "tongues": ("--omega", "1.5:2.5:4", "--p-max", "2"),
+    "melnikov": ("--omega", "1.5"),
+}
+REFUSED = {
+    ("Coulomb friction", "tongues"): "friction holds it whatever the drive",
+    ("a direct drive", "tongues"): "a sideways drive moves it",
+    ("a direct drive", "melnikov"): "not proportional to p",
+}
+"""What has no meaning, and why."""
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("model", MODELS)
+def test_every_output_of_every_command_takes_every_model(
+    model: str,
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    # The figure is made, but no pixels: they take longer than all the rest.
+    monkeypatch.setattr(style, "write", lambda figure, part: part.write_text(str(figure)))
+    (tmp_path / "model.toml").write_text(f"[pendulum]\n{MODELS[model]}", encoding="utf-8")
+    files = ("--out", "a.nc", "--plot", "a.png", "--rerun", "a.rrd")
+    words = [command, "--model", "model.toml", *COMMANDS[command], *files, "--json"]
+    monkeypatch.setattr(sys, "argv", ["pendmap", *words])
+    with pytest.raises(SystemExit) as end:
+        cli.run()
+    out, err = capsys.readouterr()
+    there = {path.name for path in tmp_path.iterdir()} - {"model.toml"}
+    if (model, command) in REFUSED:
+        assert (end.value.code, len(err.splitlines()), there) == (2, 1, set())
+        assert REFUSED[model, command] in err
+        return
+    assert not end.value.code, err
+    assert there == {"a.nc", "a.png", "a.rrd"}
+    assert json.loads(out)
+    result = pendmap.load(tmp_path / "a.nc")
+    known = pendmap.load_model(tmp_path / "model.toml")
+    assert effects_of(result.attrs) == known.effects
+    figures.draw(result, tmp_path / "again.png")

@@ -1,0 +1,267 @@
+"""Whatever is selected from a result is drawn where its coordinates say, with its own shares."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from matplotlib.colors import to_rgb
+
+import pendmap
+from drawn import made, named
+from pendmap import InputError, Pendulum, figures, palette, viewer
+from pendmap.pictures import planes
+from pendmap.pictures.selection import shown
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy.typing as npt
+    import xarray as xr
+    from matplotlib.lines import Line2D
+
+FEW = (Phase.explicit, Phase.generate)
+"""A figure takes half a second: what fails is not made smaller."""
+
+SIDE = 9
+MAP = pendmap.basins(Pendulum(p=0.6), pendmap.Grid.square(SIDE))
+PLANE = pendmap.parameter_map(
+    Pendulum(), {"p": (0.5, 2.0, SIDE), "omega": (1.5, 2.5, SIDE - 2)}, starts=4
+)
+DIAGRAM = pendmap.bifurcation(Pendulum(), {"p": (0.6, 1.8, 24)}, starts=4)
+
+parts = st.one_of(
+    st.tuples(st.integers(0, 3), st.integers(4, SIDE), st.integers(1, 3), st.booleans()).map(
+        lambda s: list(range(*s[:3]))[:: -1 if s[3] else 1]
+    ),
+    st.lists(st.integers(0, 6), min_size=1, max_size=5, unique=True),
+)
+"""Places along an axis: a slice, every k-th, reversed, or any."""
+
+
+def selected(result: xr.Dataset, *, turned: bool, **places: list[int]) -> xr.Dataset:
+    """Return a part of a result, transposed where ``turned``."""
+    part = result.isel(dict(places))
+    return part.transpose() if turned else part
+
+
+def ends(low: float, high: float, count: int, kept: list[int]) -> tuple[float, float]:
+    """Return the outer edges of the cells that are kept, of ``count`` between low and high."""
+    edge = np.linspace(low, high, count + 1)
+    return edge[min(kept)], edge[max(kept) + 1]
+
+
+def at(image: npt.NDArray[Any], extent: list[float], x: float, y: float) -> Any:  # noqa: ANN401
+    """Return an image's value, row 0 lowest, at a place."""
+    rows, columns = image.shape[:2]
+    left, right, bottom, top = extent
+    return image[
+        int((y - bottom) / (top - bottom) * rows), int((x - left) / (right - left) * columns)
+    ]
+
+
+def colour(part: xr.Dataset, theta: float, velocity: float) -> tuple[int, int, int]:
+    """Return the colour of the attractor that a start of a basin map ends on."""
+    label = int(part["label"].sel(theta=theta, velocity=velocity))
+    names = {0: "undecided"} | dict(zip(part["id"].values, part["attractor"].values, strict=True))
+    return palette.rgb(str(names[label]))
+
+
+@settings(max_examples=5, phases=FEW)
+@given(theta=parts, velocity=parts, turned=st.booleans())
+def test_a_basin_map(*, theta: list[int], velocity: list[int], turned: bool) -> None:
+    part = selected(MAP, turned=turned, theta=theta, velocity=velocity)
+    figure = made(part)
+    wide, high = ends(-math.pi, math.pi, SIDE, theta), ends(-3, 3, SIDE, velocity)
+    for axes in figure.axes[:2]:
+        assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((*wide, *high))
+        assert axes.images[0].get_extent() == pytest.approx([*wide, *high])
+    labels, settle = (axes.images[-1] for axes in figure.axes[:2])
+    settles = int(part["settle_periods"].max()) >= 0
+    for x in part["theta"].values:
+        for y in part["velocity"].values:
+            own = colour(part, x, y)
+            assert tuple(at(np.asarray(labels.get_array()), labels.get_extent(), x, y)) == own
+            periods = int(part["settle_periods"].sel(theta=x, velocity=y))
+            if not settles:
+                continue
+            drawn = at(np.ma.filled(settle.get_array(), np.nan), settle.get_extent(), x, y)
+            assert np.isnan(drawn) if periods < 0 else drawn == max(periods, 1)
+    for name, text in zip(part["attractor"].values, named(figure), strict=False):
+        share = np.mean(part["label"].values == list(MAP["attractor"].values).index(name) + 1)
+        said = text.removeprefix(str(name).replace("-", "\N{MINUS SIGN}") + ", ").split()[0]
+        assert float(said) == pytest.approx(100 * share, abs=0.51)
+
+
+@settings(max_examples=5, phases=FEW)
+@given(theta=parts, velocity=parts, turned=st.booleans())
+@pytest.mark.usefixtures("strict_recordings")
+def test_the_recording_of_a_basin_map(
+    *, theta: list[int], velocity: list[int], turned: bool, tmp_path: Path
+) -> None:
+    part = selected(MAP, turned=turned, theta=theta, velocity=velocity)
+    back = recorded(part, tmp_path)
+    labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
+    extent = _extent(back, "/basin/data/labels", labels.shape)
+    wide, high = ends(-math.pi, math.pi, SIDE, theta), ends(-3, 3, SIDE, velocity)
+    assert extent == pytest.approx([*wide, *high], abs=1e-5)
+    for x in part["theta"].values:
+        for y in part["velocity"].values:
+            label = int(part["label"].sel(theta=x, velocity=y))
+            assert at(labels, extent, x, y) == label + 1
+
+
+def _extent(back: Any, entity: str, shape: tuple[int, ...]) -> list[float]:  # noqa: ANN401
+    """Return left, right, bottom, top of an image in a recording, in physical units."""
+    matrix = np.reshape(back.one(entity, "Transform3D:mat3x3"), (3, 3)).T
+    corners = np.array([[0.0, 0.0, 0.0], [shape[1], shape[0], 0.0]]) @ matrix.T
+    corners = corners + back.one(entity, "Transform3D:translation")
+    return [corners[0, 0], corners[1, 0], corners[0, 1], corners[1, 1]]
+
+
+@settings(max_examples=3, phases=FEW)
+@given(
+    p=parts,
+    omega=st.lists(st.integers(0, 6), min_size=1, max_size=7, unique=True),
+    turned=st.booleans(),
+)
+@pytest.mark.usefixtures("strict_recordings")
+def test_a_parameter_map(*, p: list[int], omega: list[int], turned: bool, tmp_path: Path) -> None:
+    part = selected(PLANE, turned=turned, p=p, omega=omega)
+    half = 1.5 / (SIDE - 1) / 2, 1.0 / (SIDE - 3) / 2
+    wide = ends(0.5 - half[0], 2 + half[0], SIDE, p)
+    high = ends(1.5 - half[1], 2.5 + half[1], SIDE - 2, omega)
+    figure = made(part)
+    for axes in figure.axes[:2]:
+        assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((*wide, *high))
+    kinds, exponent = (axes.images[0] for axes in figure.axes[:2])
+    listed = {kind.colour: kind for kind in planes.kinds(shown(part))}
+    back = recorded(part, tmp_path)
+    image = back.image("/kinds/data/kinds", "SegmentationImage", np.uint8)
+    extent = _extent(back, "/kinds/data/kinds", image.shape)
+    assert extent == pytest.approx([*wide, *high], abs=1e-5)
+    names = back.names("/kinds")
+    for x in part["p"].values:
+        for y in part["omega"].values:
+            cell = part.sel(p=x, omega=y)
+            own = str(PLANE["regime_kinds"].values[int(cell["regime"])])
+            drawn = at(np.asarray(kinds.get_array()), kinds.get_extent(), x, y)
+            (kind,) = (k for c, k in listed.items() if np.allclose(to_rgb(c), drawn))
+            assert any(f'"{member}"' in own for member in kind.members)
+            assert names[int(at(image, extent, x, y))] in {
+                k.name for k in listed.values() if any(f'"{m}"' in own for m in k.members)
+            }
+            value = at(np.ma.filled(exponent.get_array(), np.nan), exponent.get_extent(), x, y)
+            assert value == pytest.approx(float(cell["exponent"]), nan_ok=True)
+    cells = [str(PLANE["regime_kinds"].values[k]) for k in part["regime"].values.ravel()]
+    for kind in listed.values():
+        has = [any(f'"{member}"' in one for member in kind.members) for one in cells]
+        assert kind.presence == pytest.approx(np.mean(has))
+
+
+@settings(max_examples=4, phases=FEW)
+@given(p=st.lists(st.integers(0, 23), min_size=1, max_size=24, unique=True), turned=st.booleans())
+@pytest.mark.usefixtures("strict_recordings")
+def test_a_bifurcation_diagram(*, p: list[int], turned: bool, tmp_path: Path) -> None:
+    part = selected(DIAGRAM, turned=turned, p=p)
+    values = part["p"].values
+    half = 1.2 / 23 / 2
+    figure = made(part)
+    wide = ends(0.6 - half, 1.8 + half, 24, p)
+    assert figure.axes[0].get_xlim() == pytest.approx(wide)
+    lines = [np.asarray(line.get_xydata()) for line in figure.axes[0].lines]
+    drawn = {tuple(row) for line in lines for row in line if len(row)}
+    whole = zip(DIAGRAM["point_value"].values, DIAGRAM["point_theta"].values, strict=True)
+    loose = zip(DIAGRAM["loose_value"].values, DIAGRAM["loose_theta"].values, strict=True)
+    assert drawn == {pair for pair in (*whole, *loose) if pair[0] in values}
+    exponents = [np.asarray(line.get_xydata()) for line in figure.axes[2].lines[1:]]
+    assert {x for line in exponents for x in line[:, 0]} <= set(values)
+    strip = figure.axes[1].images[0]
+    for x in values:
+        for row, sweep in ((0.5, "up"), (-0.5, "down")):
+            number = int(DIAGRAM[sweep].sel(p=x))
+            colours = at(np.asarray(strip.get_array()), strip.get_extent(), x, row)
+            assert np.allclose(colours, 1.0) == (number < 0)
+    back = recorded(part, tmp_path)
+    points = [
+        np.array(rows["Points2D:positions"][0])
+        for entity, rows in back.columns.items()
+        if entity.startswith("/bifurcation/data/") and entity.endswith("/points")
+    ]
+    assert sum(map(len, points)) == np.isin(DIAGRAM["point_value"].values, values).sum()
+    assert ("A part is shown" in back.one("/summary", "TextDocument:text")) == (len(p) < 24)
+
+
+def test_curves_of_lifetimes_and_exponents(tmp_path: Path) -> None:
+    lives = pendmap.lifetime(Pendulum(p=1.2), starts=2000)
+    rate = pendmap.lyapunov(Pendulum(p=0.6), max_periods=600)
+    drawn_lives, drawn_rate = made(lives), made(rate)
+    for every in (1, 3):
+        cut = {"elapsed": slice(240, 20, -every), "tail_begin": slice(None, None, -1)}
+        part = lives.isel(cut).transpose()
+        figure = made(part)
+        for k in range(3):
+            assert_on(figure.axes[0].lines[k], drawn_lives.axes[0].lines[k])
+        kept = part["elapsed"].values
+        assert figure.axes[0].get_xlim() == pytest.approx((kept.min(), kept.max()))
+        viewer.record(part, tmp_path / "a.rrd")
+        part = rate.isel(elapsed=slice(None, 3, -every))
+        figure = made(part)
+        assert figure.axes[0].get_xlim()[0] == float(part["elapsed"].min())
+        assert len(figure.axes[0].lines[1].get_xydata()) == part.sizes["elapsed"]
+        for k in (0, 1):
+            assert_on(figure.axes[k].lines[1], drawn_rate.axes[k].lines[1])
+        viewer.record(part, tmp_path / "a.rrd")
+
+
+def assert_on(part: Line2D, whole: Line2D) -> None:
+    """Every point of a curve is one of the other's."""
+    own = dict(np.asarray(whole.get_xydata()).tolist())
+    shown = np.asarray(part.get_xydata())
+    for x, y in shown:
+        assert y == pytest.approx(own[x], nan_ok=True)
+
+
+def test_critical_curves_of_some_frequencies() -> None:
+    found = pendmap.tongues(Pendulum(), np.linspace(0.6, 2.4, 10), 2.0)
+    part = found.isel(omega=slice(None, 3, -1))
+    places = zip(found["critical_omega"].values, found["p"].values, strict=True)
+    kept = shown(part)
+    own = kept["omega"].values[kept["index"].values]
+    assert list(zip(own, kept["p"].values, strict=True)) == [
+        pair for pair in places if pair[0] in part["omega"].values
+    ]
+    made(part)
+
+
+def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path) -> None:
+    for part, says in (
+        (MAP.isel(theta=3), "theta is a single value here"),
+        (MAP.sel(theta=slice(7, 8)), "theta has no values here"),
+        (DIAGRAM.isel(entry=slice(1, None)), "entry: a selection of it cannot be drawn"),
+        (DIAGRAM.isel(kind=slice(1, None)), "kind: a selection of kinds cannot be drawn"),
+        (PLANE.isel(set=slice(1, None)), "set: a selection of it cannot be drawn"),
+    ):
+        for write, name in ((figures.draw, "a.png"), (viewer.record, "a.rrd")):
+            with pytest.raises(InputError, match=says):
+                write(part, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_part_says_what_its_summary_is_of(tmp_path: Path) -> None:
+    part = MAP.isel(theta=slice(0, 4))
+    assert part.attrs["summary"].startswith(
+        "theta = -3.14159 to 3.14159 rad, velocity = -3 to 3: 81 starts."
+    )
+    told = recorded(part, tmp_path).one("/summary", "TextDocument:text")
+    assert "A part is shown: theta = -3.14159 to -0.349066, velocity = -3 to 3, 36 cells of 81" in (
+        told
+    )
+    pendmap.save(part, tmp_path / "part.nc")
+    again = pendmap.load(tmp_path / "part.nc")
+    assert made(again).axes[0].get_xlim() == pytest.approx((-math.pi, -math.pi / 9))
