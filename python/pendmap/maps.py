@@ -95,6 +95,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     ------
     InputError
         If a value is outside its range, or no step reaches ``tol``.
+    MemoryError
+        If there is too little memory for the cells.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
 

@@ -14,6 +14,7 @@ use super::starts::Starts;
 use crate::error::Error;
 use crate::integrate::State;
 use crate::lanes::Path;
+use crate::memory;
 use crate::model::Pendulum;
 
 /// Cells between those of the coarsest grid.
@@ -21,6 +22,10 @@ const COARSEST: usize = 8;
 /// Distances over which cells exchange their attractors, pass after pass: what one cell alone has found
 /// comes to all that can have it.
 const EXCHANGES: [usize; 6] = [8, 4, 2, 1, 1, 1];
+/// Bytes of a cell: its attractors, and the arrays that they become ...
+const EACH: usize = 4096;
+/// ... and of each point that is kept of those that do not close.
+const ROOM: usize = 64;
 /// Starts of that measurement.
 const PROBES: usize = 100;
 
@@ -125,7 +130,7 @@ impl Plane<'_> {
 ///
 /// # Errors
 /// [`Error::NotMappable`] for effects that a map cannot have, [`Error::Range`] for a value outside its
-/// range, [`Error::Tolerance`] for a `tol` that no step reaches, [`Error::Interrupted`] if `control` was
+/// range, [`Error::Memory`] for too many cells, [`Error::Tolerance`] for a `tol` that no step reaches, [`Error::Interrupted`] if `control` was
 /// cancelled.
 pub fn parameter_map(
     base: &Pendulum,
@@ -139,6 +144,7 @@ pub fn parameter_map(
         let name = if count == 0 { "cells" } else { "starts" };
         return Err(Error::Range { name, value: 0.0, allowed: "1 or more" });
     }
+    memory::reckon("cells", count, EACH + ROOM * request.kept)?;
     (0..count).try_for_each(|cell| plane.pendulum(cell).check_mappable())?;
     let pool = pool(request.threads)?;
     let probes = Starts::List(request.starts.clone()).sampled_states(PROBES, 0);

@@ -18,8 +18,12 @@ use crate::fit::replay::replay as replayed;
 use crate::fit::window::Window;
 use crate::fit::{Counts, Free, Problem, Record, RodSensor, Settings, Slot, fit};
 use crate::integrate::State;
+use crate::memory;
 use crate::model::Recorded;
 use crate::model::recorded::{Quantity, Samples};
+
+/// Bytes of a reading that is made: its state, itself in a row, and in the array of all.
+const EACH_READING: usize = 40;
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
@@ -252,6 +256,7 @@ pub fn replay<'py>(
     }
     let starts: Vec<State> = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
     let times = times.as_slice()?.to_vec();
+    memory::reckon("readings", starts.len().saturating_mul(times.len()), EACH_READING)?;
     let all = pooled(py, threads, progress.as_ref(), |control| {
         control.begin(starts.len());
         let done = || control.add(1);

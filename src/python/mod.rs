@@ -18,16 +18,19 @@ use pyo3::prelude::*;
 
 use crate::error::Error;
 use crate::lanes::Path;
+use crate::memory;
 use crate::model::formula::{ParameterSpec, Spec};
 use crate::model::{Effect, Formula, Kind, Pendulum};
 
-/// One mapping of errors for all functions: what the caller gave is a `ValueError`.
+/// One mapping of errors for all functions: what the caller gave is a `ValueError`, what the system
+/// refuses a `MemoryError` or an `OSError`.
 impl From<Error> for PyErr {
     fn from(error: Error) -> Self {
-        use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+        use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOSError, PyValueError};
         match error {
             Error::Interrupted => PyKeyboardInterrupt::new_err(()),
-            Error::Threads(_) => PyRuntimeError::new_err(error.to_string()),
+            Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
+            Error::Threads(_) => PyOSError::new_err(error.to_string()),
             _ => PyValueError::new_err(error.to_string()),
         }
     }
@@ -98,6 +101,12 @@ fn simd_available() -> Vec<&'static str> {
     Path::ALL.into_iter().filter(|path| path.available()).map(Path::name).collect()
 }
 
+/// Refuses `count` of `what`, with `each` bytes each, where that is more memory than is free.
+#[pyfunction]
+fn reckon(what: &str, count: usize, each: usize) -> PyResult<()> {
+    Ok(memory::reckon(what, count, each)?)
+}
+
 /// Number of threads that a call uses if none is given.
 #[pyfunction]
 fn default_threads() -> usize {
@@ -111,6 +120,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_function(wrap_pyfunction!(simd, module)?)?;
     module.add_function(wrap_pyfunction!(simd_available, module)?)?;
+    module.add_function(wrap_pyfunction!(reckon, module)?)?;
     module.add_function(wrap_pyfunction!(default_threads, module)?)?;
     module.add_function(wrap_pyfunction!(library::effects, module)?)?;
     module.add_function(wrap_pyfunction!(library::formula, module)?)?;

@@ -51,10 +51,12 @@ pub fn stopped<T: Send>(
         thread::scope(|scope| {
             let (sender, receiver) = channel();
             let shared = &control;
-            scope.spawn(move || {
+            let task = move || {
                 // The receiver waits until this arrives, so it is still there.
                 let _ = sender.send(work(shared));
-            });
+            };
+            let begun = thread::Builder::new().spawn_scoped(scope, task);
+            begun.map_err(|why| Error::Threads(why.to_string()))?;
             let mut stop: Option<PyErr> = None;
             loop {
                 match receiver.recv_timeout(PAUSE) {

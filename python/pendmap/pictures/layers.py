@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap import _core
 from pendmap.errors import InputError
 from pendmap.model import Effect
 from pendmap.model.rig import COUNTERPARTS
@@ -21,12 +22,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "BYTES_OF_CELL",
     "VARIABLES",
     "finite_time",
     "layers",
     "named",
     "parameters",
     "refuse_lists",
+    "refuse_too_large",
     "reliable",
     "settles",
     "symbol",
@@ -34,6 +37,12 @@ __all__ = [
     "warning",
     "what",
 ]
+
+BYTES_OF_CELL = 64
+"""What a cell of a basin map takes in all while its figure and its recording are made."""
+
+BYTES_OF_VALUE = 16
+"""What a value of a dataset takes, whatever it is, while a picture of it is made."""
 
 VARIABLES = {
     "labels": "label",
@@ -84,6 +93,17 @@ def refuse_lists(dataset: xr.Dataset) -> None:
     """
     if dataset.attrs.get("kind") == "basins" and "theta" not in dataset.dims:
         raise InputError("a list of starts is no map: only basins on a grid can be drawn")
+
+
+def refuse_too_large(dataset: xr.Dataset) -> None:
+    """Refuse a dataset whose picture would need more memory than is free.
+
+    Raises
+    ------
+    MemoryError
+        With what it needs and what is free.
+    """
+    _core.reckon("values", sum(values.size for values in dataset.variables.values()), BYTES_OF_VALUE)
 
 
 def settles(dataset: xr.Dataset) -> bool:

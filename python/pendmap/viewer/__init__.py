@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError
 from pendmap.files import whole_file
-from pendmap.pictures.layers import refuse_lists
+from pendmap.pictures.layers import refuse_lists, refuse_too_large
 from pendmap.viewer import (
     basins,
     diagrams,
@@ -115,6 +115,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     ------
     InputError
         For an unknown kind of dataset or suffix.
+    MemoryError
+        If the dataset is too large.
     OSError
         If the file cannot be written.
     """
@@ -123,6 +125,7 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         known = ", ".join(_KINDS)
         raise InputError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
     refuse_lists(dataset)
+    refuse_too_large(dataset)
     layout, log = _KINDS[kind]
     with whole_file(path, SUFFIXES) as part, frame.strict():
         recording = frame.recording(dataset)
