@@ -103,7 +103,9 @@ def refuse_too_large(dataset: xr.Dataset) -> None:
     MemoryError
         With what it needs and what is free.
     """
-    _core.reckon("values", sum(values.size for values in dataset.variables.values()), BYTES_OF_VALUE)
+    _core.reckon(
+        "values", sum(values.size for values in dataset.variables.values()), BYTES_OF_VALUE
+    )
 
 
 def settles(dataset: xr.Dataset) -> bool:
