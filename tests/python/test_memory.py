@@ -37,8 +37,8 @@ calls = {
         pendulum, {"p": (0.1, 1.0, 20000), "gamma": (0.1, 0.2, 20000)}
     ),
     "simulate": lambda: pendmap.simulate(pendulum, 1.0, 0.0, 5e4, samples=10000),
-    "basins_of": lambda: pendmap.basins_of(pendulum, *np.broadcast_to(0.5, (2, 10**8))),
-    "advance": lambda: pendmap.advance(pendulum, *np.broadcast_to(0.5, (2, 4 * 10**8)), 1),
+    "basins_of": lambda: pendmap.basins_of(pendulum, *np.broadcast_to(0.5, (2, 10**9))),
+    "advance": lambda: pendmap.advance(pendulum, *np.broadcast_to(0.5, (2, 10**9)), 1),
     "growth": lambda: _core.growth(
         pendulum.parameters, np.zeros(10**4), np.zeros(10**4), 10**6, 1, 20, 1
     ),
