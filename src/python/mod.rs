@@ -19,6 +19,7 @@ use pyo3::prelude::*;
 use crate::error::Error;
 use crate::lanes::Path;
 use crate::memory;
+use crate::model::effects::Role;
 use crate::model::formula::{ParameterSpec, Spec};
 use crate::model::{Effect, Formula, Kind, Pendulum};
 
@@ -52,8 +53,10 @@ enum Which {
 /// `(name, term, revealed by, parameters)`.
 type FormulaTuple = (String, String, String, Vec<ParameterTuple>);
 
-/// `(name, power of w0, place of the parameter to be taken off it, unit, range, typical, meaning)`.
-type ParameterTuple = (String, f64, Option<usize>, String, [f64; 2], [f64; 2], String);
+/// `(name, power of w0, place of the parameter to be taken off it, unit, range, typical, meaning,
+/// role)`.
+type ParameterTuple =
+    (String, f64, Option<usize>, String, [f64; 2], [f64; 2], String, Option<String>);
 
 impl Which {
     fn kind(self) -> Result<Kind, Error> {
@@ -66,8 +69,9 @@ impl Which {
 
 fn formula_of(given: FormulaTuple) -> Result<&'static Formula, Error> {
     let (name, term, revealed_by, parameters) = given;
-    let parameter = |(name, power, less, unit, range, typical, meaning): ParameterTuple| {
-        ParameterSpec { name, power, less, unit, range, typical, meaning }
+    let parameter = |(name, power, less, unit, range, typical, meaning, role): ParameterTuple| {
+        let role = Role::ALL.into_iter().find(|known| Some(known.words()) == role.as_deref());
+        ParameterSpec { name, power, less, unit, range, typical, meaning, role }
     };
     let parameters = parameters.into_iter().map(parameter).collect();
     Formula::new(&Spec { name, term, revealed_by, parameters })
@@ -123,6 +127,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(reckon, module)?)?;
     module.add_function(wrap_pyfunction!(default_threads, module)?)?;
     module.add_function(wrap_pyfunction!(library::effects, module)?)?;
+    module.add_function(wrap_pyfunction!(library::roles, module)?)?;
     module.add_function(wrap_pyfunction!(library::formula, module)?)?;
     module.add_function(wrap_pyfunction!(period, module)?)?;
     module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
