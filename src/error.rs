@@ -75,11 +75,22 @@ pub enum Error {
         /// The smallest error reached.
         reached: f64,
     },
+    /// More memory than is free.
+    Memory {
+        /// What there would be too many of.
+        what: String,
+        /// How many.
+        count: usize,
+        /// Bytes that they need.
+        needed: f64,
+        /// Bytes that are free, where the system says it.
+        free: Option<f64>,
+    },
     /// Motions leave the range of numbers.
     Diverges,
     /// The caller asked to stop.
     Interrupted,
-    /// The thread pool could not be made.
+    /// A thread could not be made.
     Threads(String),
 }
 
@@ -117,6 +128,13 @@ impl fmt::Display for Error {
                 f,
                 "tol is {tol:e}: the smallest error that steps can reach here is {reached:.1e}"
             ),
+            Self::Memory { what, count, needed, free } => {
+                write!(f, "{count} {what} need about {:.3} GB, ", needed / 1e9)?;
+                match free {
+                    Some(free) => write!(f, "{:.3} GB are free: allowed are fewer", free / 1e9),
+                    None => f.write_str("more than is free: allowed are fewer"),
+                }
+            }
             Self::Diverges => f.write_str(
                 "the motion leaves the range of numbers: it begins too fast, or a torque or effect of \
                  this model feeds it energy",

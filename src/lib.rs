@@ -16,10 +16,11 @@
 //! | What does the whole plane of initial conditions do? | [`maps`] |
 //! | Which parameters does a record's pendulum have? | [`fit`] |
 //! | How do many trajectories share a register? | [`lanes`] |
+//! | Is there enough memory? | [`memory`] |
 //! | What was wrong with my request? | [`error`] |
 //!
 //! Imports run upwards in that list's reverse: `maps` -> `attractor`, `orbit` -> `integrate` ->
-//! `model` -> `lanes` -> `error`, and `fit` -> `integrate`. Threads live in `maps` and `fit` alone.
+//! `model` -> `lanes` -> `memory` -> `error`, and `fit` -> `integrate`. Threads live in `maps` and `fit` alone.
 //!
 //! ```
 //! use pendmap::maps::basins::{Options, basins};
@@ -46,6 +47,7 @@ pub mod fit;
 pub mod integrate;
 pub mod lanes;
 pub mod maps;
+pub mod memory;
 pub mod model;
 pub mod orbit;
 #[cfg(feature = "python")]

@@ -25,7 +25,9 @@ __all__ = [
     "parameter_map",
     "parameter_names",
     "period",
+    "reckon",
     "replay",
+    "roles",
     "simd",
     "simd_available",
     "simulate",
@@ -36,7 +38,7 @@ __all__ = [
 __version__: str
 
 _FormulaParameter: TypeAlias = tuple[
-    str, float, int | None, str, tuple[float, float], tuple[float, float], str
+    str, float, int | None, str, tuple[float, float], tuple[float, float], str, str | None
 ]
 _Formula: TypeAlias = tuple[str, str, str, Sequence[_FormulaParameter]]
 _Parameters: TypeAlias = tuple[
@@ -74,7 +76,9 @@ class _ExponentChoices(TypedDict):
 
 def simd() -> str: ...
 def simd_available() -> list[str]: ...
+def reckon(what: str, count: int, each: int) -> None: ...
 def default_threads() -> int: ...
+def roles() -> list[str]: ...
 def effects() -> list[dict[str, Any]]: ...
 def formula(given: _Formula) -> tuple[dict[str, Any], bool]: ...
 def period(parameters: _Parameters) -> float: ...

@@ -90,6 +90,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     InputError
         If a parameter or value is not allowed, the model has an effect that no map can have, or no
         step reaches ``tol``.
+    MemoryError
+        If there is too little memory for the values.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
     """

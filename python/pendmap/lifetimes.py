@@ -107,6 +107,8 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is outside its range, or the model has an effect that no map can have.
+    MemoryError
+        If there is too little memory for the starts.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
 

@@ -113,6 +113,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is outside its range, or the model has an effect that no map can have.
+    MemoryError
+        If there is too little memory for the grid.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
     """
@@ -156,6 +158,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         "cells": grid.cells,
         "begun": raw["begun"],
         "seconds": time.perf_counter() - began,
+        "simd": _core.simd(),
         "threads": workers or _core.default_threads(),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,

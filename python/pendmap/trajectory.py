@@ -98,6 +98,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is not finite or outside its range.
+    MemoryError
+        If there is too little memory for the samples.
     KeyboardInterrupt
         After Ctrl-C, without ``live`` or before the first sample.
     """

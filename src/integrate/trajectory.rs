@@ -11,6 +11,7 @@ use super::sample::{Sampled, sample};
 use super::stroboscopic::State;
 use super::tangent::{Number, Tangent};
 use crate::error::Error;
+use crate::memory;
 use crate::model::Pendulum;
 
 /// The first error of a step tried, over the tolerance.
@@ -21,6 +22,10 @@ const TIGHTENING: f64 = 16.0;
 const ROUNDING: f64 = 1e-7;
 /// Angles beyond this are taken a number of whole turns nearer.
 const FAR: f64 = 100.0;
+/// Bytes of a sample: time, state, what a tangent adds, and their copies.
+const EACH: usize = 120;
+/// Turns, sticks and releases in a period, generously, each as large as a sample.
+const EVENTS: usize = 4;
 /// Batches whose spread gives the standard error of an exponent.
 const BATCHES: usize = 20;
 /// The part of a trajectory that turns the tangent into the direction of growth.
@@ -72,8 +77,8 @@ pub struct Request {
 /// says what was reached. Time in the laboratory goes on.
 ///
 /// # Errors
-/// [`Error::Range`] for a value that is not finite or outside its range, [`Error::Interrupted`] if
-/// `cancel` was set.
+/// [`Error::Range`] for a value that is not finite or outside its range, [`Error::Memory`] for too many
+/// samples, [`Error::Interrupted`] if `cancel` was set.
 pub fn simulate(
     pendulum: &Pendulum,
     request: &Request,
@@ -121,6 +126,9 @@ fn from(
 ) -> Result<Trajectory, Error> {
     let (tolerance, reached_error) = choose(pendulum, request, cancel)?;
     let interval = pendulum.period() / request.samples as f64;
+    let count = (request.until / interval) as usize;
+    let events = EVENTS.saturating_mul((request.until / pendulum.period()) as usize);
+    memory::reckon("samples", count.saturating_add(events), EACH)?;
     let mut time = times(request.until, interval);
     seen(time[0], request.start);
     let mut known = 1;

@@ -5,17 +5,20 @@ use rayon::prelude::*;
 use super::control::{Control, pool};
 use crate::error::Error;
 use crate::integrate::Strobe;
+use crate::memory;
 
 /// Starts that one task takes: enough to fill any bundle many times.
 const BLOCK: usize = 1024;
 /// Periods between two looks at the control.
 const STRETCH: usize = 64;
+/// Bytes of a start: where it began and its turns.
+const EACH: usize = 24;
 
 /// Advances every start by `periods` forcing periods, in place; the net turns come back.
 ///
 /// # Errors
 /// [`Error::Lengths`] if the slices differ in length, [`Error::NotMappable`] for effects that a map
-/// cannot have, [`Error::Interrupted`] after [`Control::cancel`].
+/// cannot have, [`Error::Memory`], [`Error::Interrupted`] after [`Control::cancel`].
 pub fn advance(
     strobe: &Strobe,
     theta: &mut [f64],
@@ -29,6 +32,7 @@ pub fn advance(
         return Err(Error::Lengths { given, names: ("theta", "velocity") });
     }
     strobe.pendulum.check_mappable()?;
+    memory::reckon("starts", theta.len(), EACH)?;
     control.begin(theta.len());
     let first = theta.to_vec();
     let mut turns = vec![0.0; theta.len()];

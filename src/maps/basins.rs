@@ -12,6 +12,7 @@ use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
 use crate::integrate::{State, Strobe, accuracy};
 use crate::lanes::Path;
+use crate::memory;
 use crate::model::Pendulum;
 
 /// Starts whose step error is measured.
@@ -29,6 +30,8 @@ const LEAST_BOUND: u32 = 200;
 /// Cells of a map from which its uncertainty exponent is worth the 50,000 starts that it takes; a
 /// smaller map is a sketch, whatever a start costs.
 const LEAST_CELLS: usize = 10_000;
+/// Bytes of a start: label, settling time, turns, exponent, and what copies them.
+const EACH: usize = 32;
 
 /// What to compute, and how well.
 #[derive(Clone, Copy, Debug)]
@@ -142,6 +145,7 @@ impl BasinMap {
 /// # Errors
 /// [`Error::NotMappable`] for effects that a map cannot have,
 /// [`Error::Range`] and [`Error::Tolerance`] for requests that cannot be met,
+/// [`Error::Memory`] for more starts than there is memory for,
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn basins(
     pendulum: &Pendulum,
@@ -154,6 +158,7 @@ pub fn basins(
     if starts.is_empty() {
         return Err(Error::Range { name: "starts", value: 0.0, allowed: "1 or more" });
     }
+    memory::reckon("starts", starts.len(), EACH)?;
     let pool = pool(options.threads)?;
     let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
     let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, path)?;
@@ -272,7 +277,10 @@ fn to_capture(
             *label = moved[*label as usize - 1];
         }
         now = bound(catalogue).max(now);
-        let picks: Vec<usize> = labels.open.iter().map(|(i, _)| *i).collect();
+        let mut picks = Vec::new();
+        memory::room("starts", &mut picks, labels.open.len())?;
+        picks.extend(labels.open.iter().map(|(i, _)| *i));
+        memory::reckon("starts", picks.len(), EACH)?;
         let again = label(strobe, catalogue, starts, Some(&picks), now, pool, control)?;
         labels.replace(&picks, again);
     }

@@ -139,7 +139,7 @@ impl Course<'_> {
                 let monodromy = [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)], product];
                 return Some(Place { p, point, monodromy });
             }
-            if !(size < before) {
+            if size.is_nan() || size >= before {
                 return None;
             }
             before = size;
@@ -185,7 +185,7 @@ impl Course<'_> {
         let mut here = self.solved(pendulum, near.p + 1e-4 * (1.0 + near.p), near.point)?;
         for _ in 0..ITERATIONS {
             let step = size(&here) * (here.p - before.p) / (size(&here) - size(&before));
-            if step.abs() > NEAR * (1.0 + here.p) || !(here.p - step > 0.0) {
+            if step.abs() > NEAR * (1.0 + here.p) || step.is_nan() || here.p <= step {
                 return None;
             }
             let ratio = -step / (here.p - before.p);

@@ -49,7 +49,8 @@ impl Control {
 /// More workers than this only wait for one another.
 const MOST_THREADS: usize = 256;
 
-/// A pool of `threads` workers; 0 means one for each processor.
+/// A pool of `threads` workers; 0 means one for each processor. It lives as long as the call that made
+/// it: a child of the process has none of its parent's threads, and would wait for them.
 ///
 /// # Errors
 /// [`Error::Range`] above 256, [`Error::Threads`] if the system refuses.

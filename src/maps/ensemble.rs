@@ -7,6 +7,7 @@ use super::growth::Bundle;
 use crate::attractor::chaos::mean_and_error;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
+use crate::memory;
 use crate::model::pendulum::Route;
 use crate::orbit::PoincareMap;
 
@@ -83,6 +84,7 @@ impl Run<'_> {
             control.begin(done + new);
             let rows = bundle.grow(self.strobe, new, WINDOW, pool, control)?;
             for (all, row) in growth.iter_mut().zip(rows) {
+                memory::room("windows", all, row.len())?;
                 all.extend(row);
             }
             let done = done + new;

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::control::Control;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
+use crate::memory;
 
 /// Trajectories that one task takes.
 const BLOCK: usize = 32;
@@ -125,6 +126,8 @@ impl Course {
     ) -> Result<(), Error> {
         while self.growth.len() < periods {
             let rows = self.bundle.grow(strobe, 1, 1, pool, control)?;
+            memory::room("periods", &mut self.growth, 1)?;
+            memory::room("periods", &mut self.states, 1)?;
             self.growth.extend(rows.into_iter().flatten());
             self.states.extend(self.bundle.states());
         }

@@ -9,6 +9,7 @@ use crate::attractor::Catalogue;
 use crate::attractor::capture::{self, Fate, Outcome, Source};
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
+use crate::memory;
 
 /// Not decided within the bound.
 pub const UNDECIDED: i16 = 0;
@@ -66,6 +67,8 @@ struct Worker<'a> {
     lot: Vec<(usize, State)>,
     open: Vec<(usize, State)>,
     work: u64,
+    /// Whether there was no memory for all that is open.
+    full: Option<Error>,
 }
 
 impl Source for Worker<'_> {
@@ -109,6 +112,10 @@ impl Worker<'_> {
     fn sort_lot(&mut self) {
         let Shared { catalogue, strobe, label, .. } = self.shared;
         let lot = std::mem::take(&mut self.lot);
+        if let Err(error) = memory::room("starts", &mut self.open, lot.len()) {
+            self.full = Some(error);
+            return;
+        }
         let states: Vec<State> = lot.iter().map(|(_, state)| *state).collect();
         for ((index, state), home) in lot.into_iter().zip(catalogue.homes(strobe, &states)) {
             match home {
@@ -125,7 +132,8 @@ impl Worker<'_> {
 /// order in which they take work shows.
 ///
 /// # Errors
-/// [`Error::Interrupted`] if `control` was cancelled; [`Error::Threads`] without a pool.
+/// [`Error::Interrupted`] if `control` was cancelled; [`Error::Memory`] without room for
+/// what is undecided.
 pub fn label(
     strobe: &Strobe,
     catalogue: &Catalogue,
@@ -149,19 +157,27 @@ pub fn label(
         open: Mutex::new(Vec::new()),
     };
     control.begin(count);
-    let work: u64 = pool
+    let work: Result<Vec<u64>, Error> = pool
         .broadcast(|_| {
-            let mut worker =
-                Worker { shared: &shared, range: 0..0, lot: Vec::new(), open: Vec::new(), work: 0 };
+            let mut worker = Worker {
+                shared: &shared,
+                range: 0..0,
+                lot: Vec::new(),
+                open: Vec::new(),
+                work: 0,
+                full: None,
+            };
             capture::run(strobe, &catalogue.traps, bound, control.flag(), &mut worker);
             worker.sort_lot();
             if let Ok(mut open) = shared.open.lock() {
+                memory::room("starts", &mut open, worker.open.len())?;
                 open.append(&mut worker.open);
             }
-            worker.work
+            worker.full.map_or(Ok(worker.work), Err)
         })
         .into_iter()
-        .sum();
+        .collect();
+    let work = work?.into_iter().sum();
     control.check()?;
     let mut open = shared.open.into_inner().unwrap_or_default();
     open.sort_by_key(|(index, _)| *index);

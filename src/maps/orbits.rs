@@ -18,6 +18,7 @@ use super::vanishing;
 use crate::error::Error;
 use crate::integrate::{State, accuracy};
 use crate::lanes::Path;
+use crate::memory;
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
@@ -28,6 +29,8 @@ use crate::orbit::symmetry::Mirror;
 pub const LONGEST: usize = 64;
 /// The error of the displacements after five periods: they only say where to begin.
 const TOLERANCE: f64 = 1e-6;
+/// Bytes of a cell: its corner, where it comes to, and what both are made of.
+const EACH: usize = 128;
 /// Starts whose step error is measured.
 const ERROR_SAMPLE: usize = 200;
 /// Newton's method may wander so many cells away from where it began, and at least ...
@@ -79,13 +82,15 @@ pub struct Orbits {
 ///
 /// # Errors
 /// [`Error::NotMappable`] for effects that a map cannot have, [`Error::Range`] for an `n` out of
-/// range, [`Error::Interrupted`] if `control` was cancelled.
+/// range, [`Error::Memory`] for too fine a grid, [`Error::Interrupted`] if `control` was cancelled.
 pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Result<Orbits, Error> {
     pendulum.check_mappable()?;
     if !(1..=LONGEST).contains(&request.n) {
         let value = request.n as f64;
         return Err(Error::Range { name: "n", value, allowed: "1 to 64" });
     }
+    let cells = request.theta.count * request.velocity.count;
+    memory::reckon("cells", cells, EACH)?;
     let none = Orbits { closed: Vec::new(), running: Vec::new(), begun: 0 };
     if pendulum.is_autonomous() && (request.n, request.w) != (1, 0) {
         // A flow in the plane closes without turns where it is conservative, and then everywhere.

@@ -14,6 +14,7 @@ use super::starts::Starts;
 use crate::error::Error;
 use crate::integrate::State;
 use crate::lanes::Path;
+use crate::memory;
 use crate::model::Pendulum;
 
 /// Cells between those of the coarsest grid.
@@ -23,6 +24,10 @@ const COARSEST: usize = 8;
 const EXCHANGES: [usize; 3] = [8, 4, 2];
 /// Passes between next neighbours at the most; they end where no cell has gained an attractor.
 const MOST_PASSES: usize = 64;
+/// Bytes of a cell: its attractors, and the arrays that they become ...
+const EACH: usize = 4096;
+/// ... and of each point that is kept of those that do not close.
+const ROOM: usize = 64;
 /// Starts of that measurement.
 const PROBES: usize = 100;
 
@@ -127,7 +132,7 @@ impl Plane<'_> {
 ///
 /// # Errors
 /// [`Error::NotMappable`] for effects that a map cannot have, [`Error::Range`] for a value outside its
-/// range, [`Error::Tolerance`] for a `tol` that no step reaches, [`Error::Interrupted`] if `control` was
+/// range, [`Error::Memory`] for too many cells, [`Error::Tolerance`] for a `tol` that no step reaches, [`Error::Interrupted`] if `control` was
 /// cancelled.
 pub fn parameter_map(
     base: &Pendulum,
@@ -141,6 +146,7 @@ pub fn parameter_map(
         let name = if count == 0 { "cells" } else { "starts" };
         return Err(Error::Range { name, value: 0.0, allowed: "1 or more" });
     }
+    memory::reckon("cells", count, EACH + ROOM * request.kept)?;
     (0..count).try_for_each(|cell| plane.pendulum(cell).check_mappable())?;
     let pool = pool(request.threads)?;
     let probes = Starts::List(request.starts.clone()).sampled_states(PROBES, 0);

@@ -14,6 +14,7 @@ use crate::maps::control::pool;
 use crate::maps::ensemble::WINDOW;
 use crate::maps::growth::Bundle;
 use crate::maps::lyapunov::{End, Request, lyapunov as exponent_of};
+use crate::memory;
 
 /// Numerical choices as Python hands them over.
 #[derive(FromPyObject)]
@@ -96,6 +97,8 @@ pub fn growth<'py>(
         let given = (theta.len(), velocity.len());
         return Err(Error::Lengths { given, names: ("theta", "velocity") }.into());
     }
+    // A row of windows for each start, and the array of all.
+    memory::reckon("starts", theta.len(), 16 * windows.saturating_add(8))?;
     let states: Vec<State> = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
     let strobe = Strobe::new(&pendulum, steps_per_period, Path::choose()?);
     let pool = pool(threads)?;

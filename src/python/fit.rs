@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use super::watch::watched;
+use super::watch::pooled;
 use super::{Parameters, pendulum};
 use crate::error::Error;
 use crate::fit::descent::Point;
@@ -18,9 +18,12 @@ use crate::fit::replay::replay as replayed;
 use crate::fit::window::Window;
 use crate::fit::{Counts, Free, Problem, Record, RodSensor, Settings, Slot, fit};
 use crate::integrate::State;
-use crate::maps::control::pool;
+use crate::memory;
 use crate::model::Recorded;
 use crate::model::recorded::{Quantity, Samples};
+
+/// Bytes of a reading that is made: its state, itself in a row, and in the array of all.
+const EACH_READING: usize = 40;
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
@@ -171,7 +174,7 @@ pub fn fit_runs<'py>(
     let given = windows.map(|given| self::windows(given, &problem)).transpose()?;
     let FitChoices { shortest, growth, steps, gain, hold, target, .. } = choices;
     let settings = Settings { shortest, growth, steps, gain, hold, target };
-    let (found, ends) = watched(py, None, |control| {
+    let (found, ends) = pooled(py, 0, None, |control| {
         let found = fit(&problem, settings, given, control.flag())?;
         let level = choices.level * found.widening(&problem, choices.doubt);
         let ends = intervals(&problem, &found.point, &choices.profiled, level, control.flag())?;
@@ -199,7 +202,7 @@ pub fn fit_equations<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let problem = problem(runs, &free, tolerance)?;
     let windows = self::windows(windows, &problem)?;
-    let at = watched(py, None, |_| Point::new(&problem, problem.start(), windows))?;
+    let at = pooled(py, 0, None, |_| Point::new(&problem, problem.start(), windows))?;
     point(py, &problem, &at)
 }
 
@@ -216,7 +219,7 @@ pub fn fit_rows<'py>(
 ) -> PyResult<Bound<'py, PyList>> {
     let problem = problem(runs, &free, tolerance)?;
     let windows = self::windows(windows, &problem)?;
-    let all = watched(py, None, |_| {
+    let all = pooled(py, 0, None, |_| {
         linearised(&problem, &problem.start(), &windows).ok_or(Error::Diverges)
     })?;
     let list = PyList::empty(py);
@@ -253,11 +256,11 @@ pub fn replay<'py>(
     }
     let starts: Vec<State> = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
     let times = times.as_slice()?.to_vec();
-    let all = watched(py, progress.as_ref(), |control| {
+    memory::reckon("readings", starts.len().saturating_mul(times.len()), EACH_READING)?;
+    let all = pooled(py, threads, progress.as_ref(), |control| {
         control.begin(starts.len());
         let done = || control.add(1);
-        pool(threads)?
-            .install(|| replayed(&record, &starts, &times, tolerance, control.flag(), &done))
+        replayed(&record, &starts, &times, tolerance, control.flag(), &done)
     })?;
     let flat: Vec<f64> = all.into_iter().flatten().collect();
     flat.into_pyarray(py).reshape([starts.len(), times.len()])

@@ -5,7 +5,7 @@ use pyo3::types::{PyDict, PyList};
 
 use super::{FormulaTuple, formula_of};
 use crate::model::Kind;
-use crate::model::effects::Power;
+use crate::model::effects::{Power, Role};
 
 /// Name, group, family, formula, parameters and the rest of every effect.
 #[pyfunction]
@@ -15,6 +15,12 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         list.append(entry(py, kind)?)?;
     }
     Ok(list)
+}
+
+/// The words for what a parameter may do.
+#[pyfunction]
+pub fn roles() -> Vec<&'static str> {
+    Role::ALL.into_iter().map(Role::words).collect()
 }
 
 /// The same of a user's own effect, which is checked; and whether it is proportional to its first
@@ -38,6 +44,7 @@ fn entry(py: Python<'_>, kind: Kind) -> PyResult<Bound<'_, PyDict>> {
     for parameter in definition.parameters {
         let entry = PyDict::new(py);
         entry.set_item("name", parameter.name)?;
+        entry.set_item("role", parameter.role.words())?;
         entry.set_item("unit", parameter.unit)?;
         // w0 to this power, or to 2 less the value of the parameter of that name.
         let mut exponent = None;

@@ -11,6 +11,7 @@ use crate::maps::basins::{Options, basins};
 use crate::maps::control::pool;
 use crate::maps::starts::{Axis, Starts};
 use crate::maps::texture::of_cells;
+use crate::memory;
 
 /// `(low, high, count)` as Python hands it over.
 pub type AxisTuple = (f64, f64, usize);
@@ -70,6 +71,8 @@ pub fn basins_list<'py>(
         let allowed = "finite starts only";
         return Err(Error::Range { name: "start", value: *value, allowed }.into());
     }
+    // Angle and velocity, and all that a map and its dataset have of a start.
+    memory::reckon("starts", theta.len(), 100)?;
     let states = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
     run(py, parameters, Starts::List(states), choices, progress)
 }

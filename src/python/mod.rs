@@ -19,16 +19,20 @@ use pyo3::prelude::*;
 use crate::error::Error;
 use crate::lanes::Path;
 use crate::maps::bounds::{LEAST, cell_periods, max_periods};
+use crate::memory;
+use crate::model::effects::Role;
 use crate::model::formula::{ParameterSpec, Spec};
 use crate::model::{Effect, Formula, Kind, Pendulum};
 
-/// One mapping of errors for all functions: what the caller gave is a `ValueError`.
+/// One mapping of errors for all functions: what the caller gave is a `ValueError`, what the system
+/// refuses a `MemoryError` or an `OSError`.
 impl From<Error> for PyErr {
     fn from(error: Error) -> Self {
-        use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+        use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOSError, PyValueError};
         match error {
             Error::Interrupted => PyKeyboardInterrupt::new_err(()),
-            Error::Threads(_) => PyRuntimeError::new_err(error.to_string()),
+            Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
+            Error::Threads(_) => PyOSError::new_err(error.to_string()),
             _ => PyValueError::new_err(error.to_string()),
         }
     }
@@ -50,8 +54,10 @@ enum Which {
 /// `(name, term, revealed by, parameters)`.
 type FormulaTuple = (String, String, String, Vec<ParameterTuple>);
 
-/// `(name, power of w0, place of the parameter to be taken off it, unit, range, typical, meaning)`.
-type ParameterTuple = (String, f64, Option<usize>, String, [f64; 2], [f64; 2], String);
+/// `(name, power of w0, place of the parameter to be taken off it, unit, range, typical, meaning,
+/// role)`.
+type ParameterTuple =
+    (String, f64, Option<usize>, String, [f64; 2], [f64; 2], String, Option<String>);
 
 impl Which {
     fn kind(self) -> Result<Kind, Error> {
@@ -64,8 +70,9 @@ impl Which {
 
 fn formula_of(given: FormulaTuple) -> Result<&'static Formula, Error> {
     let (name, term, revealed_by, parameters) = given;
-    let parameter = |(name, power, less, unit, range, typical, meaning): ParameterTuple| {
-        ParameterSpec { name, power, less, unit, range, typical, meaning }
+    let parameter = |(name, power, less, unit, range, typical, meaning, role): ParameterTuple| {
+        let role = Role::ALL.into_iter().find(|known| Some(known.words()) == role.as_deref());
+        ParameterSpec { name, power, less, unit, range, typical, meaning, role }
     };
     let parameters = parameters.into_iter().map(parameter).collect();
     Formula::new(&Spec { name, term, revealed_by, parameters })
@@ -107,6 +114,12 @@ fn simd_available() -> Vec<&'static str> {
     Path::ALL.into_iter().filter(|path| path.available()).map(Path::name).collect()
 }
 
+/// Refuses `count` of `what`, with `each` bytes each, where that is more memory than is free.
+#[pyfunction]
+fn reckon(what: &str, count: usize, each: usize) -> PyResult<()> {
+    Ok(memory::reckon(what, count, each)?)
+}
+
 /// Number of threads that a call uses if none is given.
 #[pyfunction]
 fn default_threads() -> usize {
@@ -120,8 +133,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_function(wrap_pyfunction!(simd, module)?)?;
     module.add_function(wrap_pyfunction!(simd_available, module)?)?;
+    module.add_function(wrap_pyfunction!(reckon, module)?)?;
     module.add_function(wrap_pyfunction!(default_threads, module)?)?;
     module.add_function(wrap_pyfunction!(library::effects, module)?)?;
+    module.add_function(wrap_pyfunction!(library::roles, module)?)?;
     module.add_function(wrap_pyfunction!(library::formula, module)?)?;
     module.add_function(wrap_pyfunction!(period, module)?)?;
     module.add_function(wrap_pyfunction!(bounds, module)?)?;

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use crate::error::Error;
-use crate::maps::control::Control;
+use crate::maps::control::{Control, pool};
 
 /// How often signals and progress are looked at.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -28,8 +28,19 @@ pub fn watched<T: Send>(
     stop.map_or_else(|| result.map_err(PyErr::from), Err)
 }
 
-/// The same with anything done at every pause; what `work` came to, and what stopped it, a signal or
-/// an error of `report`.
+/// Like [`watched`], in a pool of this call's own: threads that outlived a call would be missing in a
+/// forked child, and whoever gave them work there would wait for ever.
+pub fn pooled<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&Control) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    watched(py, progress, |control| pool(threads)?.install(|| work(control)))
+}
+
+/// Like [`watched`] with anything done at every pause; what `work` came to, and what stopped it, a
+/// signal or an error of `report`.
 pub fn stopped<T: Send>(
     py: Python<'_>,
     mut report: impl FnMut(Python<'_>, &Control) -> PyResult<()> + Send,
@@ -40,10 +51,12 @@ pub fn stopped<T: Send>(
         thread::scope(|scope| {
             let (sender, receiver) = channel();
             let shared = &control;
-            scope.spawn(move || {
+            let task = move || {
                 // The receiver waits until this arrives, so it is still there.
                 let _ = sender.send(work(shared));
-            });
+            };
+            let begun = thread::Builder::new().spawn_scoped(scope, task);
+            begun.map_err(|why| Error::Threads(why.to_string()))?;
             let mut stop: Option<PyErr> = None;
             loop {
                 match receiver.recv_timeout(PAUSE) {

@@ -30,8 +30,7 @@ def middle(name: str) -> pendmap.Effect:
     """The effect with values from the middle of what is typical."""
     (effect,) = (e for e in pendmap.effects() if e.name == name)
     values = {p.name: sum(p.typical) / 2 for p in effect.parameters}
-    if "n" in values and name != "power_law_drag":
-        values["n"] = 3.0
+    values |= {p.name: 3.0 for p in effect.parameters if p.role == "order"}
     return pendmap.Effect(name, values)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import signal
@@ -17,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from interrupted import started
-from pendmap import Axis, Grid, InputError, Pendulum
+from pendmap import Axis, Grid, InputError, Pendulum, cli
 
 
 def independent_labels(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:
@@ -259,6 +260,28 @@ def test_every_instruction_set_gives_the_same_smooth_map(
     again = pendmap.basins(Pendulum(p=0.6), Grid.square(60))
     assert again.attrs["simd"] == path
     assert np.array_equal(again.label, smooth.label)
+
+
+def test_an_instruction_set_that_is_asked_for_counts_for_one_command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("PENDMAP_SIMD", raising=False)
+    for path in available_paths():
+        for words in ("basins --p 0.6 --grid 8", "orbit --p 0.6 --grid 8", "lyapunov --p 0.6"):
+            line = ["pendmap", *words.split(), "--simd", path, "--json", "--quiet"]
+            monkeypatch.setattr(sys, "argv", line)
+            with pytest.raises(SystemExit) as end:
+                cli.run()
+            assert not end.value.code
+            assert json.loads(capsys.readouterr().out)["simd"] == path
+            assert "PENDMAP_SIMD" not in os.environ
+    monkeypatch.setattr(sys, "argv", ["pendmap", "basins", "--simd", "mmx"])
+    with pytest.raises(SystemExit) as end:
+        cli.run()
+    assert end.value.code == 2
+    said = capsys.readouterr().err
+    assert "Invalid value for '--simd': 'mmx': allowed on this processor: " in said
+    assert said.count("\n") == 1
 
 
 def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ use std::fs;
 use pendmap::integrate::State;
 use pendmap::integrate::tangent::Tangent;
 use pendmap::model::effects::{
-    Action, Definition, Group, MOST_PARAMETERS, Mappable, Parameter, Power,
+    Action, Definition, Group, MOST_PARAMETERS, Mappable, Parameter, Power, Role,
 };
 use pendmap::model::{Effect, Equation, Kind, Observation, Pendulum};
 
@@ -90,7 +90,8 @@ fn definitions_are_whole() {
         assert_eq!(group, expected, "{name}");
         let words: Vec<&str> = formula.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
         for (k, parameter) in parameters.iter().enumerate() {
-            let Parameter { name: own, unit, range, typical, meaning, power } = *parameter;
+            let Parameter { name: own, role, unit, range, typical, meaning, power } = *parameter;
+            assert_eq!(k == 0, role == Role::Size, "{name}.{own}");
             assert!(words.contains(&own), "{name}: {formula} has no {own}");
             assert!(parameters[..k].iter().all(|p| p.name != own), "{name}: {own} twice");
             assert!(!unit.is_empty() && !meaning.is_empty(), "{name}.{own}");

@@ -11,6 +11,7 @@ use pendmap::maps::advance::advance;
 use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::Control;
 use pendmap::maps::starts::{Axis, Starts};
+use pendmap::memory;
 use pendmap::model::{HarmonicDrive, Pendulum};
 
 use crate::support::{driven, path, plane, spread};
@@ -159,4 +160,17 @@ fn maps() {
     // They are errors as the standard library has them.
     let boxed: Box<dyn std::error::Error> = Box::new(error);
     assert!(boxed.source().is_none());
+}
+
+#[test]
+fn more_memory_than_there_is() {
+    let why = refusal(memory::reckon("cells", usize::MAX / 16, 8));
+    assert!(why.starts_with("1152921504606846975 cells need about 9223372036.855 GB, "), "{why}");
+    assert!(why.ends_with(" free: allowed are fewer"), "{why}");
+    let mut list = vec![0_u64];
+    let why = refusal(memory::room("periods", &mut list, usize::MAX / 16));
+    assert!(why.ends_with(" free: allowed are fewer"), "{why}");
+    memory::reckon("cells", 1000, 8).expect("enough");
+    memory::room("periods", &mut list, 1000).expect("enough");
+    assert!(list.capacity() > 1000);
 }

@@ -30,7 +30,7 @@ pub fn term(kind: Kind) -> Option<&'static str> {
 
 /// A parameter of a formula like one of the library.
 fn like(parameter: &Parameter) -> ParameterSpec {
-    let Parameter { name, unit, power, range, typical, meaning } = *parameter;
+    let Parameter { name, unit, power, range, typical, meaning, .. } = *parameter;
     let (power, less) = match power {
         Power::Of(power) => (f64::from(power), None),
         Power::Real(power) => (power, None),
@@ -50,6 +50,7 @@ fn like(parameter: &Parameter) -> ParameterSpec {
         range,
         typical,
         meaning: meaning.to_owned(),
+        role: None,
     }
 }
 
@@ -63,6 +64,7 @@ pub fn formula(name: &str, term: &str, parameters: &[(&str, f64)]) -> Spec {
         range: [f64::NEG_INFINITY, f64::INFINITY],
         typical: [0.01, 0.3],
         meaning: String::new(),
+        role: None,
     };
     Spec {
         name: name.to_owned(),

@@ -62,9 +62,11 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     if count is not None and (theta is not None or velocity is not None):
         raise click.UsageError("--grid: allowed alone; --theta and --velocity name their own cells")
 
+    from pendmap import _core
     from pendmap.grid import Axis, Grid
     from pendmap.maps import basins
     from pendmap.model import without_dimensions
+    from pendmap.pictures.layers import BYTES_OF_CELL
     from pendmap.summary import unlimited_rotation
 
     usual = Grid.square(count or _DEFAULT, model.units.w0)
@@ -72,6 +74,8 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
         Axis(*theta) if theta else usual.theta, Axis(*velocity) if velocity else usual.velocity
     )
     outputs.check_room(grid.theta.count * grid.velocity.count)
+    if outputs.plot or outputs.rerun:
+        _core.reckon("cells", grid.cells, BYTES_OF_CELL)
     if outputs.shows_progress:  # the summary says it too, after all periods have passed
         for line in unlimited_rotation(without_dimensions(model)[0]):
             click.echo(line, err=True)

@@ -12,6 +12,7 @@ import click
 from pendmap.checks import MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.model_options import rig_from
+from pendmap.cli.options import simd_option
 from pendmap.cli.show import Written, plain, progress_bar, write_all, write_table
 from pendmap.cli.types import NUMBER, OutputFile, Whole
 
@@ -37,6 +38,7 @@ __all__ = ["command"]
 @click.option("--seed", type=Whole(0, MOST_SEED), default=0, help="Draws them.  [default: 0]")
 @click.option("--threads", type=Whole(1, MOST_THREADS), help="Threads.  [default: one a processor]")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files.")
+@simd_option
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(  # noqa: PLR0913 (an option each)
     *,

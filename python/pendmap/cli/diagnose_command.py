@@ -15,14 +15,8 @@ import click
 
 from pendmap.cli.inputs import keep_inputs, report_files
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import check_view
-from pendmap.cli.show import (
-    open_recording,
-    plain,
-    progress_bar,
-    write_all,
-    write_table,
-)
+from pendmap.cli.options import check_view, simd_option
+from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
 from pendmap.cli.types import OutputFile, ReportFile, Whole
 from pendmap.errors import InputError
 
@@ -80,6 +74,7 @@ NAME = "diagnose"
     is_flag=True,
     help="One JSON object on stdout; alone, no file but the model.",
 )
+@simd_option
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(  # noqa: PLR0913 (an option each)
     *,

@@ -104,7 +104,7 @@ def _parameter(parameter: EffectParameter) -> str:
     else:
         scale = "w0" if power == "1" else f"w0^{power}"
         values = f"{low:g} to {high:g}; in SI times {scale}, {unit}"
-    return f"{parameter.name}: {parameter.meaning} ({values})"
+    return f"{parameter.name}, {parameter.role}: {parameter.meaning} ({values})"
 
 
 def _example(effect: EffectDefinition) -> dict[str, Any]:

@@ -11,14 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import Outputs, output_options
-from pendmap.cli.show import (
-    open_viewer,
-    plain,
-    progress_bar,
-    write_all,
-    write_table,
-)
+from pendmap.cli.options import Outputs, output_options, simd_option
+from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -43,6 +37,7 @@ SUFFIX = ".toml"
     metavar="NAME",
     help="Fit this effect of the library too; may be repeated.",
 )
+@simd_option
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 @output_options((SUFFIX,), "Model")
 def command(

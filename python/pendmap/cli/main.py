@@ -183,8 +183,8 @@ def _ended() -> int:  # noqa: PLR0911 (one for each way to end)
         # No message, and none from the interpreter at the end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
-    except MemoryError:
-        return _refuse("not enough memory: choose a smaller grid")
+    except MemoryError as error:
+        return _refuse(f"not enough memory: {str(error) or 'choose a smaller grid'}")
     except NotWrittenError as error:
         _say(str(error))
         return FAILED

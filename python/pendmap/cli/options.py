@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import click
 
 from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
-from pendmap.cli.types import NUMBER, OutputFile, Whole
+from pendmap.cli.types import NUMBER, InstructionSet, OutputFile, Whole
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
@@ -27,16 +28,43 @@ __all__ = [
     "output_options",
     "progress_options",
     "search_options",
+    "simd_option",
 ]
+
+_SIMD = "PENDMAP_SIMD"
+"""Names the instruction set; the core reads it whenever a call begins."""
+
+
+def simd_option(function: Command) -> Command:
+    """Add the instruction set, which holds until the command has ended."""
+
+    def use(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
+        if value is None:
+            return
+        before = os.environ.get(_SIMD)
+        os.environ[_SIMD] = value
+        if before is None:
+            ctx.call_on_close(lambda: os.environ.pop(_SIMD))
+        else:
+            ctx.call_on_close(lambda: os.environ.update({_SIMD: before}))
+
+    add = click.option(
+        "--simd",
+        type=InstructionSet(),
+        callback=use,
+        expose_value=False,
+        help="Instruction set: avx512, avx2, sse or portable.  [default: the quickest here]",
+    )
+    return add(function)
 
 
 def progress_options(function: Command) -> Command:
-    """Add threads, seed and quiet."""
+    """Add threads, instruction set and quiet."""
     threads = click.option(
         "--threads", type=Whole(1, MOST_THREADS), help="Threads.  [default: one a processor]"
     )
     quiet = click.option("--quiet", is_flag=True, help="No progress, no summary.")
-    return threads(quiet(function))
+    return threads(simd_option(quiet(function)))
 
 
 def search_options(function: Command) -> Command:

@@ -79,6 +79,6 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
     return {
         "units": a["units"],
         "orbits": found,
-        **{name: a[name] for name in ("n", "w", "cells", "begun", "seconds", "threads")},
+        **{name: a[name] for name in ("n", "w", "cells", "begun", "seconds", "simd", "threads")},
         "summary": a["summary"].split("\n"),
     }

@@ -160,6 +160,24 @@ class _Values(click.ParamType[list[float]]):
         return [low + (high - low) * k / max(count - 1, 1) for k in range(count)]
 
 
+class InstructionSet(click.ParamType[str]):
+    """An instruction set of this processor."""
+
+    name = "name"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
+        """Refuse what this processor lacks."""
+        from pendmap import _core
+
+        available = _core.simd_available()
+        if value not in available:
+            allowed = f"allowed on this processor: {', '.join(available)}"
+            self.fail(f"{shown(value)}: {allowed}", param, ctx)
+        return str(value)
+
+
 class OutputFile(click.ParamType[Path]):
     """A file to write: its suffix and folder are checked before anything is computed."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.model.effects import Effect, definition, is_phase, library
+from pendmap.model.effects import Effect, definition, is_shape, library
 from pendmap.model.formula import Formula
 from pendmap.model.rig import COUNTERPARTS
 
@@ -62,13 +62,14 @@ class Candidate:
 
     @property
     def size(self) -> str:
-        """The parameter that says how strong it is: the library's first."""
-        return str(self.definition["parameters"][0]["name"])
+        """The parameter that says how strong it is."""
+        return next(str(e["name"]) for e in self.definition["parameters"] if e["role"] == "size")
 
     @property
     def phase(self) -> str | None:
         """The parameter that is a phase, if it has one."""
-        return next((e["name"] for e in self.definition["parameters"] if is_phase(e)), None)
+        entries = self.definition["parameters"]
+        return next((e["name"] for e in entries if e["role"] == "phase"), None)
 
     @property
     def free(self) -> list[str]:
@@ -83,16 +84,14 @@ class Candidate:
 
         Whole numbers are not.
         """
-        entries = self.definition["parameters"]
-        return [
-            f"{self.name}.{e['name']}" for e in entries if e["name"] in self.shape and not _whole(e)
-        ]
+        entries = [e for e in self.definition["parameters"] if e["role"] != "order"]
+        return [f"{self.name}.{e['name']}" for e in entries if e["name"] in self.shape]
 
     @property
     def places(self) -> list[str]:
         """The parameters of its shape that are places, on either side of the rest."""
         entries = self.definition["parameters"]
-        return [e["name"] for e in entries if e["name"] in self.shape and _is_place(e)]
+        return [e["name"] for e in entries if e["name"] in self.shape and e["role"] == "place"]
 
     @property
     def count(self) -> int:
@@ -202,7 +201,7 @@ def candidates(
 
 def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
     """Yield the shapes of an effect: one parameter at most is scanned."""
-    shapes = [e for e in entry["parameters"][1:] if not is_phase(e)]
+    shapes = [e for e in entry["parameters"] if is_shape(e)]
     if not shapes:
         yield {}
         return
@@ -214,19 +213,8 @@ def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
 
 def _scan(entry: Mapping[str, Any]) -> NDArray[np.float64]:
     low, high = entry["typical"]
-    if _whole(entry):
+    if entry["role"] == "order":
         return np.arange(low, high + 0.5)
-    if _is_place(entry):
+    if entry["role"] == "place":
         return np.linspace(low, high, PLACES)
     return np.geomspace(low, high, SCANNED)
-
-
-def _is_place(entry: Mapping[str, Any]) -> bool:
-    """Whether a shape is a place on the circle, on either side of the rest."""
-    return bool(entry["typical"][0] < 0)
-
-
-def _whole(entry: Mapping[str, Any]) -> bool:
-    """Whether a shape is a number of periods: its range is of whole numbers."""
-    low, high = entry["typical"]
-    return bool(entry["unit"] == "1" and float(low).is_integer() and float(high).is_integer())

@@ -30,6 +30,7 @@ from pendmap.figures.of_records import (
     write_report,
 )
 from pendmap.figures.written import SUFFIXES, written
+from pendmap.pictures.layers import refuse_too_large
 from pendmap.pictures.selection import shown
 
 if TYPE_CHECKING:
@@ -124,6 +125,8 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     InputError
         For an unknown kind of dataset, suffix, layer or colour map, and for an impossible size or
         resolution.
+    MemoryError
+        If the dataset is too large.
     OSError
         If the file cannot be written.
 
@@ -138,6 +141,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
             f"cannot draw a dataset of kind {kind!r}; kinds that can be drawn: {known}"
         )
     dataset = shown(dataset)
+    refuse_too_large(dataset)
     return written(
         path,
         lambda dpi: _KINDS[kind](dataset, layer=layer, size=size, dpi=dpi, colormap=colormap),

@@ -17,13 +17,9 @@ if TYPE_CHECKING:
     from pendmap.model.formula import Formula, FormulaKey
     from pendmap.model.units import Units
 
-__all__ = ["SHAPES", "Effect", "definition", "is_phase", "library"]
+__all__ = ["Effect", "definition", "is_shape", "library"]
 
-_TURN: Final = 6.0
-"""A parameter whose typical range is at least this wide around 0 is a phase, rad."""
-
-SHAPES: Final = ("n", "th0", "w", "vs")
-"""Parameters of effects that say how they act, not how strongly."""
+_NO_SHAPE: Final = ("size", "phase")
 
 
 @functools.cache
@@ -37,10 +33,9 @@ def library() -> dict[str, dict[str, Any]]:
     return {entry["name"]: entry for entry in _core.effects()}
 
 
-def is_phase(entry: Mapping[str, Any]) -> bool:
-    """Whether a parameter is a phase, by its definition: typical of it is a whole turn, in rad."""
-    low, high = entry["typical"]
-    return bool(entry["unit"] == "rad" and low < 0 < high and high - low > _TURN)
+def is_shape(entry: Mapping[str, Any]) -> bool:
+    """Whether a parameter says how an effect acts, not how strongly or at which phase."""
+    return entry["role"] not in _NO_SHAPE
 
 
 def definition(name: object) -> dict[str, Any]:
@@ -150,7 +145,7 @@ class Effect:
         values = {}
         for parameter in entry["parameters"]:
             low, high = parameter["typical"]
-            if parameter["name"] not in SHAPES:
+            if not is_shape(parameter):
                 values[parameter["name"]] = low
             elif low > 0:
                 values[parameter["name"]] = float(f"{(low * high) ** 0.5:.1g}")
@@ -160,11 +155,8 @@ class Effect:
 
     @property
     def sizes(self) -> list[str]:
-        """The names of its parameters that say how strong it is, not how it acts."""
-        if self.formula is None:
-            return [name for name in self.parameters if name not in SHAPES]
-        first, *others = self.definition["parameters"]
-        return [first["name"], *(entry["name"] for entry in others if is_phase(entry))]
+        """The names of its parameters that say how strong it is, and at which phase it acts."""
+        return [entry["name"] for entry in self.definition["parameters"] if not is_shape(entry)]
 
     def described(self) -> list[str]:
         """Return the names of its parameters with their SI units."""

@@ -26,12 +26,13 @@ _TAKEN: Final = frozenset(("w0", "length_m", "gravity", "torque", *_DAMPING, *_D
 """Names of a pendulum's own parameters."""
 
 _FORMULA: Final = ("name", "term", "parameters", "revealed_by")
-_PARAMETER: Final = ("power", "typical", "range", "unit", "meaning")
+_PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
 _TYPICAL: Final = (1e-4, 0.3)
 """Values of interest where none are said: as of the library's sizes."""
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
 
-_ParameterKey = tuple[str, float, int | None, str, tuple[float, float], tuple[float, float], str]
+_Bounds = tuple[float, float]
+_ParameterKey = tuple[str, float, int | None, str, _Bounds, _Bounds, str, str | None]
 FormulaKey = tuple[str, str, str, tuple[_ParameterKey, ...]]
 """A formula as the kernel takes it: name, term, revealed_by, parameters."""
 
@@ -60,14 +61,17 @@ class Formula:
 
         - ``power``: its value in SI is the one without dimensions times this power of ``w0``; or
           ``"2 - n"``, with another parameter ``n``;
+        - ``role``: what it does: ``size``, ``width``, ``place``, ``power``, ``order`` (how many
+          times in a turn, a whole number), ``time constant`` or ``phase``; by default as the term
+          and the power of ``w0`` show it;
         - ``typical``: the smallest and the largest value of interest, without dimensions, where a
           search looks; by default 1e-4 and 0.3;
         - ``range``: the least and the greatest value allowed, without dimensions; by default any;
         - ``unit``, in SI, and ``meaning``: for those who read.
 
-        The first one says how strong the effect is; a diagnosis wants a term that is proportional
-        to it. A further one is a phase where its unit is ``rad`` and its typical values are those
-        of a whole turn, else a shape, of which a diagnosis scans the first.
+        The first one is the size; a diagnosis wants a term that is proportional to it. A further
+        one in which the term repeats every turn is a phase; all others are shapes, of which a
+        diagnosis scans the first.
     revealed_by : str
         Which data show it, for the advice of a diagnosis.
 
@@ -272,7 +276,8 @@ def _parameter(name: object, given: object, names: list[Any]) -> _ParameterKey:
     meaning = _text(name, "meaning", said.get("meaning", ""))
     typical = _bounds(name, "typical", said.get("typical", _TYPICAL))
     allowed = _bounds(name, "range", said.get("range", (-math.inf, math.inf)))
-    return name, power, less, unit, allowed, typical, meaning
+    role = None if "role" not in said else _role(name, said["role"], first=name == names[0])
+    return name, power, less, unit, allowed, typical, meaning, role
 
 
 def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | None]:
@@ -292,6 +297,18 @@ def _text(name: str, what: str, value: object) -> str:
     if not isinstance(value, str):
         raise InputError(f"parameter '{name}': {what} is {checks.shown(value)}: allowed is a text")
     return value
+
+
+def _role(name: str, value: object, *, first: bool) -> str:
+    """Return a role that is known; the first parameter, and no other, is the size."""
+    from pendmap import _core  # noqa: PLC0415 (only models with formulas need it)
+
+    allowed = [role for role in _core.roles() if (role == "size") == first]
+    if value not in allowed:
+        raise InputError(
+            f"parameter '{name}': role is {checks.shown(value)}: allowed is {', '.join(allowed)}"
+        )
+    return str(value)
 
 
 def _unit(power: float, less: int | None, names: list[Any]) -> str:
@@ -316,7 +333,7 @@ def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
 
 def _said(part: _ParameterKey, names: list[str]) -> dict[str, Any]:
     """Return a parameter as a table says it; what is as by default is left out."""
-    _, power, less, unit, allowed, typical, meaning = part
+    _, power, less, unit, allowed, typical, meaning, role = part
     said: dict[str, Any] = {"power": power if less is None else f"2 - {names[less]}"}
     if typical != _TYPICAL:
         said["typical"] = list(typical)
@@ -327,4 +344,6 @@ def _said(part: _ParameterKey, names: list[str]) -> dict[str, Any]:
         said["unit"] = unit
     if meaning:
         said["meaning"] = meaning
+    if role:
+        said["role"] = role
     return said

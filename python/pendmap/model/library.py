@@ -23,6 +23,9 @@ class EffectParameter:
     ----------
     name : str
         Its key in model files.
+    role : str
+        What it does: ``size``, ``width``, ``place``, ``power``, ``order`` (how many times in a
+        turn), ``time constant`` or ``phase``.
     unit : str
         Its unit in SI.
     power_of_w0 : float
@@ -38,6 +41,7 @@ class EffectParameter:
     """
 
     name: str
+    role: str
     unit: str
     power_of_w0: float
     power_of_w0_less: str | None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap import _core
 from pendmap.errors import InputError
 from pendmap.model import effects_of
 from pendmap.model.rig import COUNTERPARTS
@@ -20,11 +21,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "BYTES_OF_CELL",
     "VARIABLES",
     "finite_time",
     "layers",
     "named",
     "parameters",
+    "refuse_too_large",
     "reliable",
     "settles",
     "symbol",
@@ -32,6 +35,12 @@ __all__ = [
     "warning",
     "what",
 ]
+
+BYTES_OF_CELL = 64
+"""What a cell of a basin map takes in all while its figure and its recording are made."""
+
+BYTES_OF_VALUE = 16
+"""What a value of a dataset takes, whatever it is, while a picture of it is made."""
 
 VARIABLES = {
     "labels": "label",
@@ -70,6 +79,19 @@ def reliable(dataset: xr.Dataset) -> bool:
 def finite_time(dataset: xr.Dataset) -> bool:
     """Whether labels tell nothing: one chaotic attractor takes every start, or nothing attracts."""
     return bool(dataset.attrs.get("layers") == "finite_time")
+
+
+def refuse_too_large(dataset: xr.Dataset) -> None:
+    """Refuse a dataset whose picture would need more memory than is free.
+
+    Raises
+    ------
+    MemoryError
+        With what it needs and what is free.
+    """
+    _core.reckon(
+        "values", sum(values.size for values in dataset.variables.values()), BYTES_OF_VALUE
+    )
 
 
 def settles(dataset: xr.Dataset) -> bool:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError
 from pendmap.files import whole_file
+from pendmap.pictures.layers import refuse_too_large
 from pendmap.pictures.selection import shown
 from pendmap.viewer import (
     basins,
@@ -127,6 +128,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     ------
     InputError
         For an unknown kind of dataset or suffix.
+    MemoryError
+        If the dataset is too large.
     OSError
         If the file cannot be written.
     """
@@ -135,6 +138,7 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         known = ", ".join(_KINDS)
         raise InputError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
     dataset = shown(dataset)
+    refuse_too_large(dataset)
     layout, log = _KINDS[kind]
     with (
         whole_file(path, SUFFIXES) as part,

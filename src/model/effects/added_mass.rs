@@ -7,7 +7,7 @@
 //! is an error of the drive's amplitude.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -21,6 +21,7 @@ impl Law for AddedMass {
         formula: "-e a sin(theta), a the pivot's acceleration over gravity, all per whole inertia",
         parameters: &[Parameter {
             name: "e",
+            role: Role::Size,
             unit: "1",
             power: Power::Of(0),
             range: [-0.9, 10.0],

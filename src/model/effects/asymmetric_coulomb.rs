@@ -5,7 +5,7 @@
 //! constant torque `-d`, for as long as `|d| <= theta_r`. No record of one rig tells it from a bias torque.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -19,6 +19,7 @@ impl Law for AsymmetricCoulomb {
         formula: "-d |sign(v)|",
         parameters: &[Parameter {
             name: "d",
+            role: Role::Size,
             unit: "rad/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],

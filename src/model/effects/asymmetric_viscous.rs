@@ -1,7 +1,7 @@
 //! Viscous damping that differs between the two senses of rotation.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for AsymmetricViscous {
         formula: "-b |v|",
         parameters: &[Parameter {
             name: "b",
+            role: Role::Size,
             unit: "1/s",
             power: Power::Of(1),
             range: [f64::NEG_INFINITY, f64::INFINITY],

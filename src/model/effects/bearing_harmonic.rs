@@ -2,7 +2,7 @@
 
 use super::law::{
     Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
-    Power,
+    Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -18,6 +18,7 @@ impl Law for BearingHarmonic {
         parameters: &[
             Parameter {
                 name: "amplitude",
+                role: Role::Size,
                 unit: "rad/s^2",
                 power: Power::Of(2),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -26,6 +27,7 @@ impl Law for BearingHarmonic {
             },
             Parameter {
                 name: "n",
+                role: Role::Order,
                 unit: "1",
                 power: Power::Of(0),
                 range: [0.0, 1000.0],
@@ -34,6 +36,7 @@ impl Law for BearingHarmonic {
             },
             Parameter {
                 name: "psi",
+                role: Role::Phase,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],

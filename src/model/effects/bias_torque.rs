@@ -1,7 +1,7 @@
 //! A constant torque: a motor's, a tilted magnet's, a twisted cable's.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for BiasTorque {
         formula: "+torque",
         parameters: &[Parameter {
             name: "torque",
+            role: Role::Size,
             unit: "rad/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],

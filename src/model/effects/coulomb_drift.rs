@@ -1,7 +1,7 @@
 //! Coulomb friction that changes as the rig warms up or wears.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for CoulombDrift {
         formula: "-r t sign(v), t time in the laboratory",
         parameters: &[Parameter {
             name: "r",
+            role: Role::Size,
             unit: "rad/s^3",
             power: Power::Of(3),
             range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -1,7 +1,7 @@
 //! Dry friction of constant magnitude, the paper's `theta_r = Tr / w0^2`.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for CoulombFriction {
         formula: "-theta_r sign(v)",
         parameters: &[Parameter {
             name: "theta_r",
+            role: Role::Size,
             unit: "rad/s^2",
             power: Power::Of(2),
             range: [0.0, f64::INFINITY],

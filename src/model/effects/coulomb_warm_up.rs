@@ -4,7 +4,7 @@
 //! what depends on it, comes to its end exponentially (Newton's law of cooling).
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -19,6 +19,7 @@ impl Law for CoulombWarmUp {
         parameters: &[
             Parameter {
                 name: "f",
+                role: Role::Size,
                 unit: "rad/s^2",
                 power: Power::Of(2),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -44,6 +45,7 @@ impl Law for CoulombWarmUp {
 /// The time over which a rig warms up.
 pub const TIME_CONSTANT: Parameter = Parameter {
     name: "tau",
+    role: Role::Time,
     unit: "s",
     power: Power::Of(-1),
     range: [1e-3, f64::INFINITY],

@@ -1,7 +1,7 @@
 //! The next odd power of the velocity after viscous damping.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for CubicDamping {
         formula: "-k3 v^3",
         parameters: &[Parameter {
             name: "k3",
+            role: Role::Size,
             unit: "s/rad^2",
             power: Power::Of(-1),
             range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -1,6 +1,6 @@
 //! A drive whose frequency creeps.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -14,6 +14,7 @@ impl Law for DriveChirp {
         formula: "phase omega t + r t^2/2 + phi, t since the run began",
         parameters: &[Parameter {
             name: "r",
+            role: Role::Size,
             unit: "rad/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],

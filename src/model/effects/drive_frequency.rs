@@ -1,6 +1,6 @@
 //! A drive whose frequency is not what it was set to.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -14,6 +14,7 @@ impl Law for DriveFrequency {
         formula: "omega (1 + e)",
         parameters: &[Parameter {
             name: "e",
+            role: Role::Size,
             unit: "1",
             power: Power::Of(0),
             range: [-0.9, 10.0],

@@ -1,6 +1,6 @@
 //! A drive whose phase is not what it was taken for; the same as a trigger that comes late.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -14,6 +14,7 @@ impl Law for DrivePhase {
         formula: "phase + d",
         parameters: &[Parameter {
             name: "d",
+            role: Role::Size,
             unit: "rad",
             power: Power::Of(0),
             range: [f64::NEG_INFINITY, f64::INFINITY],

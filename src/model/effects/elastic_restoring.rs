@@ -2,7 +2,7 @@
 
 use super::law::{
     Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
-    Power,
+    Power, Role,
 };
 use crate::lanes::Real;
 
@@ -16,6 +16,7 @@ impl Law for ElasticRestoring {
         formula: "-k theta, theta not wrapped",
         parameters: &[Parameter {
             name: "k",
+            role: Role::Size,
             unit: "1/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -1,6 +1,6 @@
 //! A sensor whose disc does not turn about its centre.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 
@@ -15,6 +15,7 @@ impl Law for EncoderEccentricity {
         parameters: &[
             Parameter {
                 name: "e",
+                role: Role::Size,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -23,6 +24,7 @@ impl Law for EncoderEccentricity {
             },
             Parameter {
                 name: "psi",
+                role: Role::Phase,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -1,6 +1,6 @@
 //! A sensor with a wrong scale.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 
 pub struct EncoderGain;
@@ -13,6 +13,7 @@ impl Law for EncoderGain {
         formula: "reading (1 + e) theta",
         parameters: &[Parameter {
             name: "e",
+            role: Role::Size,
             unit: "1",
             power: Power::Of(0),
             range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -1,6 +1,6 @@
 //! A sensor whose zero is not where the pendulum hangs; in one free decay equal to a tilt of the rig.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 
 pub struct EncoderOffset;
@@ -13,6 +13,7 @@ impl Law for EncoderOffset {
         formula: "reading theta + d",
         parameters: &[Parameter {
             name: "d",
+            role: Role::Size,
             unit: "rad",
             power: Power::Of(0),
             range: [f64::NEG_INFINITY, f64::INFINITY],

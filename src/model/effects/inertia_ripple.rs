@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
     Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
-    Power,
+    Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -22,6 +22,7 @@ impl Law for InertiaRipple {
         parameters: &[
             Parameter {
                 name: "e",
+                role: Role::Size,
                 unit: "1",
                 power: Power::Of(0),
                 range: [-0.9, 0.9],
@@ -30,6 +31,7 @@ impl Law for InertiaRipple {
             },
             Parameter {
                 name: "n",
+                role: Role::Order,
                 unit: "1",
                 power: Power::Of(0),
                 range: [0.0, 1000.0],
@@ -38,6 +40,7 @@ impl Law for InertiaRipple {
             },
             Parameter {
                 name: "psi",
+                role: Role::Phase,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],

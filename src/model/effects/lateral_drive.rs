@@ -1,6 +1,6 @@
 //! A pivot that also moves sideways, at the drive's frequency.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -15,6 +15,7 @@ impl Law for LateralDrive {
         parameters: &[
             Parameter {
                 name: "e",
+                role: Role::Size,
                 unit: "1",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -23,6 +24,7 @@ impl Law for LateralDrive {
             },
             Parameter {
                 name: "phase",
+                role: Role::Phase,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],

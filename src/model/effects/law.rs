@@ -102,11 +102,52 @@ pub enum Power {
     TwoMinus(usize),
 }
 
+/// What a parameter does in its effect. A search asks for it, never for a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// How strong the effect is: at 0 there is none.
+    Size,
+    /// How far it reaches, in angle or velocity.
+    Width,
+    /// The angle at which it acts, on either side of the rest.
+    Place,
+    /// An exponent.
+    Power,
+    /// How many times it repeats in a turn: a whole number.
+    Order,
+    /// How long it takes.
+    Time,
+    /// An angle that may be anything within a turn.
+    Phase,
+}
+
+impl Role {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Size, Self::Width, Self::Place, Self::Power, Self::Order, Self::Time, Self::Phase];
+
+    /// The words for it.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Size => "size",
+            Self::Width => "width",
+            Self::Place => "place",
+            Self::Power => "power",
+            Self::Order => "order",
+            Self::Time => "time constant",
+            Self::Phase => "phase",
+        }
+    }
+}
+
 /// A parameter of an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
     /// Its name in model files.
     pub name: &'static str,
+    /// What it does.
+    pub role: Role,
     /// Its unit in SI.
     pub unit: &'static str,
     /// How it scales with `w0`.

@@ -5,7 +5,7 @@
 //! passes zero the friction has a corner: steps end there.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -19,6 +19,7 @@ impl Law for LoadDependentFriction {
         formula: "-k (|(1 + a) cos(theta) + v^2/w0^2| - 1) sign(v)",
         parameters: &[Parameter {
             name: "k",
+            role: Role::Size,
             unit: "rad/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -4,7 +4,7 @@
 //! widths that are allowed.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -19,6 +19,7 @@ impl Law for Magnet {
         parameters: &[
             Parameter {
                 name: "amplitude",
+                role: Role::Size,
                 unit: "rad/s^2",
                 power: Power::Of(2),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -27,6 +28,7 @@ impl Law for Magnet {
             },
             Parameter {
                 name: "width",
+                role: Role::Width,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [0.02, 0.4],

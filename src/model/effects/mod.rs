@@ -8,7 +8,9 @@ pub mod family;
 pub mod law;
 
 pub use family::Family;
-pub use law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power};
+pub use law::{
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+};
 
 use super::drive::Motion;
 use super::formula::Formula;

@@ -1,7 +1,7 @@
 //! A natural frequency that changes as the rod's length does with the temperature, or a mass creeps.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -16,6 +16,7 @@ impl Law for NaturalFrequencyDrift {
                   a the pivot's acceleration over gravity",
         parameters: &[Parameter {
             name: "r",
+            role: Role::Size,
             unit: "1/s",
             power: Power::Of(1),
             range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -5,7 +5,7 @@
 //! are dry friction in all but name, too abrupt for steps without events of their own.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -23,6 +23,7 @@ impl Law for PowerLawDrag {
         parameters: &[
             Parameter {
                 name: "q",
+                role: Role::Size,
                 unit: "rad^(1-n) s^(n-2)",
                 power: Power::TwoMinus(1),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -31,6 +32,7 @@ impl Law for PowerLawDrag {
             },
             Parameter {
                 name: "n",
+                role: Role::Power,
                 unit: "1",
                 power: Power::Of(0),
                 range: [0.5, 4.0],

@@ -1,7 +1,7 @@
 //! Drag in proportion to the square of the velocity: air at high speed.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for QuadraticDrag {
         formula: "-q v |v|",
         parameters: &[Parameter {
             name: "q",
+            role: Role::Size,
             unit: "1/rad",
             power: Power::Of(0),
             range: [f64::NEG_INFINITY, f64::INFINITY],

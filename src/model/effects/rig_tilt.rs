@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -20,6 +20,7 @@ impl Law for RigTilt {
         formula: "-(sin(theta + d) - sin(theta)), in SI times w0^2",
         parameters: &[Parameter {
             name: "d",
+            role: Role::Size,
             unit: "rad",
             power: Power::Of(0),
             range: [f64::NEG_INFINITY, f64::INFINITY],

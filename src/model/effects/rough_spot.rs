@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -19,6 +19,7 @@ impl Law for RoughSpot {
         parameters: &[
             Parameter {
                 name: "f",
+                role: Role::Size,
                 unit: "rad/s^2",
                 power: Power::Of(2),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -27,6 +28,7 @@ impl Law for RoughSpot {
             },
             Parameter {
                 name: "th0",
+                role: Role::Place,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -35,6 +37,7 @@ impl Law for RoughSpot {
             },
             Parameter {
                 name: "w",
+                role: Role::Width,
                 unit: "rad",
                 power: Power::Of(0),
                 range: [1e-2, f64::INFINITY],

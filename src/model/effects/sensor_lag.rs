@@ -3,7 +3,7 @@
 //! What is kept is the first power of `tau`; the next is `tau^2 th''`, smaller by `tau w0`. A free decay
 //! read late is one that began late: only what has a clock of its own, a drive, shows it.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power};
+use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 
 pub struct SensorLag;
@@ -16,6 +16,7 @@ impl Law for SensorLag {
         formula: "reading theta - tau v",
         parameters: &[Parameter {
             name: "tau",
+            role: Role::Size,
             unit: "s",
             power: Power::Of(-1),
             range: [f64::NEG_INFINITY, f64::INFINITY],

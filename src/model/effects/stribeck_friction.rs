@@ -3,7 +3,7 @@
 //! The Gaussian form of Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30, 1083.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -18,6 +18,7 @@ impl Law for StribeckFriction {
         parameters: &[
             Parameter {
                 name: "a",
+                role: Role::Size,
                 unit: "rad/s^2",
                 power: Power::Of(2),
                 range: [f64::NEG_INFINITY, f64::INFINITY],
@@ -26,6 +27,7 @@ impl Law for StribeckFriction {
             },
             Parameter {
                 name: "vs",
+                role: Role::Width,
                 unit: "rad/s",
                 power: Power::Of(1),
                 range: [1e-3, f64::INFINITY],

@@ -1,7 +1,7 @@
 //! Damping in proportion to the velocity, the paper's `gamma`.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for ViscousDamping {
         formula: "-gamma v",
         parameters: &[Parameter {
             name: "gamma",
+            role: Role::Size,
             unit: "1/s",
             power: Power::Of(1),
             range: [0.0, f64::INFINITY],

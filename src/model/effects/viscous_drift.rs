@@ -1,7 +1,7 @@
 //! Viscous damping that changes as the rig warms up or wears.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for ViscousDrift {
         formula: "-r t v, t time in the laboratory",
         parameters: &[Parameter {
             name: "r",
+            role: Role::Size,
             unit: "1/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -2,7 +2,7 @@
 
 use super::coulomb_warm_up::{TIME_CONSTANT, cooled};
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -17,6 +17,7 @@ impl Law for ViscousWarmUp {
         parameters: &[
             Parameter {
                 name: "b",
+                role: Role::Size,
                 unit: "1/s",
                 power: Power::Of(1),
                 range: [f64::NEG_INFINITY, f64::INFINITY],

@@ -22,7 +22,7 @@ use self::program::{Kinks, Program, SLOTS};
 use self::tree::{Function, Tree, Variable};
 use super::effects::law::NOT_PERIODIC;
 use super::effects::{
-    Action, Definition, Group, Kind, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Action, Definition, Group, Kind, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::error::Error;
 use crate::lanes::Real;
@@ -61,6 +61,8 @@ pub struct ParameterSpec {
     pub typical: [f64; 2],
     /// What it is.
     pub meaning: String,
+    /// What it does; as the term shows it where nothing is said.
+    pub role: Option<Role>,
 }
 
 /// A formula that is ready to run.
@@ -109,8 +111,13 @@ impl Formula {
         check_names(spec)?;
         let names: Vec<String> = spec.parameters.iter().map(|p| p.name.clone()).collect();
         let tree = parse::parse(&spec.term, &names)?;
-        let parameters: Vec<Parameter> = spec.parameters.iter().map(ParameterSpec::kept).collect();
+        let mut parameters: Vec<Parameter> =
+            spec.parameters.iter().map(ParameterSpec::kept).collect();
         check_term(&tree, &parameters)?;
+        for (place, said) in spec.parameters.iter().enumerate() {
+            parameters[place].role =
+                said.role.unwrap_or_else(|| probe::role(&tree, &parameters, place));
+        }
         let jumps = probe::jumps(&tree, &parameters);
         let steep_sign = !jumps && tree.has_steep_speed();
         let kinks = tree.kinks();
@@ -255,6 +262,7 @@ impl ParameterSpec {
         let whole = self.power.fract() == 0.0 && self.power.abs() < 64.0;
         Parameter {
             name: kept(&self.name),
+            role: self.role.unwrap_or(Role::Size),
             unit: kept(&self.unit),
             power: match self.less {
                 Some(place) => Power::TwoMinus(place),

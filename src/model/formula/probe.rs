@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::tree::{Place, Tree};
-use crate::model::effects::{Parameter, Power};
+use crate::model::effects::{Parameter, Power, Role};
 
 /// A place, where none matters.
 pub const NOWHERE: Place = Place {
@@ -99,6 +99,39 @@ pub fn is_proportional(term: &Tree, parameters: &[Parameter]) -> bool {
         double[0] *= 2.0;
         always(term, &values, |at| 0.5 * term.value(&double, at))
     })
+}
+
+/// What the parameter of a `place` in their list does, by the term, how it scales, and where it is
+/// looked for.
+pub fn role(term: &Tree, parameters: &[Parameter], place: usize) -> Role {
+    let Parameter { power, typical, unit, .. } = parameters[place];
+    let turned = |values: &[f64]| {
+        let mut values = values.to_vec();
+        values[place] += TAU;
+        values
+    };
+    let repeats = usual(parameters).all(|values| {
+        let further = turned(&values);
+        always(term, &values, |at| term.value(&further, at))
+    });
+    let bare = power == Power::Of(0) && unit == "1";
+    if place == 0 {
+        Role::Size
+    } else if parameters.iter().any(|other| other.power == Power::TwoMinus(place)) {
+        Role::Power
+    } else if repeats {
+        Role::Phase
+    } else if typical[0] < 0.0 {
+        Role::Place
+    } else if bare && typical.iter().all(|end| end.fract() == 0.0) {
+        Role::Order
+    } else if bare {
+        Role::Power
+    } else if power == Power::Of(-1) {
+        Role::Time
+    } else {
+        Role::Width
+    }
 }
 
 /// A place at which the term is no number.

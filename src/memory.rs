@@ -1,0 +1,62 @@
+//! Memory, reckoned before it is taken: an allocation that fails in the middle of a computation would
+//! end the process.
+//!
+//! Where a user's number decides how much a computation needs, [`reckon`] stands before it; what grows
+//! by itself while it runs asks for [`room`] first.
+
+use std::fs::read_to_string;
+
+use crate::error::Error;
+
+/// What everything else may take meanwhile, in bytes: threads, modules, files.
+const SPARE: f64 = 64e6;
+
+/// Refuses `count` of `what` with `each` bytes each, where they need more memory than is free.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn reckon(what: &str, count: usize, each: usize) -> Result<(), Error> {
+    let needed = count as f64 * each as f64;
+    let free = free();
+    let refused = || Error::Memory { what: what.to_owned(), count, needed, free };
+    if needed + SPARE > free.unwrap_or(f64::INFINITY) {
+        return Err(refused());
+    }
+    // Whether the system gives as much at once, which tells limits that it does not show.
+    let mut probe: Vec<u8> = Vec::new();
+    probe.try_reserve_exact((needed + SPARE) as usize).map_err(|_| refused())
+}
+
+/// Makes room for `more` at the end of `list`.
+///
+/// # Errors
+/// [`Error::Memory`] where the system gives none.
+pub fn room<T>(what: &str, list: &mut Vec<T>, more: usize) -> Result<(), Error> {
+    let count = list.len().saturating_add(more);
+    let needed = count as f64 * size_of::<T>() as f64;
+    let refused = |_| Error::Memory { what: what.to_owned(), count, needed, free: free() };
+    list.try_reserve(more).map_err(refused)
+}
+
+/// Bytes that this process may still take, where Linux says it: of the machine, of its container, and
+/// of its own limit (`ulimit -v`).
+fn free() -> Option<f64> {
+    let machine = field("/proc/meminfo", "MemAvailable:").map(|kilobytes| 1024.0 * kilobytes);
+    let container = number("/sys/fs/cgroup/memory.max");
+    let limit = field("/proc/self/limits", "Max address space");
+    let own = limit.zip(field("/proc/self/status", "VmSize:"));
+    let own = own.map(|(limit, taken)| (limit - 1024.0 * taken).max(0.0));
+    [machine, container, own].into_iter().flatten().reduce(f64::min)
+}
+
+/// The number after a name at the beginning of a line of a file; none where it is no number.
+fn field(path: &str, name: &str) -> Option<f64> {
+    let text = read_to_string(path).ok()?;
+    let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
+    rest.split_whitespace().next()?.parse().ok()
+}
+
+/// The number that is all of a file; none where it is no number.
+fn number(path: &str) -> Option<f64> {
+    read_to_string(path).ok()?.trim().parse().ok()
+}

@@ -1,0 +1,123 @@
+"""What a parameter of an effect does is said by its definition, never guessed from its name."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+
+import pendmap
+from pendmap import InputError
+from pendmap.discrepancy import candidates as search
+from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.model import Effect, effects
+from pendmap.model.units import Units
+
+ROLES = {"size", "width", "place", "power", "order", "time constant", "phase"}
+SHAPES = {
+    "bearing_harmonic": {"n": "order"},
+    "coulomb_warm_up": {"tau": "time constant"},
+    "inertia_ripple": {"n": "order"},
+    "magnet": {"width": "width"},
+    "power_law_drag": {"n": "power"},
+    "rough_spot": {"th0": "place", "w": "width"},
+    "stribeck_friction": {"vs": "width"},
+    "viscous_warm_up": {"tau": "time constant"},
+}
+BARE = Units(1.0, si=False)
+
+
+def test_every_parameter_has_a_role_and_every_effect_one_size() -> None:
+    for effect in pendmap.effects():
+        roles = {p.name: p.role for p in effect.parameters}
+        assert set(roles.values()) <= ROLES, effect.name
+        assert list(roles.values()).count("size") == 1, effect.name
+        shapes = {n: r for n, r in roles.items() if r not in {"size", "phase"}}
+        assert shapes == SHAPES.get(effect.name, {}), effect.name
+        turn = [p for p in effect.parameters if p.role == "phase"]
+        assert all(p.unit == "rad" and p.typical[1] - p.typical[0] > 6 for p in turn), effect.name
+
+
+@pytest.mark.parametrize("effect", pendmap.effects(), ids=lambda effect: effect.name)
+def test_a_search_begins_where_an_effect_is_weak_and_of_a_usual_shape(
+    effect: pendmap.EffectDefinition,
+) -> None:
+    blank = Effect.blank(effect.name, BARE)
+    assert blank.sizes == [p.name for p in effect.parameters if p.role in {"size", "phase"}]
+    for parameter in effect.parameters:
+        value, (low, high) = blank.parameters[parameter.name], parameter.typical
+        if parameter.role in {"size", "phase"}:
+            assert value == low
+        else:
+            assert low < value < high
+
+
+def renamed(entry: dict[str, Any]) -> dict[str, Any]:
+    """The definition with other names for its parameters."""
+    other = copy.deepcopy(entry)
+    for k, parameter in enumerate(other["parameters"]):
+        parameter["name"] = f"other{k}"
+        less = parameter["power_of_w0_less"]
+        names = [p["name"] for p in entry["parameters"]]
+        parameter["power_of_w0_less"] = None if less is None else f"other{names.index(less)}"
+    return other
+
+
+def seen(name: str) -> list[Any]:
+    """What a search makes of an effect, its parameters by their places."""
+    names = [p["name"] for p in effects.definition(name)["parameters"]]
+    place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
+
+    def of(one: Candidate) -> list[Any]:
+        shape = {place[n]: value for n, value in one.shape.items()}
+        lists = [[place[n] for n in part] for part in (one.free, one.adapted, one.places)]
+        return [shape, *lists, place[one.size]]
+
+    (shaped,) = (c for c in candidates((), driven=True) if c[0].name == name)
+    blank = Effect.blank(name, BARE)
+    return [[of(one) for one in shaped], blank.values, [place[n] for n in blank.sizes]]
+
+
+def test_other_names_of_parameters_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    library = effects.library()
+    names = [name for name in library if search.own_name(name) is None]
+    expected = {name: seen(name) for name in names}
+    others = {n: renamed(entry) if n in names else entry for n, entry in library.items()}
+    for module in (effects, search):
+        monkeypatch.setattr(module, "library", lambda: others)
+    assert {name: seen(name) for name in names} == expected
+
+
+@pytest.mark.parametrize(
+    ("term", "parameters", "roles"),
+    [
+        ("-k*exp(-(theta/b)^2)*v", {"k": 1, "b": 0}, ["size", "power"]),
+        ("-k*exp(-(theta/b)^2)*v", {"k": 1, "b": {"power": 0, "role": "width"}}, ["size", "width"]),
+        ("k*sin(2*theta - c)", {"k": 2, "c": 0}, ["size", "phase"]),
+        ("-k*v*exp(-t/c)", {"k": 1, "c": -1}, ["size", "time constant"]),
+        ("-k*abs(v)^c*sign(v)", {"k": "2 - c", "c": 0}, ["size", "power"]),
+        ("k*sin(c*theta)", {"k": 2, "c": {"power": 0, "typical": (1, 6)}}, ["size", "order"]),
+        (
+            "-k*exp(-(theta-c)^2)*v",
+            {"k": 1, "c": {"power": 0, "typical": (-1.0, 1.0)}},
+            ["size", "place"],
+        ),
+    ],
+)
+def test_roles_in_a_formula_are_declared_or_seen(
+    term: str, parameters: dict[str, Any], roles: list[str]
+) -> None:
+    formula = pendmap.Formula("own_effect", term, parameters)
+    assert [p["role"] for p in formula.entry["parameters"]] == roles
+    again = pendmap.Formula(**formula.table)
+    assert again == formula
+    values = dict.fromkeys(parameters, 1.0)
+    expected = [n for n, role in zip(parameters, roles, strict=True) if role in {"size", "phase"}]
+    assert formula(**values).sizes == expected
+
+
+def test_a_role_that_does_not_exist_is_refused() -> None:
+    words = "parameter 'b': role is 'breadth': allowed is width, place, power, order, time constant"
+    with pytest.raises(InputError, match=words):
+        pendmap.Formula("mine", "-k*b*v", {"k": 1, "b": {"power": 0, "role": "breadth"}})
