@@ -18,7 +18,7 @@ test: $(VENV)/.develop ## set up everything and run all tests, those of the lane
 	cargo test --locked --quiet
 	for path in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
 		PENDMAP_SIMD=$$path cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
-	$(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
+	$(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
 
 SEED ?= 1
 COUNT ?= 1000

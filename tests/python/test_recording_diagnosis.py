@@ -53,14 +53,14 @@ def hanging(back: ReadBack, bob: str, pivot: float) -> Floats:
 
 def test_the_file_is_whole(file: Path) -> None:
     command = [window._program(), "rrd", "verify", str(file)]  # noqa: SLF001 (the viewer itself)
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr
 
 
 def test_two_recordings_of_one_diagnosis_are_the_same(found: Discrepancy, file: Path) -> None:
     other = viewer.record_discrepancy(found, file.with_name("b.rrd"))
     command = [window._program(), "rrd", "compare", "--unordered", str(file), str(other)]  # noqa: SLF001
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr
 
 

@@ -74,7 +74,7 @@ def test_the_file_is_whole(report: IdentificationReport, tmp_path: Path) -> None
     assert file == tmp_path / "a.rrd"
     assert list(tmp_path.iterdir()) == [file]
     command = [window._program(), "rrd", "verify", str(file)]  # noqa: SLF001 (the viewer itself)
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr
 
 

@@ -12,7 +12,7 @@ use pendmap::maps::basins::{BasinMap, Plane};
 use pendmap::maps::label::NEVER;
 use pendmap::model::Pendulum;
 
-use crate::support::{basins_on_plane, chaos_among_others, driven, path, plane};
+use crate::support::{basins_on_plane, chaos_among_others, driven, paths, plane};
 use crate::truths::{model, number, table, truths};
 
 /// The three points of figure 2 and one more with a reference exponent: p, omega and the map.
@@ -39,12 +39,13 @@ fn a_rotation_that_gains_speed_for_ever_is_no_chaos() {
 #[test]
 fn what_leaves_its_region_is_no_set() {
     // Where nothing else would have left it out.
-    let strobe = Strobe::new(&runaway(), 60, path());
     let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
-    assert!(
-        sets(&strobe, &states, &[None; 6], 200, &Effort::THOROUGH, &AtomicBool::new(false))
-            .is_empty()
-    );
+    for path in paths() {
+        let strobe = Strobe::new(&runaway(), 60, path);
+        let found =
+            sets(&strobe, &states, &[None; 6], 200, &Effort::THOROUGH, &AtomicBool::new(false));
+        assert!(found.is_empty(), "{path}");
+    }
 }
 
 /// The one chaotic attractor of a plane that has nothing else.

@@ -12,7 +12,7 @@ use pendmap::maps::cell::{Cell, Search};
 use pendmap::maps::control::Control;
 use pendmap::maps::parameter_map::Range;
 
-use crate::support::{basins_on_plane, driven, path, plane, spread};
+use crate::support::{basins_on_plane, driven, paths, plane, spread};
 
 /// Steps a period of the method of this file.
 const STEPS: usize = 200;
@@ -130,7 +130,7 @@ fn sets_at_random_points_do_what_their_kind_says() {
 fn searched(own: &Own) -> Cell {
     let search =
         Search { starts: plane(1000).sampled_states(9, 1), each: 9, bound: None, kept: 64 };
-    let strobe = Strobe::new(&driven(0.1, own.p, own.omega), 40, path());
+    let strobe = Strobe::new(&driven(0.1, own.p, own.omega), 40, paths()[0]);
     search.cell(0, &strobe, &[], Control::default().flag())
 }
 
