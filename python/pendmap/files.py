@@ -181,7 +181,7 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
     Raises
     ------
     InputError
-        If it is no regular file, or longer.
+        If it is a pipe, a device, or longer.
     OSError
         If it cannot be read.
     """
@@ -205,16 +205,16 @@ def check_regular(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        If it is one of these.
+        If it is a pipe or a device.
     OSError
-        If there is nothing.
+        If it is a folder, or there is nothing.
     """
     _check_regular(Path(path), Path(path).stat().st_mode)
 
 
 def _check_regular(source: Path, mode: int) -> None:
     if stat.S_ISDIR(mode):
-        raise InputError(f"{source}: is a folder: allowed is a file")
+        raise IsADirectoryError(errno.EISDIR, "is a folder: allowed is a file", str(source))
     if not stat.S_ISREG(mode):
         raise InputError(f"{source}: is no file but a pipe or a device: allowed is a file")
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import click
 
-from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.show import write_all
 from pendmap.cli.types import OutputFile
 from pendmap.errors import InputError
@@ -49,7 +48,6 @@ def command(  # noqa: PLR0913 (the options above)
     if not file.name:
         raise click.UsageError(f"{str(file)!r}: is a folder: allowed is a result, .nc or .zarr")
     target = out or OutputFile([".png"]).convert(file.with_suffix(".png"), None, None)
-    keep_inputs([file], {"--out": [target]})
 
     from pendmap import figures
     from pendmap.store import load

@@ -49,6 +49,8 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
         If it cannot be read.
     """
     where = str(path)
+    if path.is_dir():
+        raise InputError(f"{where}: is a folder: allowed is a file")
     data = read_whole(path, MOST_BYTES)
     digest = hashlib.sha256(data).hexdigest()
     for mark, what in _KNOWN.items():
