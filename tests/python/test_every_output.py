@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import pendmap
-from pendmap import cli, figures
+from pendmap import InputError, cli, figures, viewer
 from pendmap.figures import style
 from pendmap.model import effects_of
 
@@ -87,3 +87,19 @@ def test_every_output_of_every_command_takes_every_model(
     known = pendmap.load_model(tmp_path / "model.toml")
     assert effects_of(result.attrs) == known.effects
     figures.draw(result, tmp_path / "again.png")
+
+
+def test_what_is_refused_while_files_are_written_leaves_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(*_: object) -> None:
+        raise InputError("time is 1e12: allowed is up to 9e9")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(viewer, "record", refused)
+    monkeypatch.setattr(sys, "argv", ["pendmap", "simulate", "--until", "20"])
+    with pytest.raises(SystemExit) as end:
+        cli.run()
+    assert end.value.code == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())

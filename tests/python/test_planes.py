@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import pendmap
 from drawn import made, named, titles
 from pendmap import Effect, Grid, Pendulum, Rig, figures
 from pendmap.cell_search import spread
 from pendmap.pictures import planes as drawn
+from pendmap.planes import undecided_cells
 from pendmap.regimes import kind_of, regimes
 from recordings import recorded
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import xarray as xr
 
     from conftest import Run
 
@@ -316,3 +316,27 @@ def test_curves_and_cells_move_one_progress() -> None:
     assert shares == sorted(shares)
     assert any(0 < share < 0.5 for share in shares)  # while curves are computed
     assert shares[-1] <= 1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_groups_of_undecided_cells_cover_them_all(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    share = np.where(draw.random((7, 9)) < 0.2, draw.random((7, 9)), 0.0)
+    axes = {"omega": np.linspace(1, 2, 7), "p": np.linspace(0, 4, 9)}
+    dataset = xr.Dataset({"undecided": (("omega", "p"), share)}, coords=axes)
+    groups = undecided_cells(dataset)
+    assert sum(group["cells"] for group in groups) == np.count_nonzero(share)
+    total = sum(group["cells"] * group["undecided"] for group in groups)
+    assert total == pytest.approx(share.sum())
+    inside = np.zeros(share.shape, dtype=bool)
+    for group in groups:
+        (left, right), (low, high) = (group["ranges"][name] for name in ("p", "omega"))
+        x, y = np.meshgrid(axes["p"], axes["omega"])
+        box = (x >= left) & (x <= right) & (y >= low) & (y <= high)
+        for edge in (x[box] == left, x[box] == right, y[box] == low, y[box] == high):
+            assert share[box][edge].any(), "no wider than its cells"
+        inside |= box
+    assert inside[share > 0].all()
+    assert [group["cells"] for group in groups] == sorted(
+        (group["cells"] for group in groups), reverse=True
+    )

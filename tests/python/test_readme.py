@@ -135,10 +135,12 @@ def test_every_toml_is_what_it_is_said_to_be(
         return
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")
     drive = ("--stroke-mm", "20", "--frequency-hz", "1.9")
-    model = ("simulate", "--model", "own.toml", *drive, "--until", "30", "--json")
+    model = ("simulate", "--model", "own.toml", *drive, "--until", "30")
     formulas = ("effects", "--effects", "own.toml", "--json")
     run = pendmap_command(*(model if "[pendulum]" in text else formulas))
     assert run.returncode == 0, run.stderr
+    if "[pendulum]" in text:
+        assert all((tmp_path / f"simulate.{kind}").exists() for kind in ("nc", "png", "rrd"))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -8,7 +8,8 @@ import pytest
 import xarray as xr
 
 import pendmap
-from pendmap import Grid, InputError, Pendulum
+from pendmap import Grid, InputError, Pendulum, figures, viewer
+from pendmap.store import KINDS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -85,3 +86,13 @@ def test_a_failure_leaves_the_old_file(
         pendmap.save(results[1], file)
     assert file.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["result.nc"]
+
+
+def test_every_kind_of_result_has_its_functions_its_figure_and_its_recording() -> None:
+    assert set(KINDS) == set(figures._KINDS) == set(viewer._KINDS)  # noqa: SLF001 (the registries)
+    with pytest.raises(InputError) as refused:
+        pendmap.save(xr.Dataset(), "a.nc")
+    for functions in KINDS.values():
+        for name in functions:
+            assert callable(getattr(pendmap, name))
+            assert f" {name}" in str(refused.value)

@@ -1,0 +1,45 @@
+"""Numbers with their errors, in words: nothing small is hidden."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import pendmap
+from pendmap.words import with_error, written
+
+sizes = st.floats(-12, 6).map(lambda power: 10.0**power)
+
+
+@given(value=sizes, negative=st.booleans(), error=sizes)
+def test_a_number_is_written_to_a_tenth_of_its_error(
+    *, value: float, negative: bool, error: float
+) -> None:
+    value = -value if negative else value
+    said, apart = (float(part) for part in with_error(value, error).split(" +- "))
+    assert said == pytest.approx(value, abs=max(0.06 * error, 0.5), rel=5e-3) if error > 1 else True
+    if error <= 1:
+        assert abs(said - value) <= max(0.06 * error, 5e-3 * abs(value))
+        assert apart == pytest.approx(error, rel=0.06)
+    assert not written(value, error).startswith("-0.0") or said != 0
+
+
+@given(value=sizes, negative=st.booleans(), error=st.sampled_from([0.0, math.nan, math.inf]))
+def test_without_an_error_there_are_five_digits(
+    *, value: float, negative: bool, error: float
+) -> None:
+    value = -value if negative else value
+    assert float(with_error(value, error)) == pytest.approx(value, rel=5e-5)
+
+
+def test_small_exponents_are_in_summaries() -> None:
+    model = pendmap.Pendulum(gamma=2e-5, p=0.0, torque=0.0)
+    found = pendmap.lyapunov(model, 0.1, 0.0, max_periods=200)
+    result = pendmap.basins(pendmap.Pendulum(gamma=2e-4, p=0.6), pendmap.Grid.square(6))
+    text = found.attrs["summary"] + result.attrs["summary"]
+    assert "0.0000" not in text
+    for exponent in result["exponent"].values:
+        assert f"exponent {exponent:.5g}" in result.attrs["summary"]
