@@ -206,16 +206,17 @@ def test_under_a_torque_orbits_are_stable_where_scipy_finds_them_so(
 
 
 def test_the_curves_of_a_small_torque_are_those_without() -> None:
-    # Folds move with the torque to the power 2/3, the others with its square. Where hanging rest sheds
-    # an oscillation of period 1, that goes on in place of it.
+    # Folds move with the torque to the power 2/3, the others with its square. Where rest sheds an
+    # oscillation of period 1, that goes on in place of it.
     for omega in (2.0, 6.0):
         level, tilted = (
             pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 20.0)
             for torque in (0.0, 1e-6)
         )
-        assert np.allclose(level["inverted_p"], tilted["inverted_p"], atol=2e-3)
-        doubled = level["p"].values[level["multiplier"].values < 0]
-        assert all(abs(tilted["p"].values - p).min() < 1e-8 for p in doubled)
+        assert np.allclose(level["inverted_p"][:2], tilted["inverted_p"][:2], atol=2e-3)
+        for prefix in ("", "inverted_"):
+            doubled = level[f"{prefix}p"].values[level[f"{prefix}multiplier"].values < 0]
+            assert all(abs(tilted[f"{prefix}p"].values - p).min() < 1e-7 for p in doubled)
 
 
 def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_counts_twice() -> None:
