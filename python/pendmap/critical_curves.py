@@ -41,6 +41,8 @@ OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
 MOST_P = 100.0
 """Largest amplitude that may be asked for."""
 
+_OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
+
 _NO_REST: _Row = {"p": [], "multiplier": [], "stable": [False]}
 """What is found of a rest that is no solution."""
 
@@ -177,30 +179,16 @@ def tongues(  # noqa: C901, PLR0913, PLR0915 (a sequence; physics first, numeric
     moved = bool(found[0]["moved"])
     if moved:
         undamped = [_NO_REST] * len(found)
-    folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
-    fold, theta, velocity = np.array(folds).T
-    of_p = {"units": "1", "long_name": "amplitude of the drive over gravity"}
-    variables: dict[str, Any] = {
-        **_columns(found, "critical", ""),
-        **_columns(undamped, "undamped", "undamped_"),
-        **_columns(upright, "inverted", "inverted_"),
+    of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
+    variables = {
+        **_variables(found, undamped, upright),
         **{
             f"{table}_omega": (table, np.repeat(frequencies, [len(row["p"]) for row in rows]))
             for table, rows in (("critical", found), ("undamped", undamped), ("inverted", upright))
         },
-        "asked": ("omega", np.isin(frequencies, asked).astype(np.int8)),
-        "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
-        "fold_sought": ("omega", looked.astype(np.int8)),
-        "fold": ("omega", fold, of_p | {"comment": "of the oscillation born at the first loss"}),
-        "fold_theta": ("omega", theta, {"units": "rad"}),
-        "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
+        **{name: ("omega", values.astype(np.int8)) for name, values in of_omega.items()},
+        **_asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max),
     }
-    for prefix, one, rest in (("", "critical", found), ("inverted_", "inverted", upright)):
-        above = [stable for row in rest for stable in row["stable"][1:]]
-        variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
-    asymptotic_p, off = _asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max)
-    variables["asymptotic"] = (("curve", "omega"), asymptotic_p, of_p)
-    variables["asymptotic_error"] = (("curve", "omega"), off, {"units": "1"})
     coords: dict[str, Any] = {
         "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
         "curve": ("curve", np.array(list(asymptotic.CURVES))),
@@ -270,6 +258,24 @@ def _usual(plane: str) -> Floats:
     return np.asarray(1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count)))
 
 
+def _variables(found: list[_Row], undamped: list[_Row], upright: list[_Row]) -> dict[str, Any]:
+    folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
+    fold, theta, velocity = np.array(folds).T
+    variables: dict[str, Any] = {
+        **_columns(found, "critical", ""),
+        **_columns(undamped, "undamped", "undamped_"),
+        **_columns(upright, "inverted", "inverted_"),
+        "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
+        "fold": ("omega", fold, _OF_P | {"comment": "of the oscillation born at the first loss"}),
+        "fold_theta": ("omega", theta, {"units": "rad"}),
+        "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
+    }
+    for prefix, one, rest in (("", "critical", found), ("inverted_", "inverted", upright)):
+        above = [stable for row in rest for stable in row["stable"][1:]]
+        variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
+    return variables
+
+
 def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, Any]:
     count = [len(row["p"]) for row in found]
     p = np.array([p for row in found for p in row["p"]], dtype=float)
@@ -277,7 +283,7 @@ def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, An
     index = np.repeat(np.arange(len(found), dtype=np.int32), count)
     return {
         f"{prefix}index": (one, index, {"comment": "place of its frequency in omega"}),
-        f"{prefix}p": (one, p, {"units": "1", "long_name": "amplitude of the drive over gravity"}),
+        f"{prefix}p": (one, p, _OF_P),
         f"{prefix}multiplier": (one, multiplier),
     }
 
@@ -287,7 +293,7 @@ def _asymptotic(
     omega: Floats,
     gamma: float,
     p_max: float,
-) -> tuple[Floats, Floats]:
+) -> dict[str, Any]:
     """Return each asymptotic curve, and how far it is from the exact one with its multiplier."""
     curves, errors = [], []
     for multiplier, formula in asymptotic.CURVES.values():
@@ -301,7 +307,11 @@ def _asymptotic(
                 error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan
         curves.append(p)
         errors.append(error)
-    return np.array(curves), np.array(errors)
+    across = ("curve", "omega")
+    return {
+        "asymptotic": (across, np.array(curves), _OF_P),
+        "asymptotic_error": (across, np.array(errors), {"units": "1"}),
+    }
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:

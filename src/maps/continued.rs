@@ -25,7 +25,7 @@ const STEP: f64 = 0.05;
 const NEAR: f64 = 0.1;
 /// The least step in `p`, and of the torque in its own units.
 const LEAST_STEP: f64 = 1e-9;
-const LEAST_SHARE: f64 = 1.0 / 64.0;
+const LEAST_SHARE: f64 = 1.0 / 256.0;
 /// A fold this far ahead in `p` is known well enough: the square of the gap falls linearly to it.
 const AT_FOLD: f64 = 1e-7;
 /// Places in a stable interval of the pendulum without torque, in parts of it, where orbits begin.
@@ -70,14 +70,14 @@ pub(super) fn curve(pendulum: &Pendulum, balance: Balance, level: &Curve, p_max:
     let doubling = level.critical.iter().filter(|c| c.multiplier < 0.0).map(|c| c.p);
     let seeds = doubling.filter_map(|p| course.begun(p, true));
     let mut sheets: Vec<Sheet> = Vec::new();
-    for seed in seeds.chain(places.filter_map(|p| course.begun(p, false))) {
+    let all = seeds.chain(places.filter_map(|p| course.begun(p, false)));
+    for seed in all.filter_map(|seed| course.within(seed)) {
         if !sheets.iter().any(|sheet| course.holds(sheet, &seed)) {
             sheets.push(course.sheet(seed));
         }
     }
     let mut critical: Vec<(f64, f64)> =
         sheets.iter().flat_map(|sheet| sheet.critical.iter().copied()).collect();
-    critical.retain(|c| c.0 <= p_max);
     critical.sort_by(|a, b| a.0.total_cmp(&b.0));
     let ends: Vec<f64> =
         [0.0].into_iter().chain(critical.iter().map(|c| c.0)).chain([p_max]).collect();
@@ -199,12 +199,19 @@ impl Course<'_> {
         None
     }
 
+    /// The same orbit within what is asked for, if it goes there.
+    fn within(&self, seed: Place) -> Option<Place> {
+        if seed.p <= self.p_max {
+            return Some(seed);
+        }
+        self.followed(seed, self.p_max).0.pop().filter(|last| last.p <= self.p_max)
+    }
+
     /// All of the orbit from one of its places, both ways.
     fn sheet(&self, seed: Place) -> Sheet {
         let (mut places, begin) = self.followed(seed, 0.0);
         places.reverse();
-        // A seed may lie above all that is asked for.
-        let (after, end) = self.followed(seed, self.p_max.max(seed.p));
+        let (after, end) = self.followed(seed, self.p_max);
         places.extend(after.into_iter().skip(1));
         let mut critical: Vec<(f64, f64)> = begin.into_iter().map(|p| (p, 1.0)).collect();
         critical.extend(self.doublings(&places).into_iter().map(|p| (p, -1.0)));

@@ -138,13 +138,96 @@ def test_inverted_rest_is_stable_where_its_motions_decay(seed: int) -> None:
 
 
 def test_where_upright_is_no_rest_hanging_rest_is_looked_at_alone() -> None:
-    push = Formula("push", "a*(1 - cos(theta))", {"a": 2})
-    pushed = Pendulum(gamma=0.1, effects=(push(a=0.1),))
+    push = Formula("push", "k*(1 - cos(theta))", {"k": 2})
+    pushed = Pendulum(gamma=0.1, effects=(push(k=0.1),))
     found = pendmap.tongues(pushed, 6.0, 20.0)
     assert found.attrs["inverted"] == 0
     assert found.sizes["inverted"] == 0
     assert found.sizes["critical"] > 0
     assert "nverted" not in found.attrs["summary"]
+
+
+def period_of(
+    x: NDArray[np.float64], p: float, omega: float, torque: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where a state is after a period, and the derivative, at gamma = 0.1 by scipy."""
+
+    def slope(t: float, y: NDArray[np.float64]) -> list[float]:
+        gravity = 1 + p * math.cos(omega * t)
+        k = gravity * math.cos(y[0])
+        velocity = torque - 0.1 * y[1] - gravity * math.sin(y[0])
+        return [y[1], velocity, y[4], y[5], -k * y[2] - 0.1 * y[4], -k * y[3] - 0.1 * y[5]]
+
+    start = [*x, 1.0, 0.0, 0.0, 1.0]
+    end = solve_ivp(slope, (0, math.tau / omega), start, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
+    return end[:2], end[2:].reshape(2, 2)
+
+
+def orbits_near(
+    angle: float, p: float, omega: float, torque: float
+) -> list[NDArray[np.complex128]]:
+    """Return the multipliers of the orbits of the drive's period that Newton's method finds."""
+    found: dict[tuple[float, float], NDArray[np.complex128]] = {}
+    for start in angle + np.linspace(-0.6, 0.6, 5):
+        x = np.array([start, 0.0])
+        for _ in range(12):
+            end, monodromy = period_of(x, p, omega, torque)
+            if np.abs(end - x).max() < 1e-9:
+                found[round(x[0], 5), round(x[1], 5)] = np.linalg.eigvals(monodromy)
+                break
+            x = x - np.linalg.solve(monodromy - np.eye(2), end - x)
+            if abs(x[0] - angle) > 2:
+                break
+    return list(found.values())
+
+
+@pytest.mark.parametrize(("omega", "torque"), [(6.0, 0.3), (2.0, 0.05), (9.0, -0.6)])
+def test_under_a_torque_orbits_are_stable_where_scipy_finds_them_so(
+    omega: float, torque: float
+) -> None:
+    found = pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 45.0 if omega > 3 else 5.0)
+    low, high = found["inverted_p"].values[:2]
+    assert found["inverted_multiplier"].values[:2].tolist() == [1, -1]
+    assert found["inverted_stable_above"].values[:2].tolist() == [1, 0]
+
+    def stable(angle: float, p: float) -> bool:
+        return any(abs(m).max() < 1 for m in orbits_near(angle, p, omega, torque))
+
+    # The orbit begins at a fold, and sheds one of twice the period in the end.
+    assert [stable(math.pi, p) for p in (0.995 * low, 1.002 * low)] == [False, True]
+    assert [stable(math.pi, p) for p in (0.998 * high, 1.002 * high)] == [True, False]
+    assert min(abs(m + 1).min() for m in orbits_near(math.pi, high, omega, torque)) < 1e-6
+    first = float(found["p"].values[0])
+    assert found["multiplier"].values[0] == -1
+    assert found["stable_at_first"].values[0] == 1
+    rest = math.asin(torque)
+    assert min(abs(m + 1).min() for m in orbits_near(rest, first, omega, torque)) < 1e-6
+    assert stable(rest, 0.99 * first)
+
+
+def test_the_curves_of_a_small_torque_are_those_without() -> None:
+    # Folds move with the torque to the power 2/3, the others with its square. Where rest sheds an
+    # oscillation of period 1, that goes on in place of it.
+    for omega in (2.0, 6.0):
+        level, tilted = (
+            pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 20.0)
+            for torque in (0.0, 1e-6)
+        )
+        assert np.allclose(level["inverted_p"][:2], tilted["inverted_p"][:2], atol=2e-3)
+        for prefix in ("", "inverted_"):
+            doubled = level[f"{prefix}p"].values[level[f"{prefix}multiplier"].values < 0]
+            assert all(abs(tilted[f"{prefix}p"].values - p).min() < 1e-7 for p in doubled)
+
+
+def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_counts_twice() -> None:
+    omega = np.linspace(1.55, 1.75, 5)
+    one, other = (
+        pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 8.0) for torque in (0.2, -0.2)
+    )
+    assert np.allclose(one["p"], other["p"], atol=1e-8)
+    assert np.allclose(one["inverted_p"], other["inverted_p"], atol=1e-8)
+    for k in range(omega.size):
+        assert (np.diff(one["p"].values[one["index"].values == k]) > 1e-6).all()
 
 
 @pytest.mark.parametrize("name", list(asymptotic.CURVES))
@@ -176,7 +259,10 @@ def test_added_damping_is_damping_and_effects_count() -> None:
     [
         ({"theta_r": 0.05}, "theta_r is 0.05: friction holds .*: allowed is 0"),
         ({"effects": (Effect("coulomb_friction", {"theta_r": 0.05}),)}, "friction holds"),
-        ({"torque": 0.1}, "a torque or a sideways drive moves it"),
+        (
+            {"effects": (Effect("lateral_drive", {"e": 0.1, "phase": 0.0}),)},
+            "a sideways drive or an effect moves it",
+        ),
         ({"effects": (Effect("drive_chirp", {"r": 0.001}),)}, "drive_chirp"),
     ],
 )

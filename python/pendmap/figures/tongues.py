@@ -51,6 +51,8 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
         raise InputError(f"colormap {colormap!r}: a figure of critical curves has no colour map")
     chart = drawn.chart(dataset, plane, NEAR)
     handles, texts = _legend(chart, own=not marks, damped=float(dataset.attrs["gamma"]) > 0)
+    if dataset.attrs["moved"]:
+        texts = [text.replace("rest is stable", "rest: its orbit is stable") for text in texts]
     sheet = Sheet(
         [Panel()],
         ratio=0.72,
@@ -117,13 +119,15 @@ def _legend(chart: drawn.Chart, *, own: bool, damped: bool) -> tuple[list[Any], 
     if chart.inverted:
         hatched = Patch(facecolor="none", edgecolor=_INVERTED, hatch="////", linewidth=0)
         entries.insert(1, (hatched, "inverted rest is stable"))
-    if damped:
+    if damped and chart.undamped:
         bare = Line2D([], [], color=style.QUIET, linewidth=0.6)
         entries.append((bare, "exact, without damping"))
     if (chart.fold == chart.fold).any(axis=0)[1]:
         fold = Line2D([], [], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
         entries.append((fold, "fold: the oscillation exists from here"))
-    for look, name in zip(_LOOKS, chart.asymptotic, strict=True):
+    for look, (name, parts) in zip(_LOOKS, chart.asymptotic.items(), strict=True):
+        if np.isnan(parts).all():
+            continue
         entries.append((Line2D([], [], color=style.INK, linewidth=1.0, linestyle=look), name))
     if _ends_in_view(chart):
         edge = Line2D([], [], color="#c8c8c8", linewidth=3.0)
