@@ -1,12 +1,15 @@
 //! Attractors and basins on the reference grids: points, kinds, names, twins, fractions.
 
+use std::collections::HashSet;
 use std::sync::OnceLock;
 
+use pendmap::attractor::catalogue::arrange;
 use pendmap::attractor::{Attractor, Kind};
 use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
 use pendmap::maps::basins::{BasinMap, Plane};
 use pendmap::maps::label::NEVER;
+use pendmap::model::Pendulum;
 
 use crate::support::{basins_on_plane, driven};
 use crate::truths::{attractors_at, fractions_at};
@@ -133,4 +136,35 @@ fn a_rotation_after_doubling_is_of_period_two_and_two_turns() {
     let map = basins_on_plane(&driven(0.1, 1.4, 2.0), 40);
     let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
     assert!(names.contains(&"rotation 2:+2") && names.contains(&"rotation 2:-2"), "{names:?}");
+}
+
+#[test]
+fn no_two_attractors_of_a_catalogue_share_a_name() {
+    let mut random = 1_u64;
+    let mut below = |bound: usize| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (random >> 33) as usize % bound
+    };
+    for _ in 0..200 {
+        let attractors: Vec<Attractor> = (0..12)
+            .map(|_| {
+                // First angles are often the same to four digits, and sometimes to all.
+                let theta = 0.1 * below(3) as f64 + [0.0, 1e-6, 1e-9][below(3)];
+                let mut one = Attractor::resting(theta);
+                let kinds = [Kind::Oscillation, Kind::TumblingChaos, Kind::LibrationChaos];
+                one.kind = kinds[below(3)];
+                (one.n, one.w) = match one.kind {
+                    Kind::Oscillation => (Some(1 + below(2)), Some(0)),
+                    _ => (None, None),
+                };
+                one
+            })
+            .collect();
+        for torque in [0.0, 0.1] {
+            let pendulum = Pendulum::new(0.1, 1.0, 2.0, 0.0, torque).expect("a pendulum");
+            let (named, _) = arrange(&pendulum, attractors.clone());
+            let names: HashSet<&str> = named.iter().map(|a| a.name.as_str()).collect();
+            assert_eq!(names.len(), named.len(), "{names:?}");
+        }
+    }
 }
