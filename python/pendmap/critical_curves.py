@@ -56,7 +56,7 @@ NEAR = 0.05
 """An asymptotic curve that is off by less than this part is near the exact one."""
 
 
-def tongues(  # noqa: C901, PLR0913, PLR0915 (a sequence; physics first, numerical choices by name)
+def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     omega: ArrayLike | None = None,
     p_max: float = P_MAX,
