@@ -120,7 +120,9 @@ fn sets_at_random_points_do_what_their_kind_says() {
         let sets: Vec<&Attractor> =
             cell.found.iter().map(|f| &f.attractor).filter(|a| a.kind.is_chaotic()).collect();
         seen += sets.len();
-        sets.iter().for_each(|set| does_what_it_says(&own, set));
+        for set in &sets {
+            does_what_it_says(&own, set);
+        }
         let tumbles = |a: &&&Attractor| a.kind == Kind::TumblingChaos;
         assert!(sets.iter().filter(tumbles).count() <= 1, "p = {}, omega = {}", own.p, own.omega);
     }
