@@ -27,6 +27,7 @@ from pendmap.errors import InputError
 from pendmap.identification.astray import refuse_astray
 from pendmap.model.effects import definition
 from pendmap.notebook import Readable
+from pendmap.records.summary import unit_wrong
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -247,7 +248,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         evidence, begin, max_effects, without, lambda done: report(1 + done, steps), own=own
     )
     nearest = search.run()
-    refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
+    if not unit_wrong(experiment, *evidence.runs):
+        refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
     report(steps - 1, steps)
     runs = run_by_run(evidence, nearest.trial)
     try:

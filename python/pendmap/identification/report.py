@@ -23,6 +23,7 @@ from pendmap.model import Rig
 from pendmap.model.effects import definition
 from pendmap.notebook import Readable
 from pendmap.records.experiment import Experiment
+from pendmap.records.summary import unit_wrong
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -231,7 +232,8 @@ def _best(
             raise
         # No other method can stand in for what was asked for by name; without that they can.
         return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
-    if joint.fit.converged or len(runs) > 1:
+    certain = joint.fit.converged or len(runs) > 1
+    if certain and not unit_wrong(experiment, *runs):
         refuse_astray(
             experiment.path,
             [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)],

@@ -27,6 +27,7 @@ __all__ = [
     "findings_said",
     "noise_said",
     "noise_unit",
+    "unit_wrong",
 ]
 
 UNITS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
@@ -167,6 +168,12 @@ def doubted(experiment: Experiment, *runs: Run) -> bool:
     """Whether a unit of these runs is wrong, or they are of several rigs, as far as can be seen."""
     said = (found for _, found in _said_of(experiment, runs))
     return any(_doubted(found) and found.what != SCALE for found in said)
+
+
+def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
+    """Whether a unit of these runs is wrong: what a fit misses is in that unit, too."""
+    said = (found for _, found in _said_of(experiment, runs))
+    return any(found.what in UNITS and found.what != SCALE and not found.mended for found in said)
 
 
 def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
