@@ -1,6 +1,6 @@
 //! How far a start must be known for its end to be known.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 
 use super::label::UNDECIDED;
 use super::near::Nearness;
@@ -24,8 +24,10 @@ const STARTS: [f64; 2] = [200.0, 16_000.0];
 const LEAST_TELLING: usize = 3;
 /// A distance at which fewer are expected from the most starts says too little.
 const LEAST_UNCERTAIN: f64 = 40.0;
-/// Labels in all: at least, over the cells of the map, and at most.
+/// Labels in all: at least, over the cells of the map, and at most, where they leave the exponent ...
 const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
+/// ... a greater standard error than this.
+const ERROR: f64 = 0.015;
 /// Part of the starts that is drawn where the map shows a change within the distance, in the pilot and ...
 const PILOT_NEAR: f64 = 0.5;
 /// ... where this has met no uncertain start elsewhere.
@@ -214,23 +216,31 @@ fn plan(pilot: &[(i32, usize)], seen: &[Counts], part: f64, labels: f64) -> Vec<
     let all = (pilot[0].0 - SCALES[1]) as usize + 1;
     let enough = |price: &f64| STARTS[1] >= LEAST_UNCERTAIN * price;
     let count = prices.iter().take(all).take_while(|price| enough(price)).count();
-    let starts = |count: usize| -> Vec<f64> {
+    let starts = |count: usize, labels: f64| -> Vec<f64> {
         let wanted = prices[..count].iter().map(|price| (AIM * price).clamp(STARTS[0], STARTS[1]));
         let wanted: Vec<f64> = wanted.collect();
         let part = (labels / SIDES as f64 / wanted.iter().sum::<f64>()).min(1.0);
         wanted.iter().map(|starts| part * starts).collect()
     };
-    // One over the square of the error, of a line through independent points.
-    let told = |count: usize| {
-        let weights: Vec<f64> = starts(count).iter().zip(&prices).map(|(n, p)| n / p).collect();
+    // The error of a line's slope through independent points, an octave apart.
+    let error = |count: usize, labels: f64| {
+        let starts = starts(count, labels);
+        let weights: Vec<f64> = starts.iter().zip(&prices).map(|(n, p)| n / p).collect();
         let moment = |power: i32| -> f64 {
             weights.iter().enumerate().map(|(k, w)| w * (k as f64).powi(power)).sum()
         };
-        moment(2) - moment(1).powi(2) / moment(0)
+        LN_2.recip() / (moment(2) - moment(1).powi(2) / moment(0)).sqrt()
     };
-    let best = (LEAST_SCALES.min(count)..=count).max_by(|a, b| told(*a).total_cmp(&told(*b)));
+    let best = |labels: f64| {
+        (LEAST_SCALES.min(count)..=count)
+            .min_by(|a, b| error(*a, labels).total_cmp(&error(*b, labels)))
+            .unwrap_or(0)
+    };
+    let more = (error(best(labels), labels) / ERROR).powi(2).max(1.0);
+    let labels = (more * labels).min(LABELS[2]);
+    let starts = starts(best(labels), labels);
     let scales = (0..).map(|k| pilot[0].0 - k);
-    let rounded = starts(best.unwrap_or(0)).into_iter().map(|starts| starts.ceil() as usize);
+    let rounded = starts.into_iter().map(|starts| starts.ceil() as usize);
     scales.zip(rounded).collect()
 }
 

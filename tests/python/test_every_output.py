@@ -49,8 +49,8 @@ COMMANDS = {
     "melnikov": ("--omega", "1.5"),
 }
 REFUSED = {
-    ("Coulomb friction", "tongues"): "friction holds it whatever the drive",
-    ("a direct drive", "tongues"): "a sideways drive moves it",
+    ("Coulomb friction", "tongues"): "friction holds hanging rest whatever the drive",
+    ("a direct drive", "tongues"): "a sideways drive or an effect moves it",
     ("a direct drive", "melnikov"): "not proportional to p",
 }
 """What has no meaning, and why."""

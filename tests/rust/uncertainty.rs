@@ -84,15 +84,16 @@ fn thirds(mut x: f64) -> i16 {
 
 #[test]
 fn exponents_that_are_known_are_found_on_maps_of_any_size() {
-    type Plane = (f64, f64, fn(f64, f64) -> i16);
+    type Plane = (f64, fn(f64, f64) -> i16);
     let planes: [Plane; 4] = [
-        (1.0, 0.05, |x, y| 1 + i16::from((x - 0.5).hypot(y - 0.5) < 0.31)),
-        (1.0, 0.05, |x, y| 1 + i16::from(y > 0.45 + 0.2 * (7.0 * x).sin())),
-        (1.0, 0.05, |x, y| 1 + i16::from(x + 0.37 * y > 0.61) + i16::from(x < 0.2)),
-        (1.0 - 2_f64.ln() / 3_f64.ln(), 0.07, |x, y| thirds((x + 0.013 * y).fract())),
+        (1.0, |x, y| 1 + i16::from((x - 0.5).hypot(y - 0.5) < 0.31)),
+        (1.0, |x, y| 1 + i16::from(y > 0.45 + 0.2 * (7.0 * x).sin())),
+        (1.0, |x, y| 1 + i16::from(x + 0.37 * y > 0.61) + i16::from(x < 0.2)),
+        (1.0 - 2_f64.ln() / 3_f64.ln(), |x, y| thirds((x + 0.013 * y).fract())),
     ];
-    for (known, width, of) in planes {
-        for (side, seed) in [(100, 1), (400, 2), (1000, 3)] {
+    for (known, of) in planes {
+        // Maps of few cells have few labels to spend: the widths are three standard errors.
+        for (side, seed, width) in [(100, 1, 0.12), (400, 2, 0.06), (1000, 3, 0.04)] {
             let found = measured(side, seed, of);
             let value = exponent(&found);
             assert!((value - known).abs() < width, "{value} for {known} on {side}: {found:?}");

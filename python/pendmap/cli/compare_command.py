@@ -80,7 +80,7 @@ def command(  # noqa: PLR0913 (an option each)
         from pendmap import figures
 
         draw = functools.partial(figures.draw_comparison, comparison)
-        written = write_all([(draw, plot)])
+        written = write_all([(draw, plot)], keep=True)
     if as_json:
         click.echo(json.dumps(plain(fields(comparison) | {"model": str(model)}), allow_nan=False))
     elif not quiet:

@@ -140,7 +140,7 @@ def command(  # noqa: PLR0913 (an option each)
         )
     with progress_bar("write", shown=shown):
         line = "pendmap " + shlex.join(sys.argv[1:])
-        written = write_all(_files(found, outputs, line))
+        written = write_all(_files(found, outputs, line), keep=True)
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 

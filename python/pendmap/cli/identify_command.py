@@ -71,7 +71,7 @@ def command(
         _show(report, outputs)
         raise
     with progress_bar("write", shown=outputs.shows_progress):
-        written = write_all(_files(outputs, report, model))
+        written = write_all(_files(outputs, report, model), keep=True)
     _show(report, outputs, written.name(outputs.out))
     if not outputs.as_json and not outputs.quiet:
         written.say()

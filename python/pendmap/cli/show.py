@@ -6,6 +6,7 @@ import contextlib
 import functools
 import json
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,7 +17,6 @@ from pendmap.notebook import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
-    from pathlib import Path
 
     import xarray as xr
 
@@ -106,10 +106,13 @@ class Written(list[str]):
             raise NotWrittenError(f"{'; '.join(self.missed)}; written: {complete}")
 
 
-def write_all(files: Iterable[tuple[Callable[[Path], Path | str], Path]]) -> Written:
+def write_all(
+    files: Iterable[tuple[Callable[[Path], Path | str], Path]], *, keep: bool = False
+) -> Written:
     """Write files one after the other and return their names.
 
-    Where one of them cannot be written, the others are tried all the same (:meth:`Written.check`).
+    Where the disk does not take one, the others are tried all the same (:meth:`Written.check`).
+    What cannot be put into a file is refused and leaves none, unless ``keep`` asks for the others.
     An interrupt takes effect between two files and names those that are complete.
     """
     written = Written()
@@ -119,6 +122,10 @@ def write_all(files: Iterable[tuple[Callable[[Path], Path | str], Path]]) -> Wri
                 try:
                     written.append(str(write(path)))
                 except InputError as error:
+                    if not keep:
+                        for name in written:
+                            Path(name).unlink(missing_ok=True)
+                        raise
                     written.refused.append(error)
                 except OSError as error:
                     written.missed.append(f"cannot write {path}: {error.strerror or error}")
