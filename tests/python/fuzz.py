@@ -109,8 +109,9 @@ def child(folder: Path, case: fuzz_cases.Case) -> NoReturn:
         code = end.code if isinstance(end.code, int) else 0
     except BaseException:  # noqa: BLE001 (a traceback is what is looked for)
         traceback.print_exc()
-    with contextlib.suppress(OSError):
-        sys.stdout.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):
+            stream.flush()
     os._exit(code)
 
 

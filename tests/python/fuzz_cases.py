@@ -368,7 +368,7 @@ def _spoil(rng: random.Random, content: netCDF4.Dataset) -> None:
     if variable.dtype is str:
         if variable.ndim:
             variable[:] = np.full(variable.shape, rng.choice(["", "x", "y" * 400]), object)
-    elif rng.random() < 0.2:
+    elif rng.random() < 0.2 and "other" not in content.variables:
         content.renameVariable(key, "other")
     elif variable.dtype.kind == "f":
         variable[...] = rng.choice([math.nan, math.inf, 1e308, -1.0, 0.0, 1e-320])

@@ -15,9 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyarrow import parquet
 
+import fuzz_cases
 import pendmap
 from pendmap import InputError, viewer
 from pendmap.errors import one_line
+from pendmap.records.description import read_description
 from pendmap.records.text import MOST_COLUMNS
 
 if TYPE_CHECKING:
@@ -148,3 +150,21 @@ def test_messages_are_short_and_shown_as_they_are(text: str) -> None:
         assert not [c for c in message if unicodedata.category(c)[0] == "C"]
     if len(text) <= 500 and text.isprintable() and "  " not in text:
         assert one_line(text) == text.strip()
+
+
+def test_a_description_is_read_or_refused_whatever_its_values(tmp_path: Path) -> None:
+    file = tmp_path / "experiment.toml"
+    keys = {line.partition(" =")[0]: line for line in fuzz_cases.EXPERIMENT.decode().split("\n")}
+    keys |= {"kind": 'kind = "free"', "decimal": 'decimal = "."', "hold_out": "hold_out = true"}
+    for key in (key for key in keys if key and not key.startswith("[")):
+        table = {"gravity": "rig", "encoder_counts": "rig", "time": "columns", "angle": "columns"}
+        where = table.get(key, "reader" if key in {"delimiter", "decimal", "skip_rows"} else "run")
+        for value in fuzz_cases.VALUES:
+            lines = [f"{key} = {value}"] if where == "run" else []
+            text = ["[[run]]", *([] if key == "file" else ['file = "run.csv"']), *lines]
+            text += [] if where == "run" else [f"[{where}]", f"{key} = {value}"]
+            file.write_text("\n".join(text), encoding="utf-8")
+            try:
+                read_description(file)
+            except InputError as error:
+                assert len(str(error)) <= 500, (key, value)

@@ -28,7 +28,7 @@ __all__ = ["command", "run"]
 FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
-_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 """What a disk says that was asked for nothing wrong."""
 
 _COMMANDS = {
@@ -118,6 +118,12 @@ def run() -> None:
             code = _exit_code(stops)
     except KeyboardInterrupt:
         code = INTERRUPTED
+    if stops and code == INTERRUPTED:
+        # A library that was stopped in its middle, while it was imported for one, may not survive
+        # that Python takes it down.
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
+        os._exit(code)
     sys.exit(code)
 
 

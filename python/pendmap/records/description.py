@@ -44,6 +44,8 @@ _MEASURED: Final = (
 _PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
 _MOST_SKIPPED: Final = 1_000_000
 _MOST_COUNTS: Final = 10**9
+_LARGEST: Final = 1e12
+"""Largest number of a description: thirty thousand years in s, and powers of it are numbers."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,10 +169,17 @@ def _rig(table: dict[str, Any]) -> dict[str, Any]:
     return known
 
 
-def _positive(name: str, value: object) -> float:
+def _number(name: str, value: object) -> float:
     number = checks.number(name, value)
-    if number <= 0:
-        raise InputError(f"{name} is {number:g}: allowed is more than 0")
+    if abs(number) > _LARGEST:
+        raise InputError(f"{name} is {number:g}: allowed is up to {_LARGEST:g}")
+    return number
+
+
+def _positive(name: str, value: object) -> float:
+    number = _number(name, value)
+    if number < 1 / _LARGEST:
+        raise InputError(f"{name} is {number:g}: allowed is more than 0, {1 / _LARGEST:g} at least")
     return number
 
 
@@ -198,16 +207,16 @@ def _column(channel: str, value: object) -> Column:
     unit = _text(f"{where}: unit", value["unit"]) if "unit" in value else None
     scale = None
     if "scale" in value:
-        scale = checks.number(f"{where}: scale", value["scale"])
+        scale = _number(f"{where}: scale", value["scale"])
         if scale == 0:
             raise InputError(f"{where}: scale is 0: allowed is any other number")
-    zero = checks.number(f"{where}: zero", value.get("zero", 0.0))
+    zero = _number(f"{where}: zero", value.get("zero", 0.0))
     place = place_of(value, where) if channel == "acceleration" else Place()
     edge = value.get("edge")
     if edge is not None and edge not in _EDGES:
         allowed = " or ".join(f'"{each}"' for each in _EDGES)
         raise InputError(f"{where}: edge is {checks.shown(edge)}: allowed is {allowed}")
-    phase = checks.number(f"{where}: phase", value["phase"]) if "phase" in value else None
+    phase = _number(f"{where}: phase", value["phase"]) if "phase" in value else None
     column = Column(name, unit, scale, zero, place, edge, phase)
     if unit is not None and scale is None:
         CHANNELS[channel].factor(unit, where)  # refuses what is not known, before files are read
@@ -220,7 +229,7 @@ def _reader(table: dict[str, Any]) -> Reader:
     if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1):
         allowed = 'one character, like ";" or "\\t"'
         raise InputError(f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is {allowed}")
-    if decimal not in {None, ".", ","}:
+    if decimal not in (None, ".", ","):
         raise InputError(f'[reader]: decimal is {checks.shown(decimal)}: allowed is "." or ","')
     if delimiter is not None and delimiter in '"\r\n\0+-.0123456789eE':
         raise InputError(
@@ -239,7 +248,7 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
     drive = _drive(table["drive"], where) if "drive" in table else None
     pivot = _pivot(table["pivot"], where) if "pivot" in table else None
     kind = table.get("kind", "forced" if drive or pivot else "free")
-    if kind not in {"free", "forced"}:
+    if kind not in ("free", "forced"):  # whatever it is, a list too
         raise InputError(f'{where}: kind is {checks.shown(kind)}: allowed is "free" or "forced"')
     if kind == "free" and drive:
         raise InputError(f'{where}: kind is "free" and there is a drive: allowed is one of them')
@@ -247,14 +256,14 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
         raise InputError(f"{where}: drive and pivot: allowed is one of them")
     limits = {}
     for name in ("from_s", "to_s"):
-        limits[name] = checks.number(f"{where}: {name}", table[name]) if name in table else None
+        limits[name] = _number(f"{where}: {name}", table[name]) if name in table else None
     low, high = limits["from_s"], limits["to_s"]
     if low is not None and high is not None and low >= high:
         raise InputError(f"{where}: from_s is {low:g}: allowed is less than to_s, {high:g}")
     return RunPlan(
         file=_text(f"{where}: file", table["file"]),
         kind=kind,
-        lab_time_s=checks.number(f"{where}: lab_time_s", table.get("lab_time_s", 0.0)),
+        lab_time_s=_number(f"{where}: lab_time_s", table.get("lab_time_s", 0.0)),
         from_s=low,
         to_s=high,
         hold_out=checks.flag(f"{where}: hold_out", table.get("hold_out", False)),
@@ -276,7 +285,7 @@ def _drive(value: object, where: str) -> dict[str, float | None]:
         if name not in table:
             raise InputError(f"{where}: drive: {name} is missing: allowed is like {_DRIVE_LIKE}")
     numbers: dict[str, float | None] = {
-        name: checks.number(f"{where}: drive: {name}", value) for name, value in table.items()
+        name: _number(f"{where}: drive: {name}", value) for name, value in table.items()
     }
     _positive(f"{where}: drive: Omega", numbers["Omega"])
     return {"phi": None} | numbers
