@@ -113,9 +113,9 @@ def test_what_is_typed_counts_instead_of_the_file(
         (("--model", "bare.toml", "--stroke-mm", 2), "bare.toml: has no dimensions: stroke_mm is"),
         (("--model", "bare.toml", "--p", 2), "bare.toml: p without omega"),
         (("--model", "absent.toml"), "absent.toml: No such file"),
-        (("--model", "."), ": Is a directory"),
+        (("--model", "."), ".: is a folder: allowed is a file"),
         (("--model", "model.nc", "--out", "model.nc"), "'--out': 'model.nc': is an input, which"),
-        (("--model", "a.zarr/model.toml", "--out", "a.zarr"), "'--out': 'a.zarr': is an input"),
+        (("--model", "a.zarr/model.toml", "--out", "a.zarr"), "a.zarr: is a folder of something"),
     ],
 )
 def test_the_command_refuses_on_one_line(

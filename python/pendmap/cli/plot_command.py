@@ -57,7 +57,9 @@ def command(  # noqa: PLR0913 (the options above)
     )
     try:
         written = write_all([(draw, target)])
-    except (InputError, MemoryError):
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    except MemoryError:
         raise
     except Exception as error:
         # Nobody but the file says what is drawn: numbers that no result has end anywhere.
