@@ -117,6 +117,8 @@ def run() -> None:
         with _stoppable(stops):
             code = _exit_code(stops)
     except KeyboardInterrupt:
+        if not stops:  # it came before the handlers were set
+            _say("interrupted, nothing was written")
         code = INTERRUPTED
     if stops and code == INTERRUPTED:
         # A library that was stopped in its middle, while it was imported for one, may not survive
