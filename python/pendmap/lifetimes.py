@@ -99,8 +99,8 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         within so many periods. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, what the mean
         would be from other beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
         never) and ``label`` over ``start``. Attributes ``mean_periods``, ``stderr``,
-        ``from_period``, ``persistent`` (1 where nothing captured any trajectory and the exponent is
-        positive), ``transient_chaos``, ``escape_rate`` and ``entropy`` per period, ``exponent`` on
+        ``from_period``, ``persistent`` (1 where every start ends on chaos; ``exponent`` is the largest
+        then), ``transient_chaos``, ``escape_rate`` and ``entropy`` per period, ``exponent`` on
         the saddle, ``saddle_dimension``; nan where one has no meaning.
 
     Raises
@@ -252,7 +252,7 @@ def _attributes(
 ) -> dict[str, Any]:
     period = pendulum.period
     growth, error, followed = saddle
-    persistent = found.attrs["plane"] == "only_chaos"
+    persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)
     chaotic, rate = False, math.nan
     if fitted is not None:
         # In a period the share 1/mean leaves.
@@ -262,8 +262,9 @@ def _attributes(
     exponent, exponent_error = growth / period, error / period
     dimension = math.nan
     if persistent:
-        exponent = units.bare(float(found["exponent"].values[0]), RATE)
-        exponent_error = units.bare(float(found["exponent_stderr"].values[0]), RATE)
+        largest = int(np.argmax(found["exponent"].values))
+        exponent = units.bare(float(found["exponent"].values[largest]), RATE)
+        exponent_error = units.bare(float(found["exponent_stderr"].values[largest]), RATE)
     elif chaotic and not pendulum.theta_r and not pendulum.effects:
         dimension = (growth - rate) * (1 / growth + 1 / (growth + pendulum.gamma * period))
     return {

@@ -21,10 +21,9 @@ def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     lines: list[str] = []
     exponent = f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
-        name = str(found["attractor"].values[0])
         lines.append(
-            f"Persistent: {name}, exponent {exponent}; nothing captured any of the trajectories "
-            f"watched within {a['chaos_bound']} periods."
+            f"Persistent: {shares(found)}; largest exponent {exponent}; nothing captured any of the "
+            f"trajectories watched within {a['chaos_bound']} periods."
         )
     elif found.attrs["plane"] == "conservative":
         lines.append("Without damping (gamma = 0) nothing is ever captured: no lifetime.")
@@ -48,17 +47,19 @@ def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
             f"{counted(a['max_periods'], 'period')}."
         )
     if a["captured"]:
-        shares = [
-            f"{name} {100 * float(share):.2f} %"
-            for name, share in zip(found["attractor"].values, found["fraction"].values, strict=True)
-        ]
-        lines.append(f"Ended on {', '.join(shares)}.")
+        lines.append(f"Ended on {shares(found)}.")
     lines.append(
         f"{counted(a['starts'], 'start')}, {counted(a['steps_per_period'], 'step')} a period, "
         f"error reached {a['reached_error']:.1e}, {a['seconds']:.2f} s on "
         f"{counted(a['threads'], 'thread')} ({a['simd']})."
     )
     return lines
+
+
+def shares(found: xr.Dataset) -> str:
+    """Return the attractors with the share of the starts that each takes."""
+    rows = zip(found["attractor"].values, found["fraction"].values, strict=True)
+    return ", ".join(f"{name} {100 * float(share):.2f} %" for name, share in rows)
 
 
 def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:

@@ -65,6 +65,14 @@ pub struct Outcome {
     pub work: u32,
 }
 
+impl Outcome {
+    /// The periods after which it ended; `None` if nothing ended it within the bound.
+    #[must_use]
+    pub fn end(&self) -> Option<u32> {
+        (self.fate != Fate::Open).then_some(self.periods)
+    }
+}
+
 /// Where starts come from: an index and a state, until there are none left.
 pub trait Source {
     /// Number of starts, about.

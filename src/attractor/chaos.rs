@@ -1,13 +1,14 @@
 //! Sets that keep their trajectories without closing: chaotic attractors and quasi-periodic
 //! rotation, told apart from transients that have not ended yet.
 //!
-//! Each long run is cut into windows. Windows that turn alike and whose regions meet form a group. Groups that
-//! trajectories leave for one another are one set; a set that a trajectory leaves for good, for
-//! another group or for a trap, is a transient.
+//! Each long run is cut into windows, and these form groups; see `groups.rs`. Groups that trajectories
+//! leave for one another only are one set.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::capture::{self, Outcome, Traps};
 use super::effort::Effort;
+use super::groups::Groups;
 use super::kind::Kind;
 use super::region::Region;
 use super::trap::Band;
@@ -20,6 +21,8 @@ use crate::integrate::stroboscopic::State;
 const KEPT: usize = 2000;
 /// Windows of a run.
 const WINDOWS: usize = 4;
+/// How often runs may go on, or further ones be added, before what is not settled is left out.
+const ROUNDS: usize = 16;
 /// Windows that draw the curve of a quasi-periodic set.
 const CURVES: usize = 128;
 /// An exponent this many standard errors above zero is positive ...
@@ -40,8 +43,6 @@ pub struct ChaoticSet {
     pub kind: Kind,
     /// Sense of its turns: 1, -1, or 0 for both or none.
     pub sense: i64,
-    /// How many of the trajectories belong to it.
-    pub members: usize,
     /// Sampled stroboscopic points.
     pub points: Vec<State>,
     /// Largest Lyapunov exponent per unit of tau.
@@ -68,36 +69,124 @@ impl ChaoticSet {
     }
 }
 
-/// Sorts trajectories that nothing has captured, watched from `states` on for `periods` more, into the sets
-/// that none of them leaves.
+/// Sorts trajectories into the sets that none of them leaves: they are watched from `states` on for
+/// `periods` more.
 ///
-/// `captured` says after how many of these periods a trap took each, if one did. No set is returned if
-/// `cancel` was set.
+/// `captured` says after how many of these periods one of the `traps` took each, if one did. No set is returned
+/// if `cancel` was set.
 #[must_use]
 pub fn sets(
     strobe: &Strobe,
+    traps: &Traps,
     states: &[State],
     captured: &[Option<u32>],
-    periods: usize,
+    periods: u32,
     effort: &Effort,
     cancel: &AtomicBool,
 ) -> Vec<ChaoticSet> {
-    let length = periods / WINDOWS;
-    let cut = Cut { windows: WINDOWS, length, side: effort.cells };
-    let Some(mut walks) = walk(strobe, states, cut, cancel) else { return Vec::new() };
-    for (windows, captured) in walks.iter_mut().zip(captured) {
-        windows.truncate(captured.map_or(WINDOWS, |at| at as usize / length.max(1)));
-        if closes(windows, effort.longest_cycle) {
-            windows.clear();
+    let length = (periods / WINDOWS as u32).max(1);
+    let mut runs =
+        Runs { strobe, traps, length, effort, cancel, walks: Vec::new(), captured: Vec::new() };
+    runs.sets(states, captured).unwrap_or_default()
+}
+
+/// Trajectories that are watched window by window.
+struct Runs<'a> {
+    strobe: &'a Strobe,
+    traps: &'a Traps,
+    /// Periods of a window.
+    length: u32,
+    effort: &'a Effort,
+    cancel: &'a AtomicBool,
+    /// The windows of each before a trap took it.
+    walks: Vec<Vec<Window>>,
+    /// Whether a trap took it.
+    captured: Vec<bool>,
+}
+
+impl Runs<'_> {
+    /// The sets of the runs from `states` and of as many further ones as it takes to tell.
+    ///
+    /// A run whose last group no window follows goes on for a window. A set of fewer than
+    /// [`Effort::proved`] runs gets that many more from its own points. Sets that this does not settle within
+    /// [`ROUNDS`] are left out. `None` if the search was cancelled.
+    fn sets(&mut self, states: &[State], captured: &[Option<u32>]) -> Option<Vec<ChaoticSet>> {
+        self.add(states, captured)?;
+        let mut groups = Groups::new(&self.walks, &self.captured);
+        for _ in 0..ROUNDS {
+            let unknown = groups.without_next();
+            let few: Vec<State> = match unknown.as_slice() {
+                [] => self.points_of_small_classes(&groups),
+                _ => Vec::new(),
+            };
+            if unknown.is_empty() && few.is_empty() {
+                break;
+            }
+            self.go_on(&unknown)?;
+            let ends = self.captures(&few, self.length * WINDOWS as u32)?;
+            self.add(&few, &ends)?;
+            groups = Groups::new(&self.walks, &self.captured);
         }
+        let mut found = Vec::new();
+        for class in groups.classes() {
+            let windows = groups.windows(&self.walks, &class);
+            let set =
+                describe(self.strobe, &windows, self.length as usize, self.effort, self.cancel);
+            let proved = groups.members(&class) >= self.effort.proved;
+            found.extend(set.filter(|set| proved || set.band.is_some()));
+        }
+        (!self.cancel.load(Ordering::Relaxed)).then_some(found)
     }
-    let groups = Groups::new(&walks, captured);
-    let describe = |class: Vec<usize>| {
-        let windows: Vec<&Window> = groups.windows(&walks, &class);
-        let members = groups.members(&class);
-        describe(strobe, &windows, members, length, effort, cancel)
-    };
-    groups.classes().into_iter().filter_map(describe).collect()
+
+    /// Watches from `states`; a run that repeats itself, as from a start exactly on an orbit that does not
+    /// attract, shows no set.
+    fn add(&mut self, states: &[State], captured: &[Option<u32>]) -> Option<()> {
+        for (mut windows, captured) in self.walk(states, WINDOWS)?.into_iter().zip(captured) {
+            windows.truncate(captured.map_or(WINDOWS, |at| (at / self.length) as usize));
+            if closes(&windows, self.effort.longest_cycle) {
+                windows.clear();
+            }
+            self.walks.push(windows);
+            self.captured.push(captured.is_some());
+        }
+        Some(())
+    }
+
+    /// Watches these runs for another window.
+    fn go_on(&mut self, runs: &[usize]) -> Option<()> {
+        let last = |run: &usize| self.walks[*run].last()?.points.last().copied();
+        let ends: Vec<State> = runs.iter().filter_map(last).collect();
+        let captured = self.captures(&ends, self.length)?;
+        for ((run, windows), at) in runs.iter().zip(self.walk(&ends, 1)?).zip(captured) {
+            self.captured[*run] = at.is_some();
+            if at.is_none() {
+                self.walks[*run].extend(windows);
+            }
+        }
+        Some(())
+    }
+
+    fn walk(&self, states: &[State], windows: usize) -> Option<Vec<Vec<Window>>> {
+        let cut = Cut { windows, length: self.length as usize, side: self.effort.cells };
+        walk(self.strobe, states, cut, self.cancel)
+    }
+
+    fn captures(&self, states: &[State], periods: u32) -> Option<Vec<Option<u32>>> {
+        let outcomes = capture::outcomes(self.strobe, self.traps, periods, states, self.cancel)?;
+        Some(outcomes.iter().map(Outcome::end).collect())
+    }
+
+    fn points_of_small_classes(&self, groups: &Groups) -> Vec<State> {
+        let proved = self.effort.proved;
+        let small = groups.classes().into_iter().filter(|class| groups.members(class) < proved);
+        let points =
+            |class: Vec<usize>| spread(&points(&groups.windows(&self.walks, &class)), proved);
+        small.flat_map(points).collect()
+    }
+}
+
+fn points(windows: &[&Window]) -> Vec<State> {
+    windows.iter().flat_map(|window| window.points.iter().copied()).collect()
 }
 
 /// Whether it repeats itself: a start exactly on an orbit that does not attract, such as upright or
@@ -110,107 +199,10 @@ fn closes(windows: &[Window], longest: usize) -> bool {
     })
 }
 
-/// Windows that turn alike in regions that meet, and where trajectories go from them.
-struct Groups {
-    /// The group of every window of every walk.
-    of: Vec<Vec<usize>>,
-    /// The groups that the next windows belong to; `None` is a trap.
-    next: Vec<Vec<Option<usize>>>,
-}
-
-impl Groups {
-    fn new(walks: &[Vec<Window>], captured: &[Option<u32>]) -> Self {
-        // Groups that a window joins become one: `parent` leads to it.
-        let mut found: Vec<(Senses, Region)> = Vec::new();
-        let mut parent: Vec<usize> = Vec::new();
-        let mut of: Vec<Vec<usize>> = Vec::with_capacity(walks.len());
-        for windows in walks {
-            let mut own = Vec::with_capacity(windows.len());
-            for window in windows {
-                let (senses, mut region) = (window.senses, window.region.clone());
-                let place = found.len();
-                for k in 0..place {
-                    if parent[k] == k && found[k].0 == senses && found[k].1.meets(&window.region) {
-                        region.unite(&found[k].1);
-                        parent[k] = place;
-                    }
-                }
-                found.push((senses, region));
-                parent.push(place);
-                own.push(place);
-            }
-            of.push(own);
-        }
-        let root = |mut k: usize| {
-            while parent[k] != k {
-                k = parent[k];
-            }
-            k
-        };
-        for group in of.iter_mut().flatten() {
-            *group = root(*group);
-        }
-        let mut next = vec![Vec::new(); found.len()];
-        for (own, captured) in of.iter().zip(captured) {
-            for pair in own.windows(2) {
-                next[pair[0]].push(Some(pair[1]));
-            }
-            if let (Some(last), Some(_)) = (own.last(), captured) {
-                next[*last].push(None);
-            }
-        }
-        Self { of, next }
-    }
-
-    /// The groups that trajectories leave for one another only, and stay in.
-    fn classes(&self) -> Vec<Vec<usize>> {
-        let mut classes: Vec<Vec<usize>> = Vec::new();
-        let mut used: Vec<usize> = self.of.iter().flatten().copied().collect();
-        used.sort_unstable();
-        used.dedup();
-        for group in used {
-            let Some(reached) = self.reached(group) else { continue };
-            let back = |k: &usize| self.reached(*k).is_some_and(|others| others.contains(&group));
-            if !reached.is_empty() && reached.iter().all(back) && !classes.contains(&reached) {
-                classes.push(reached);
-            }
-        }
-        classes
-    }
-
-    /// The groups that trajectories come to from this one, sorted; `None` if a trap is among them.
-    fn reached(&self, group: usize) -> Option<Vec<usize>> {
-        let mut reached: Vec<usize> = Vec::new();
-        let mut from = vec![group];
-        while let Some(group) = from.pop() {
-            for next in &self.next[group] {
-                let next = (*next)?;
-                if !reached.contains(&next) {
-                    reached.push(next);
-                    from.push(next);
-                }
-            }
-        }
-        reached.sort_unstable();
-        Some(reached)
-    }
-
-    fn windows<'a>(&self, walks: &'a [Vec<Window>], class: &[usize]) -> Vec<&'a Window> {
-        let all = walks.iter().flatten().zip(self.of.iter().flatten());
-        all.filter(|(_, group)| class.contains(group)).map(|(window, _)| window).collect()
-    }
-
-    fn members(&self, class: &[usize]) -> usize {
-        let ends = |own: &&Vec<usize>| own.last().is_some_and(|group| class.contains(group));
-        self.of.iter().filter(ends).count()
-    }
-}
-
 /// What a set of windows is; `None` where it is neither chaos nor quasi-periodic.
 fn describe(
     strobe: &Strobe,
     windows: &[&Window],
-    members: usize,
     length: usize,
     effort: &Effort,
     cancel: &AtomicBool,
@@ -223,8 +215,7 @@ fn describe(
     for window in windows {
         region.unite(&window.region);
     }
-    let every: Vec<State> = windows.iter().flat_map(|w| w.points.iter().copied()).collect();
-    let points = spread(&every, KEPT);
+    let every = points(windows);
     let exponents = exponents(strobe, &spread(&every, effort.watched), length, cancel)?;
     let (mean, stderr) = mean_and_error(&exponents);
     let period = strobe.pendulum.period();
@@ -232,8 +223,7 @@ fn describe(
     let found = |kind: Kind, sense: i64, mean: f64, band: Option<Band>| ChaoticSet {
         kind,
         sense,
-        members,
-        points,
+        points: spread(&every, KEPT),
         exponent: mean / period,
         exponent_stderr: stderr / period,
         region,

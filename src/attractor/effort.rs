@@ -17,8 +17,7 @@ pub struct Effort {
     pub watched: usize,
     /// Trajectories that nothing has captured are watched for this many times the first bound more.
     pub watch: u32,
-    /// A set of fewer trajectories than this is proved once more: from so many of its points, for as
-    /// long again, nothing may be captured.
+    /// Runs that a chaotic set needs: where fewer have come to it, so many more from its own points must stay.
     pub proved: usize,
     /// Cells around the circle of the region of a set: few enough for its points to fill what it visits.
     pub cells: usize,
@@ -52,7 +51,7 @@ impl Effort {
         tries: 24,
         watched: 256,
         watch: 4,
-        proved: 0,
+        proved: 16,
         cells: 96,
         trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
     };

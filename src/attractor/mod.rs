@@ -13,6 +13,7 @@ pub mod catalogue;
 pub mod chaos;
 pub mod effort;
 pub mod find;
+mod groups;
 pub mod kind;
 mod place;
 pub mod region;

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::capture::{self, Fate};
+use super::capture::{self, Fate, Outcome};
 use super::chaos::{self, ChaoticSet, spread};
 use super::find::{Catalogue, Ending};
 use super::kind::Kind;
@@ -48,10 +48,9 @@ impl Catalogue {
         if outcomes.iter().all(|o| o.fate != Fate::Open) {
             return;
         }
-        let captured: Vec<Option<u32>> =
-            outcomes.iter().map(|o| (o.fate != Fate::Open).then_some(o.periods)).collect();
+        let captured: Vec<Option<u32>> = outcomes.iter().map(Outcome::end).collect();
         let new: Vec<ChaoticSet> =
-            chaos::sets(strobe, &sample, &captured, length as usize, &self.effort, cancel)
+            chaos::sets(strobe, &self.traps, &sample, &captured, length, &self.effort, cancel)
                 .into_iter()
                 .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
                 .collect();
@@ -79,34 +78,27 @@ impl Catalogue {
         self.rebuild(&strobe.pendulum);
     }
 
-    /// Whether a set of few trajectories is more than a transient that happens to last.
+    /// Whether friction that holds rest for ever ends what was taken for chaos.
     ///
-    /// Where friction holds rest for ever, chaos that stops once is over, and such transients are long:
-    /// they are watched for [`LONG`] periods, or until one ends.
+    /// Chaos that stops once is over there, and such transients are long: the set is watched for [`LONG`]
+    /// periods from some of its points, or until one run ends.
     fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
-        let proved = self.effort.proved;
-        if proved == 0 || set.band.is_some() {
+        if self.rests.is_empty() || set.band.is_some() {
             return true;
         }
-        let holds = !self.rests.is_empty();
-        if set.members >= proved && !holds {
-            return true;
-        }
-        let mut points = spread(&set.points, proved);
-        let (mut over, mut part) = (0, length);
-        loop {
+        let mut points = spread(&set.points, self.effort.proved);
+        let (mut over, mut part) = (0, length.min(LONG));
+        while over < LONG {
             let found = capture::outcomes(strobe, &self.traps, part, &points, cancel);
             let Some(outcomes) = found.filter(|all| all.iter().all(|o| o.fate == Fate::Open))
             else {
                 return false;
             };
-            over += part;
-            if !holds || over >= LONG {
-                return true;
-            }
             points = outcomes.iter().map(|o| o.state).collect();
+            over += part;
             part = over.min(LONG - over);
         }
+        true
     }
 }
 

@@ -263,20 +263,24 @@ fn to_capture(
         let stride = labels.open.len().div_ceil(FURTHER_SAMPLE);
         let states: Vec<State> = labels.open.iter().step_by(stride).map(|(_, s)| *s).collect();
         let keys: Vec<[u64; 2]> = catalogue.attractors.iter().map(Attractor::mark).collect();
-        if !catalogue.search(strobe, &states, searched, control.flag()) {
+        if catalogue.search(strobe, &states, searched, control.flag()) {
+            // Attractors may have moved in the sorted list: the labels move with them.
+            let moved: Vec<i16> = keys
+                .iter()
+                .map(|old| catalogue.attractors.iter().position(|a| a.mark() == *old))
+                .map(|at| at.map_or(UNDECIDED, |i| i as i16 + 1))
+                .collect();
+            for label in labels.label.iter_mut().filter(|l| **l > 0) {
+                *label = moved[*label as usize - 1];
+            }
+            now = bound(catalogue).max(now);
+        } else if now < max_periods {
+            // What is left is given all the time that there is.
+            now = max_periods;
+        } else {
             break;
         }
         control.check()?;
-        // Attractors may have moved in the sorted list: the labels move with them.
-        let moved: Vec<i16> = keys
-            .iter()
-            .map(|old| catalogue.attractors.iter().position(|a| a.mark() == *old))
-            .map(|at| at.map_or(UNDECIDED, |i| i as i16 + 1))
-            .collect();
-        for label in labels.label.iter_mut().filter(|l| **l > 0) {
-            *label = moved[*label as usize - 1];
-        }
-        now = bound(catalogue).max(now);
         let mut picks = Vec::new();
         memory::room("starts", &mut picks, labels.open.len())?;
         picks.extend(labels.open.iter().map(|(i, _)| *i));

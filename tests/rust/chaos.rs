@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-use pendmap::attractor::capture::{Fate, outcomes};
+use pendmap::attractor::capture::{Fate, Traps, outcomes};
 use pendmap::attractor::chaos::sets;
 use pendmap::attractor::{Effort, Kind};
 use pendmap::integrate::trajectory::{Request, simulate};
@@ -42,8 +42,8 @@ fn what_leaves_its_region_is_no_set() {
     let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
     for path in paths() {
         let strobe = Strobe::new(&runaway(), 60, path);
-        let found =
-            sets(&strobe, &states, &[None; 6], 200, &Effort::THOROUGH, &AtomicBool::new(false));
+        let (effort, cancel) = (Effort::THOROUGH, AtomicBool::new(false));
+        let found = sets(&strobe, &Traps::default(), &states, &[None; 6], 200, &effort, &cancel);
         assert!(found.is_empty(), "{path}");
     }
 }

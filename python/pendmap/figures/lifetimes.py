@@ -112,7 +112,7 @@ def _survival(axes: Axes, dataset: xr.Dataset) -> None:
         axes.plot(tail.periods, tail.share, color=_FIT, lw=1.4, zorder=5)
         axes.axvline(tail.periods[0], color=style.QUIET, lw=0.7, ls=(0, (2, 2)))
     axes.set_yscale("log")
-    drawn_low = min(float(one.share[one.share > 0].min()) for one in drawn.curves(dataset))
+    drawn_low = min(np.min(one.share[one.share > 0], initial=1.0) for one in drawn.curves(dataset))
     axes.set_ylim(max(0.5 / float(dataset.attrs["starts"]), 0.5 * drawn_low), 1.5)
     periods = drawn.curves(dataset)[0].periods
     axes.set_xlim(periods[0], max(periods[-1], periods[0] + 1.0))
