@@ -99,9 +99,9 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         within so many periods. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, what the mean
         would be from other beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
         never) and ``label`` over ``start``. Attributes ``mean_periods``, ``stderr``,
-        ``from_period``, ``persistent`` (1 where every start ends on chaos; ``exponent`` is the largest
-        then), ``transient_chaos``, ``escape_rate`` and ``entropy`` per period, ``exponent`` on
-        the saddle, ``saddle_dimension``; nan where one has no meaning.
+        ``from_period``, ``persistent`` (1 where every start ends on chaos; ``exponent`` is that of
+        the most chaotic attractor then), ``transient_chaos``, ``escape_rate`` and ``entropy`` per
+        period, ``exponent`` on the saddle, ``saddle_dimension``; nan where one has no meaning.
 
     Raises
     ------

@@ -22,8 +22,8 @@ def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     exponent = f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
         lines.append(
-            f"Persistent: {shares(found)}; largest exponent {exponent}; nothing captured any of the "
-            f"trajectories watched within {a['chaos_bound']} periods."
+            f"Persistent: {shares(found)}; largest exponent {exponent}; nothing captured any of "
+            f"the trajectories watched within {a['chaos_bound']} periods."
         )
     elif found.attrs["plane"] == "conservative":
         lines.append("Without damping (gamma = 0) nothing is ever captured: no lifetime.")
