@@ -100,6 +100,11 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     """
     model = pendulum
     pendulum, _ = without_dimensions(model)
+    if pendulum.counts_turns:
+        raise InputError(
+            "effects: an effect counts turns, so that no orbit leads from one upright position to "
+            "the next at the same energy, and Melnikov's criterion has none to follow"
+        )
     if omega is None:
         omega = np.linspace(*_RANGE)
     frequencies = grid.frequencies(omega)

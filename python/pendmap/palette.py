@@ -14,7 +14,8 @@ chaos                   tumbling purple; rotating wine and violet; libration pin
 no attractor            undecided light grey; failed black
 ======================  ==================================================================
 
-Beyond a family's last colour they begin again, darker, then lighter, and so on (:func:`lap`).
+Beyond a family's last colour they begin again, darker, then lighter, and so on (:func:`lap`). So
+do attractors around another turn of the line, ``"rest turn +1"``.
 Nothing here depends on which other attractors a map holds, and no drawing library is imported.
 """
 
@@ -134,17 +135,19 @@ _LAPS = (
 
 _KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
 _NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
+_TURN = re.compile(r"turn ([+-]\d+)")
 _MARK = re.compile(r"\(([+-])\)|[#\s]([b-z]|\d+)$")
 
 
 @dataclass(frozen=True)
 class _Read:
-    """What a name tells: kind, period n, direction +1, -1 or 0, a mark such as ``+`` or ``b``."""
+    """What a name tells: kind, period n, direction, a mark such as ``+`` or ``b``, and the turn."""
 
     kind: str
     n: int
     direction: int
     mark: str
+    turn: int = 0
 
 
 def colour(name: str, kind: str | None = None) -> str:
@@ -240,7 +243,8 @@ def _place(read: _Read) -> tuple[_Shade, int]:
     else:
         return (UNNAMED, "grey"), 0
     around, at = divmod(step + _further(read.mark), len(family))
-    return family[at], around
+    # Turns +1, -1, +2, ... take the laps one after the other.
+    return family[at], around + 2 * abs(read.turn) - (read.turn > 0)
 
 
 def _read(name: str, kind: str | None) -> _Read:
@@ -249,11 +253,14 @@ def _read(name: str, kind: str | None) -> _Read:
     found = found or (kind or "").lower().replace(" ", "_")
     numbers = _NUMBERS.search(words)
     n, w = (int(numbers[1]), int(numbers[2])) if numbers else (1, 0)
-    mark = _MARK.search(words[numbers.end() :] if numbers else words)
+    mark = _MARK.search(_TURN.sub("", words[numbers.end() :] if numbers else words))
     turn = (w > 0) - (w < 0)
     if not turn and found in _DIRECTED:
-        turn = -1 if "-" in words else 1 if "+" in words else 0
-    return _Read(found, n, turn, (mark[1] or mark[2]) if mark else "")
+        sign = _TURN.sub("", words)
+        turn = -1 if "-" in sign else 1 if "+" in sign else 0
+    away = _TURN.search(words)
+    counted = int(away[1]) if away else 0
+    return _Read(found, n, turn, (mark[1] or mark[2]) if mark else "", counted)
 
 
 def _further(mark: str) -> int:

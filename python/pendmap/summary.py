@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap.model.pendulum import effects_of, is_driven
 from pendmap.model.units import TIME, Units
 from pendmap.words import counted, with_error, written
 
@@ -222,7 +223,9 @@ def _settling(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     if a["longest_settle"] < 0:
         return []
-    own = "" if a["p"] != 0 else f" (without drive a period is {_own_period(a)})"
+    own = (
+        "" if is_driven(a["p"], effects_of(a)) else f" (without drive a period is {_own_period(a)})"
+    )
     times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
     return [f"Settling takes {times}{own}."]
 

@@ -1,14 +1,15 @@
 //! Trajectories run until an attractor has captured them: a lane that has finished takes the next
 //! start at a period's end.
 
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::trap::{Band, Ellipse};
 use crate::integrate::block::Block;
 use crate::integrate::{State, Strobe};
-use crate::lanes::sine::wrap;
 use crate::lanes::{Isa, Job, Lane, dispatch};
+use crate::model::Angle;
 
 /// All regions that capture.
 #[derive(Clone, Debug, Default)]
@@ -21,16 +22,20 @@ pub struct Traps {
     pub rests: Rests,
 }
 
-/// The sets of states that friction holds for ever: indices of their attractors, hanging and upside
-/// down.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Rests(pub [Option<usize>; 2]);
+/// The sets of states that friction holds for ever: one around each half turn at the most.
+#[derive(Clone, Debug, Default)]
+pub struct Rests {
+    /// Where the angle lives.
+    pub angle: Angle,
+    /// The index of each set's attractor, by [`Angle::half_turn`].
+    pub sets: BTreeMap<i64, usize>,
+}
 
 impl Rests {
     /// The set that holds the angle `theta`.
     #[must_use]
     pub fn of(&self, theta: f64) -> Option<usize> {
-        self.0[usize::from(theta.cos() < 0.0)]
+        self.sets.get(&self.angle.half_turn(theta)).copied()
     }
 }
 
@@ -196,6 +201,7 @@ impl<'a> Watch<'a> {
         while occupied > 0 {
             self.job.strobe.period(&mut self.block);
             let heights = Heights {
+                angle: self.job.strobe.angle,
                 block: &mut self.block,
                 ellipses: &self.scaled,
                 height: &mut self.height,
@@ -353,6 +359,7 @@ impl<'a> Watch<'a> {
 
 /// Takes off whole turns; the lowest height above the traps' centres.
 struct Heights<'a> {
+    angle: Angle,
     block: &'a mut Block,
     ellipses: &'a [Ellipse],
     height: &'a mut [f64],
@@ -376,7 +383,7 @@ impl Heights<'_> {
         let mut lowest = f64::INFINITY;
         let mut at = 0;
         while at < self.height.len() {
-            let (half_turns, whole) = wrap(L::load(token, &self.block.half_turns[at..]));
+            let (half_turns, whole) = self.angle.wrap(L::load(token, &self.block.half_turns[at..]));
             let kick = L::load(token, &self.block.kick[at..]);
             let mut height = L::splat(token, f64::INFINITY);
             for e in self.ellipses {

@@ -1,6 +1,6 @@
 //! The attractors of a map, numbered by a key of their own and named by what they are.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::Complex;
 
@@ -9,11 +9,13 @@ use super::kind::Kind;
 use super::region::Region;
 use super::walk::Senses;
 use crate::integrate::State;
-use crate::integrate::accuracy::distance;
-use crate::model::Pendulum;
+use crate::model::{Angle, Pendulum};
 use crate::orbit::PeriodicOrbit;
 use crate::orbit::rotation::Rotation;
 use crate::orbit::symmetry::Mirror;
+
+/// Angles this near to 0 or pi are that.
+const EXACT: f64 = 1e-9;
 
 /// An attractor.
 #[derive(Clone, Debug)]
@@ -40,6 +42,8 @@ pub struct Attractor {
     pub region: Option<Region>,
     /// A name that stays.
     pub name: String,
+    /// Where its angle lives.
+    pub angle: Angle,
     /// Its mirror image in the catalogue: itself where it is symmetric.
     pub twin: Option<usize>,
 }
@@ -50,11 +54,8 @@ impl Attractor {
     pub fn periodic(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Self {
         let period = orbit.n as f64 * pendulum.period();
         let kind = classify(pendulum, orbit);
-        // Newton's method leaves a rest at 1e-170: it is known exactly.
         let points = match kind {
-            Kind::Rest if pendulum.torque == 0.0 => vec![[0.0, 0.0]],
-            Kind::InvertedRest if pendulum.torque == 0.0 => vec![[PI, 0.0]],
-            Kind::Rest | Kind::InvertedRest => vec![[orbit.points[0][0], 0.0]],
+            Kind::Rest | Kind::InvertedRest => vec![[balanced(orbit.points[0][0]), 0.0]],
             _ => orbit.points.clone(),
         };
         Self {
@@ -69,13 +70,14 @@ impl Attractor {
             sense: orbit.w.signum(),
             region: None,
             name: String::new(),
+            angle: orbit.angle,
             twin: None,
         }
     }
 
     /// All that friction holds for ever around the state `theta`, hanging or upside down.
     #[must_use]
-    pub fn resting(theta: f64) -> Self {
+    pub fn resting(angle: Angle, theta: f64) -> Self {
         Self {
             kind: if theta.cos() < 0.0 { Kind::InvertedRest } else { Kind::Rest },
             n: Some(1),
@@ -88,6 +90,7 @@ impl Attractor {
             sense: 0,
             region: None,
             name: String::new(),
+            angle,
             twin: None,
         }
     }
@@ -133,6 +136,7 @@ impl Attractor {
             sense: rotation.sense,
             region: None,
             name: String::new(),
+            angle: Angle::Circle,
             twin: None,
         }
     }
@@ -152,6 +156,7 @@ impl Attractor {
             sense: set.sense,
             region: set.band.is_none().then(|| set.region.clone()),
             name: String::new(),
+            angle: set.region.angle(),
             twin: None,
         }
     }
@@ -162,6 +167,12 @@ impl Attractor {
         let (kind, sense) = senses.kind();
         let turns = self.kind == Kind::TumblingChaos || (self.kind, self.sense) == (kind, sense);
         turns && self.region.as_ref().is_some_and(|region| region.holds_most(points))
+    }
+
+    /// Whether one of its points lies within `tolerance` of a state.
+    #[must_use]
+    pub fn passes(&self, state: State, tolerance: f64) -> bool {
+        self.points.iter().any(|p| self.angle.distance(*p, state) < tolerance)
     }
 
     /// What stays when a catalogue is sorted anew: the bits of the first point.
@@ -179,7 +190,7 @@ impl Attractor {
         if self.n.is_none() {
             return other.region.as_ref().is_none_or(|region| region.holds_most(image));
         }
-        image.iter().all(|p| other.points.iter().any(|q| distance(*p, *q) < tolerance))
+        image.iter().all(|p| other.passes(*p, tolerance))
     }
 
     fn key(&self) -> (Kind, usize, i64, f64, f64) {
@@ -189,9 +200,18 @@ impl Attractor {
     }
 }
 
-/// Mean angle of states, each wrapped.
+/// Mean angle of states.
 fn mean_angle(states: &[State]) -> f64 {
     states.iter().map(|p| p[0]).sum::<f64>() / states.len().max(1) as f64
+}
+
+/// The angle of a rest: Newton's method leaves hanging and inverted rest at 1e-170, and they are known exactly.
+fn balanced(theta: f64) -> f64 {
+    match theta {
+        hanging if hanging.abs() < EXACT => 0.0,
+        inverted if (PI - inverted.abs()).abs() < EXACT => PI,
+        _ => theta,
+    }
 }
 
 /// The kind of a closed orbit.
@@ -199,9 +219,9 @@ fn classify(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Kind {
     let [theta, velocity] = orbit.points[0];
     let still = orbit.n == 1 && orbit.w == 0 && velocity.abs() < 1e-9;
     // At a rest the torque balances gravity at every time: with drive only without torque.
-    let balanced = pendulum.is_autonomous() || theta.abs() < 1e-9 || PI - theta.abs() < 1e-9;
-    match (orbit.w, still && balanced) {
-        (0, true) if theta.abs() < FRAC_PI_2 => Kind::Rest,
+    let known = [0.0, PI].contains(&balanced(theta));
+    match (orbit.w, still && (pendulum.is_autonomous() || known)) {
+        (0, true) if theta.cos() > 0.0 => Kind::Rest,
         (0, true) => Kind::InvertedRest,
         (0, false) => Kind::Oscillation,
         _ => Kind::Rotation,
@@ -211,7 +231,8 @@ fn classify(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Kind {
 /// Sorts by key, pairs twins and names all.
 ///
 /// Names are "rest", "rotation 1:+1", "oscillation 2:0"; of asymmetric twin oscillations the one
-/// that leans to positive angles is "(+)"; if some share a name all the same, the angle of their
+/// that leans to positive angles is "(+)"; on the line "turn +1" says around which multiple of a turn one
+/// moves; if some share a name all the same, the angle of their
 /// first point is added, to as many digits as tell them apart. No two names are the same.
 ///
 /// Also returns the place that each of the given attractors has in the result.
@@ -243,6 +264,10 @@ pub fn arrange(pendulum: &Pendulum, attractors: Vec<Attractor>) -> (Vec<Attracto
     let plain = |i: usize| {
         // Twins lean to opposite sides, also where the image takes half a period.
         let own = mean_angle(&sorted[i].points);
+        let turn = (own / TAU).round();
+        if sorted[i].angle == Angle::Line && turn != 0.0 {
+            return format!("{} turn {turn:+}", name(&sorted[i], false, 0.0));
+        }
         let lean = if images[i].is_empty() { own } else { own - mean_angle(&images[i]) };
         name(&sorted[i], twins[i] != Some(i), lean)
     };

@@ -14,8 +14,8 @@ use super::region::Region;
 use super::trap::Band;
 use super::walk::{Cut, Senses, Window, walk};
 use crate::integrate::Strobe;
-use crate::integrate::accuracy::distance;
 use crate::integrate::stroboscopic::State;
+use crate::model::Angle;
 
 /// Stroboscopic points that are kept as a picture of the set.
 const KEPT: usize = 2000;
@@ -143,7 +143,7 @@ impl Runs<'_> {
     fn add(&mut self, states: &[State], captured: &[Option<u32>]) -> Option<()> {
         for (mut windows, captured) in self.walk(states, WINDOWS)?.into_iter().zip(captured) {
             windows.truncate(captured.map_or(WINDOWS, |at| (at / self.length) as usize));
-            if closes(&windows, self.effort.longest_cycle) {
+            if closes(self.strobe.angle, &windows, self.effort.longest_cycle) {
                 windows.clear();
             }
             self.walks.push(windows);
@@ -191,11 +191,11 @@ fn points(windows: &[&Window]) -> Vec<State> {
 
 /// Whether it repeats itself: a start exactly on an orbit that does not attract, such as upright or
 /// hanging rest, stays there for want of a perturbation.
-fn closes(windows: &[Window], longest: usize) -> bool {
+fn closes(angle: Angle, windows: &[Window], longest: usize) -> bool {
     let Some(points) = windows.last().map(|window| &window.points) else { return false };
     (1..=longest).any(|n| {
         points.len() > 2 * n
-            && points.iter().zip(&points[n..]).all(|(a, b)| distance(*a, *b) < SAME)
+            && points.iter().zip(&points[n..]).all(|(a, b)| angle.distance(*a, *b) < SAME)
     })
 }
 

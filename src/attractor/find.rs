@@ -9,7 +9,6 @@ use super::effort::Effort;
 use super::rest;
 use super::returns::{escape_speed, near_returns};
 use super::trap::{self, Band, Ellipse, ellipses};
-use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, Strobe};
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
@@ -204,7 +203,7 @@ impl Catalogue {
         let known = self.orbits.len();
         let (mut found, mut tries) = (Vec::new(), 0);
         for (_, start, n) in returns {
-            let held = |e: &Ellipse| e.height([wrapped(start[0]), start[1]]) < 1.0;
+            let held = |e: &Ellipse| e.height([strobe.angle.wrapped(start[0]), start[1]]) < 1.0;
             if tries == self.effort.tries || cancel.load(Ordering::Relaxed) {
                 break;
             }
@@ -261,10 +260,11 @@ impl Catalogue {
         let mut all: Vec<Attractor> =
             self.orbits.iter().map(|(o, _)| Attractor::periodic(pendulum, o)).collect();
         all.extend(self.rotations.iter().map(|(r, _)| Attractor::running(r)));
-        all.extend(self.rests.iter().map(|theta| Attractor::resting(*theta)));
+        all.extend(self.rests.iter().map(|theta| Attractor::resting(pendulum.angle(), *theta)));
         all.extend(self.sets.iter().map(Attractor::sampled));
         let (attractors, place) = arrange(pendulum, all);
         let mut traps = Traps::default();
+        traps.rests.angle = pendulum.angle();
         let mut place = place.into_iter();
         for ((_, ellipses), at) in self.orbits.iter().zip(place.by_ref()) {
             traps.ellipses.extend(ellipses.iter().map(|e| Ellipse { attractor: at, ..*e }));
@@ -273,7 +273,7 @@ impl Catalogue {
             traps.bands.extend(band.iter().map(|b| Band { attractor: at, ..b.clone() }));
         }
         for (theta, at) in self.rests.iter().zip(place.by_ref()) {
-            traps.rests.0[usize::from(theta.cos() < 0.0)] = Some(at);
+            traps.rests.sets.insert(traps.rests.angle.half_turn(*theta), at);
         }
         for (set, at) in self.sets.iter().zip(place) {
             traps.bands.extend(set.band.iter().map(|b| Band { attractor: at, ..b.clone() }));

@@ -35,7 +35,7 @@ impl Catalogue {
         let map = self.map(strobe);
         let longest = self.effort.longest_cycle;
         let place = |track: &Vec<State>| {
-            let nearest = nearest_return(track, longest);
+            let nearest = nearest_return(strobe.angle, track, longest);
             let orbit = nearest.and_then(|(_, start, n)| newton::find(&map, start, n, REACH));
             orbit.and_then(|orbit| {
                 let own = |a: &Attractor| {

@@ -4,19 +4,20 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use crate::integrate::State;
-use crate::model::Pendulum;
+use crate::model::{Angle, Pendulum};
 
 /// Two regions that share more than this part of the smaller one's cells meet.
 const SHARED: f64 = 0.2;
 
-/// Cells of equal size that stroboscopic points lie in, angles taken modulo a turn.
+/// Cells of equal size that stroboscopic points lie in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     cells: BTreeSet<[i32; 2]>,
     /// Cells per radian and per unit of velocity.
     scale: [f64; 2],
-    /// Cells around the circle.
+    /// Cells of a turn.
     side: i32,
+    angle: Angle,
 }
 
 impl Region {
@@ -27,13 +28,28 @@ impl Region {
         let pull = pendulum.greatest_pull().sqrt();
         let speed = if pull.is_finite() { pull.max(1.0) } else { 1.0 };
         let scale = side as f64 / TAU;
-        Self { cells: BTreeSet::new(), scale: [scale, scale / speed], side: side as i32 }
+        Self {
+            cells: BTreeSet::new(),
+            scale: [scale, scale / speed],
+            side: side as i32,
+            angle: pendulum.angle(),
+        }
     }
 
     fn cell(&self, [theta, velocity]: State) -> [i32; 2] {
-        let column = ((theta * self.scale[0] + 0.5).floor() as i32).rem_euclid(self.side);
+        let column = self.column((theta * self.scale[0] + 0.5).floor() as i32);
         // The conversion saturates where a motion has left all bounds.
         [column, (velocity * self.scale[1] + 0.5).floor() as i32]
+    }
+
+    fn column(&self, column: i32) -> i32 {
+        if self.angle == Angle::Circle { column.rem_euclid(self.side) } else { column }
+    }
+
+    /// Where its angles live.
+    #[must_use]
+    pub fn angle(&self) -> Angle {
+        self.angle
     }
 
     /// Adds the cell of a state.
@@ -70,7 +86,7 @@ impl Region {
     /// The image under `(th, v) -> (-th, -v)`; cells are centred on 0, so that it is exact.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        let image = |[a, b]: &[i32; 2]| [(-a).rem_euclid(self.side), b.saturating_neg()];
+        let image = |[a, b]: &[i32; 2]| [self.column(a.saturating_neg()), b.saturating_neg()];
         Self { cells: self.cells.iter().map(image).collect(), ..*self }
     }
 }

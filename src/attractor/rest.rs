@@ -2,22 +2,43 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::model::{Equation, Pendulum};
+use crate::model::{Angle, Equation, Pendulum};
 
 /// Angles at which a set is looked for where it has no closed form.
 const ANGLES: usize = 720;
+/// On the line sets are looked for this many half turns away, at the most.
+const MOST_HALF_TURNS: i32 = 1000;
 /// An angle this near to 0 or pi is that.
 const NEAR: f64 = 1e-6;
 
 /// The angle in the middle of each set at rest, hanging and upside down: where the load at its
 /// greatest is least. Empty without friction.
+///
+/// On the line there may be one around each half turn, as far as those reach that a turn follows without any.
 #[must_use]
 pub fn centres(pendulum: &Pendulum) -> Vec<f64> {
     if !pendulum.has_friction() {
         return Vec::new();
     }
     let equation = pendulum.equation();
-    balances(pendulum).into_iter().filter(|theta| equation.holds_for_ever(*theta)).collect()
+    let held = |theta: &f64| equation.holds_for_ever(*theta);
+    if pendulum.angle() == Angle::Circle {
+        return balances(pendulum).into_iter().filter(held).collect();
+    }
+    let around = |half_turn: i32| Some(centre(&equation, f64::from(half_turn) * PI)).filter(held);
+    let mut all: Vec<f64> = around(0).into_iter().collect();
+    for sense in [1, -1] {
+        let mut empty = 0;
+        for away in 1..MOST_HALF_TURNS {
+            let found = around(sense * away);
+            empty = if found.is_some() { 0 } else { empty + 1 };
+            if empty == 2 {
+                break;
+            }
+            all.extend(found);
+        }
+    }
+    all
 }
 
 /// The angles, hanging and upside down, where the load at its greatest is least: where rest is, or

@@ -2,10 +2,9 @@
 
 use std::cmp::Ordering;
 
-use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
 use crate::model::effects::Action;
-use crate::model::{Effect, Pendulum};
+use crate::model::{Angle, Effect, Pendulum};
 
 /// Stroboscopic points that come back this near are taken to Newton's method.
 const NEAR: f64 = 0.03;
@@ -29,7 +28,7 @@ pub(super) fn near_returns(strobe: &Strobe, alive: &[State], longest: usize) -> 
             // Held at every period's end: no orbit, and every n would fit.
             continue;
         }
-        let mut own: Vec<Return> = returns_of(&track, longest).collect();
+        let mut own: Vec<Return> = returns_of(strobe.angle, &track, longest).collect();
         own.sort_by(nearer);
         returns.extend(own.into_iter().take(TRIED));
     }
@@ -42,12 +41,13 @@ fn nearer(a: &Return, b: &Return) -> Ordering {
 }
 
 /// The nearest return of one trajectory.
-pub(super) fn nearest_return(track: &[State], longest: usize) -> Option<Return> {
-    returns_of(track, longest).min_by(|a, b| a.0.total_cmp(&b.0))
+pub(super) fn nearest_return(angle: Angle, track: &[State], longest: usize) -> Option<Return> {
+    returns_of(angle, track, longest).min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-fn returns_of(track: &[State], longest: usize) -> impl Iterator<Item = Return> {
-    (1..=longest).map(|n| (distance(track[n], track[0]), track[0], n)).filter(|r| r.0 < NEAR)
+fn returns_of(angle: Angle, track: &[State], longest: usize) -> impl Iterator<Item = Return> {
+    let near = move |n: usize| (angle.distance(track[n], track[0]), track[0], n);
+    (1..=longest).map(near).filter(|r| r.0 < NEAR)
 }
 
 /// The speed at which nothing holds a rotation back any more: where the torque is greater than all

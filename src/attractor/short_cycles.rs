@@ -1,12 +1,12 @@
 //! Stable orbits of few periods that no trajectory has come to: what a basin is too small for a few
 //! starts to hit.
 
-use std::f64::consts::TAU;
+use std::f64::consts::PI;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::find::{Catalogue, REACH};
-use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
+use crate::model::Angle;
 use crate::orbit::newton;
 
 /// Longest period, in forcing periods.
@@ -24,19 +24,21 @@ impl Catalogue {
     /// Newton's method from where a grid of starts comes back nearest to itself, after 1 to 4 periods; whether
     /// a stable orbit was found that was not known.
     ///
-    /// The grid reaches as far as the velocities of `points`.
+    /// The grid reaches as far as the velocities of `points`, and on the line their angles.
     pub(super) fn find_short_cycles(
         &mut self,
         strobe: &Strobe,
         points: &[State],
         cancel: &AtomicBool,
     ) -> bool {
-        let fastest = MARGIN * points.iter().fold(0.0_f64, |most, s| most.max(s[1].abs()));
+        let reach = |part: usize| points.iter().fold(0.0_f64, |most, s| most.max(s[part].abs()));
+        let widest = if strobe.angle == Angle::Circle { PI } else { MARGIN * reach(0) };
+        let fastest = MARGIN * reach(1);
         let map = self.map(strobe);
         let known = self.orbits.len();
         // Repelled by all that was met: a stable orbit lies next to the one that it was born with.
         let mut met: Vec<State> = Vec::new();
-        for (starts, n) in least_gaps(strobe, fastest).iter().zip(1..) {
+        for (starts, n) in least_gaps(strobe, [widest, fastest]).iter().zip(1..) {
             for start in starts.iter().take(TRIED) {
                 for _ in 0..BESIDE {
                     let found = newton::find_other(&map, *start, n, REACH, &met);
@@ -60,10 +62,10 @@ impl Catalogue {
 
 /// Starts of the grid whose gap after 1, 2, ... periods is less than those of their neighbours, the least
 /// first.
-fn least_gaps(strobe: &Strobe, fastest: f64) -> [Vec<State>; LONGEST] {
+fn least_gaps(strobe: &Strobe, [widest, fastest]: State) -> [Vec<State>; LONGEST] {
     let at = |k: usize| {
         let part = |i: usize| (i as f64 + 0.5) / SIDE as f64 - 0.5;
-        [TAU * part(k % SIDE), 2.0 * fastest * part(k / SIDE)]
+        [2.0 * widest * part(k % SIDE), 2.0 * fastest * part(k / SIDE)]
     };
     let starts: Vec<State> = (0..SIDE * SIDE).map(at).collect();
     let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) =
@@ -73,8 +75,9 @@ fn least_gaps(strobe: &Strobe, fastest: f64) -> [Vec<State>; LONGEST] {
     std::array::from_fn(|_| {
         // Lengths agree, so this cannot fail.
         let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
-        let gap: Vec<f64> =
-            (0..starts.len()).map(|k| distance([theta[k], velocity[k]], starts[k])).collect();
+        let gap: Vec<f64> = (0..starts.len())
+            .map(|k| strobe.angle.distance([theta[k], velocity[k]], starts[k]))
+            .collect();
         let lowest = |k: &usize| {
             let (i, j) = (k % SIDE, k / SIDE);
             let rows = j.saturating_sub(1)..=(j + 1).min(SIDE - 1);

@@ -15,6 +15,7 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use super::effort::Sampling;
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, Strobe};
+use crate::model::Angle;
 use crate::orbit::PeriodicOrbit;
 
 /// An ellipse around one point of an attractor: inside where `y1^2 + y2^2 < 1`.
@@ -83,9 +84,9 @@ pub fn ellipses(
         let Some(radius) = radius else { return Vec::new() };
         let shape = root.map(|x| x / radius);
         let reach = radius * extent(&root);
-        for turn in [-TAU, 0.0, TAU] {
+        for turn in strobe.angle.turns() {
             let centre = [centre[0] + turn, centre[1]];
-            if centre[0].abs() - reach <= std::f64::consts::PI {
+            if *turn == 0.0 || centre[0].abs() - reach <= std::f64::consts::PI {
                 traps.push(Ellipse { centre, shape, attractor: 0, point, cycle: orbit.n });
             }
         }
@@ -161,7 +162,7 @@ fn safe_radius(
     for _ in 0..returns {
         strobe.advance(&mut theta, &mut velocity, &mut turns, n).ok()?;
         let height = |i: usize| {
-            let (x, y) = (wrapped(theta[i] - centre[0]), velocity[i] - centre[1]);
+            let (x, y) = (strobe.angle.wrapped(theta[i] - centre[0]), velocity[i] - centre[1]);
             (a * x + b * y).hypot(c * y)
         };
         // From the smallest level outward, up to the first one with a sample that rises.
@@ -218,6 +219,10 @@ impl Band {
     /// The band around states `curve` of a running state, `None` where no sampled width is safe.
     #[must_use]
     pub fn around(strobe: &Strobe, states: &[State], attractor: usize) -> Option<Self> {
+        if strobe.angle == Angle::Line {
+            // What turns for ever there never comes back.
+            return None;
+        }
         let curve = tabulate(states)?;
         let mut band = Self { curve, half_width: 1.0, attractor };
         let columns = BAND_CELLS / 2;

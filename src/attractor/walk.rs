@@ -95,7 +95,7 @@ fn walk_block(
     let (theta, velocity): (Vec<f64>, Vec<f64>) = states.iter().map(|s| (s[0], s[1])).unzip();
     let mut block = Block::new(width);
     block.fill(&theta, &velocity, kick);
-    block.wrap();
+    block.wrap(strobe.angle);
     // The well between two upright positions; a passage over the top changes it by one.
     let well = |block: &Block, i: usize| {
         (0.5 * block.half_turns[i] + 0.5).floor() as i64 + block.turns[i] as i64
@@ -134,7 +134,7 @@ fn walk_block(
                     (before[i], last[i]) = (sense, now);
                 }
             }
-            block.wrap();
+            block.wrap(strobe.angle);
             for (i, windows) in all.iter_mut().enumerate() {
                 let Some(window) = windows.last_mut() else { continue };
                 let state = [block.half_turns[i] * PI, block.kick[i] / kick];

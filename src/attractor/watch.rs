@@ -12,7 +12,7 @@ use crate::integrate::{State, Strobe};
 /// called chaos.
 const LEAST_DECAY: f64 = 20.0;
 
-/// Periods for which chaos is watched where friction could end it.
+/// Periods for which chaos is watched where another attractor could end it.
 const LONG: u32 = 5000;
 
 impl Catalogue {
@@ -78,12 +78,12 @@ impl Catalogue {
         self.rebuild(&strobe.pendulum);
     }
 
-    /// Whether friction that holds rest for ever ends what was taken for chaos.
+    /// Whether what was taken for chaos beside another attractor is no way to it.
     ///
-    /// Chaos that stops once is over there, and such transients are long: the set is watched for [`LONG`]
-    /// periods from some of its points, or until one run ends.
+    /// Such transients are long: the set is watched for [`LONG`] periods from some of its points, or until one
+    /// run ends.
     fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
-        if self.rests.is_empty() || set.band.is_some() {
+        if self.attractors.iter().all(|a| a.kind.is_chaotic()) || set.band.is_some() {
             return true;
         }
         let mut points = spread(&set.points, self.effort.proved);

@@ -1,11 +1,9 @@
 //! How many steps a period a tolerance asks for.
 
-use std::f64::consts::TAU;
-
 use super::stroboscopic::{State, Strobe};
 use crate::error::Error;
 use crate::lanes::Path;
-use crate::model::Pendulum;
+use crate::model::{Angle, Pendulum};
 
 /// Periods after which step errors are compared.
 pub const PERIODS: usize = 5;
@@ -27,7 +25,7 @@ pub fn error_reached(strobe: &Strobe, starts: &[State]) -> f64 {
         .iter()
         .zip(&fine)
         .map(|(a, b)| {
-            let d = distance(*a, *b);
+            let d = strobe.angle.distance(*a, *b);
             if d.is_finite() { d } else { f64::INFINITY }
         })
         .collect();
@@ -39,13 +37,13 @@ pub fn error_reached(strobe: &Strobe, starts: &[State]) -> f64 {
 /// Distance of two states, the angle taken modulo a turn.
 #[must_use]
 pub fn distance(a: State, b: State) -> f64 {
-    wrapped(a[0] - b[0]).hypot(a[1] - b[1])
+    Angle::Circle.distance(a, b)
 }
 
 /// The angle in [-pi, pi].
 #[must_use]
 pub fn wrapped(angle: f64) -> f64 {
-    angle - TAU * (angle / TAU).round()
+    Angle::Circle.wrapped(angle)
 }
 
 fn after(strobe: &Strobe, starts: &[State]) -> Vec<State> {

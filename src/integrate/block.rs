@@ -11,8 +11,8 @@ use std::ops::Range;
 use super::runner::{Runner, smooth};
 use super::stroboscopic::Strobe;
 use super::ticket::Ticket;
-use crate::lanes::sine::wrap;
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
+use crate::model::Angle;
 use crate::model::pendulum::Route;
 
 /// Most trajectories of a block with events: enough for the queue of a step to fill its lanes.
@@ -79,9 +79,9 @@ impl Block {
     }
 
     /// Takes whole turns off the angles and adds them to `turns`.
-    pub fn wrap(&mut self) {
+    pub fn wrap(&mut self, angle: Angle) {
         for (half_turns, turns) in self.half_turns.iter_mut().zip(&mut self.turns) {
-            let (wrapped, whole) = wrap(*half_turns);
+            let (wrapped, whole) = angle.wrap(*half_turns);
             *half_turns = wrapped;
             *turns += whole;
         }

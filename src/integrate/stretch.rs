@@ -6,7 +6,7 @@ use super::step::Moving;
 use super::stroboscopic::{Strobe, same_length};
 use super::tangent::Tangent;
 use crate::error::Error;
-use crate::lanes::sine::{Fine, wrap};
+use crate::lanes::sine::Fine;
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
 use crate::model::pendulum::Route;
 
@@ -150,7 +150,7 @@ impl Stretch<'_> {
                 let mut lanes = Moving::new(schedule, theta, velocity);
                 lanes.run::<Fine>(schedule);
                 let velocity = lanes.velocity(schedule);
-                let (wrapped, whole) = wrap(lanes.half_turns.value);
+                let (wrapped, whole) = self.strobe.angle.wrap(lanes.half_turns.value);
                 let turns = L::load(token, &buffers[2].0) + whole;
                 wrapped.scale(PI).store(&mut buffers[0].0);
                 velocity.value.store(&mut buffers[1].0);

@@ -9,7 +9,7 @@ use super::schedule::Schedule;
 use crate::error::Error;
 use crate::lanes::Path;
 use crate::model::pendulum::Route;
-use crate::model::{Equation, Pendulum};
+use crate::model::{Angle, Equation, Pendulum};
 
 /// Angle and velocity, `[theta, th']`.
 pub type State = [f64; 2];
@@ -41,6 +41,8 @@ pub struct Strobe {
     pub extra: bool,
     /// The drive at the stages of the general method; empty on other routes.
     pub timetable: Timetable,
+    /// Where its angle lives.
+    pub angle: Angle,
     /// The equation, time in the laboratory held.
     pub equation: Equation<f64>,
 }
@@ -64,6 +66,7 @@ impl Strobe {
             friction: pendulum.has_friction(),
             extra: pendulum.has_extra_load(),
             timetable: Timetable::new(pendulum, general),
+            angle: pendulum.angle(),
             equation: pendulum.equation(),
         }
     }
@@ -82,7 +85,7 @@ impl Strobe {
 
     /// Advances every state by `periods` forcing periods, in place.
     ///
-    /// Angles come back in [-pi, pi]; the whole turns taken off are added to `turns`.
+    /// Angles on the circle come back in [-pi, pi]; the whole turns taken off are added to `turns`.
     ///
     /// # Errors
     /// [`Error::Lengths`] if the three slices differ in length.
@@ -97,7 +100,7 @@ impl Strobe {
         self.advance_blocks(theta, velocity, turns, width, |block| {
             for _ in 0..periods {
                 self.period(block);
-                block.wrap();
+                block.wrap(self.angle);
             }
         })
     }
@@ -116,7 +119,7 @@ impl Strobe {
         self.advance_blocks(theta, velocity, turns, 1, |block| {
             for _ in 0..periods {
                 self.period_singly(block);
-                block.wrap();
+                block.wrap(self.angle);
             }
         })
     }

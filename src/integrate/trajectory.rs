@@ -101,7 +101,7 @@ pub fn simulate_watched(
 ) -> Result<Trajectory, Error> {
     check(request)?;
     // Far from 0 the angle's last place would be all that steps can resolve: whole turns wait outside.
-    let far = request.start[0].abs() > FAR && pendulum.check_mappable().is_ok();
+    let far = request.start[0].abs() > FAR && pendulum.repeats_every_turn();
     let turns = if far { TAU * (request.start[0] / TAU).round() } else { 0.0 };
     let start = [request.start[0] - turns, request.start[1]];
     let nearer = Request { start, ..*request };

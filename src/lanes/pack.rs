@@ -130,7 +130,7 @@ impl<S: Isa, const N: usize> Real for Bundle<S, N> {
 
     #[inline(always)]
     fn wrapped(self) -> Self {
-        sine::wrap(self).0
+        sine::wrap(self, 0.5).0
     }
 
     #[inline(always)]

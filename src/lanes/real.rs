@@ -144,7 +144,7 @@ macro_rules! scalar_lane {
             }
             #[inline(always)]
             fn wrapped(self) -> Self {
-                sine::wrap(self).0
+                sine::wrap(self, 0.5).0
             }
             #[inline(always)]
             fn exponential(self) -> Self {

@@ -81,9 +81,10 @@ pub fn cosine<D: Degree, L: Lane>(x: L) -> L {
     -sine::<D, L>(x - x.like(0.5))
 }
 
-/// The angle in [-1, 1] half turns and the whole turns taken off, both exact.
+/// The angle less whole turns, in half turns, and the turns taken off, both exact: the whole number nearest to
+/// `part` times the angle. One half leaves an angle in [-1, 1], and 0 all of it.
 #[inline(always)]
-pub fn wrap<L: Lane>(x: L) -> (L, L) {
-    let turns = x.scale(0.5) + x.like(ROUND) - x.like(ROUND);
+pub fn wrap<L: Lane>(x: L, part: f64) -> (L, L) {
+    let turns = x.scale(part) + x.like(ROUND) - x.like(ROUND);
     (x - (turns + turns), turns)
 }

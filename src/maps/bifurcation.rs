@@ -6,7 +6,6 @@ use super::parameter_map::{ParameterMap, Plane, Range, Request as MapRequest, pa
 use crate::attractor::Attractor;
 use crate::attractor::trap::Band;
 use crate::error::Error;
-use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
 use crate::model::Pendulum;
 use crate::orbit::rotation::running_states;
@@ -158,7 +157,7 @@ fn settle(strobe: &Strobe, cell: &Cell, state: &mut State) -> (Option<usize>, Ve
                 let held = |(sense, band): &(i64, Band)| *sense == a.sense && band.contains(*state);
                 return running.iter().any(held);
             }
-            let near = |s: State| a.points.iter().any(|p| distance(*p, s) < ARRIVED);
+            let near = |s: State| a.passes(s, ARRIVED);
             a.n.is_some() && near(*state) && near(next)
         };
         if let Some(k) = cell.found.iter().position(|f| arrived(&f.attractor)) {

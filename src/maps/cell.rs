@@ -7,7 +7,6 @@ use super::bounds::cell_periods;
 use crate::attractor::chaos::spread;
 use crate::attractor::rest::balances;
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
-use crate::integrate::accuracy::distance;
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
@@ -229,7 +228,7 @@ impl Hint {
     fn is_like(&self, attractor: &Attractor, symmetric: bool) -> bool {
         let w = attractor.w.unwrap_or(attractor.sense);
         let image = [-self.points[0][0], -self.points[0][1]];
-        let near = |point: State| attractor.points.iter().any(|p| distance(*p, point) < LIKE);
+        let near = |point: State| attractor.passes(point, LIKE);
         let either =
             |sign: i64, point: State| w == sign * self.w && (self.n.is_none() || near(point));
         (self.kind, self.n) == (attractor.kind, attractor.n)

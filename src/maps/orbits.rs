@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::integrate::{State, accuracy};
 use crate::lanes::Path;
 use crate::memory;
-use crate::model::Pendulum;
+use crate::model::{Angle, Pendulum};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
@@ -104,7 +104,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
     let begin = if pendulum.is_autonomous() {
-        rests(pendulum)
+        rests(pendulum, request.theta)
     } else {
         beginnings(pendulum, request, reach, control)?
     };
@@ -139,8 +139,8 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         next = new.iter().flat_map(|orbit| beside(orbit, request.n)).collect();
     }
     let inside = |p: &State| {
-        let turned = [-TAU, 0.0, TAU].map(|turn| p[0] + turn);
-        turned.iter().any(|t| request.theta.holds(*t)) && request.velocity.holds(p[1])
+        let within = |turn: &f64| request.theta.holds(p[0] + turn);
+        map.angle.turns().iter().any(within) && request.velocity.holds(p[1])
     };
     let held = |p: &State| rubs && p[1] == 0.0 && pendulum.equation().holds_for_ever(p[0]);
     all.retain(|orbit| {
@@ -152,9 +152,13 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
 
 /// Where nothing accelerates an undriven pendulum at rest: all else that closes within a time that is
 /// given closes by chance.
-fn rests(pendulum: &Pendulum) -> Vec<State> {
+fn rests(pendulum: &Pendulum, theta: Axis) -> Vec<State> {
     let pull = |theta: f64| pendulum.acceleration(0.0, theta, 0.0);
-    let angle = |k: usize| PI * (2.0 * (k as f64 + 0.5) / LOOKS as f64 - 1.0);
+    let (low, high) = match pendulum.angle() {
+        Angle::Circle => (-PI, PI),
+        Angle::Line => (theta.low, theta.high),
+    };
+    let angle = |k: usize| low + (high - low) * (k as f64 + 0.5) / LOOKS as f64;
     let between = |k: usize| {
         let (mut low, mut high) = (angle(k), angle(k + 1));
         if (pull(low) > 0.0) == (pull(high) > 0.0) {
@@ -187,7 +191,7 @@ fn beginnings(
         let turns = advance(&strobe, &mut theta, &mut velocity, n, threads, control)?;
         let ends = theta.iter().zip(&velocity).zip(turns);
         let gap = |(start, ((theta, velocity), turns)): (&State, ((&f64, &f64), i64))| {
-            let rest = accuracy::wrapped(theta - start[0]);
+            let rest = strobe.angle.wrapped(theta - start[0]);
             [(turns - request.w) as f64 * TAU + rest, velocity - start[1]]
         };
         Ok(from.iter().zip(ends).map(gap).collect())

@@ -1,5 +1,6 @@
 //! The equation of motion, what drives it and what else acts.
 
+pub mod angle;
 pub mod drive;
 pub mod effects;
 pub mod equation;
@@ -10,6 +11,7 @@ pub mod recorded;
 pub mod rest;
 mod spline;
 
+pub use angle::Angle;
 pub use drive::HarmonicDrive;
 pub use effects::{Effect, Kind};
 pub use equation::Equation;

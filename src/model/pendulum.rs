@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use super::angle::Angle;
 use super::drive::{HarmonicDrive, Motion};
+use super::effects::law::NOT_PERIODIC;
 use super::effects::{Action, Effect, Kind, Mappable};
 use super::equation::Equation;
 use crate::error::Error;
@@ -296,13 +298,29 @@ impl Pendulum {
         self.motion().lateral != 0.0 || self.effects.iter().any(position)
     }
 
+    /// Where its angle lives.
+    #[must_use]
+    pub fn angle(&self) -> Angle {
+        let counts = |e: &Effect| e.kind.counts_turns(&e.parameters);
+        if self.effects.iter().any(counts) { Angle::Line } else { Angle::Circle }
+    }
+
+    /// Whether a turn makes no difference.
+    #[must_use]
+    pub fn repeats_every_turn(&self) -> bool {
+        let differs = |e: &Effect| e.kind.bars_maps(&e.parameters) == Some(NOT_PERIODIC);
+        self.angle() == Angle::Circle && !self.effects.iter().any(differs)
+    }
+
     /// Whether a map over initial conditions can have all its effects.
     ///
     /// # Errors
     /// [`Error::NotMappable`] for the first that it cannot have.
     pub fn check_mappable(&self) -> Result<(), Error> {
+        let bounded = self.angle() == Angle::Line;
         for effect in &self.effects {
-            if let Some(why) = effect.kind.bars_maps(&effect.parameters) {
+            let why = effect.kind.bars_maps(&effect.parameters);
+            if let Some(why) = why.filter(|why| !(bounded && *why == NOT_PERIODIC)) {
                 return Err(Error::NotMappable { effect: effect.kind.definition().name, why });
             }
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use super::poincare::{PoincareMap, closing_gap};
+use super::poincare::PoincareMap;
 use crate::integrate::State;
 use crate::model::Pendulum;
 
@@ -48,12 +48,13 @@ impl Branch<'_> {
     /// `P(x) - m x` and its derivatives by angle, velocity and `p`, a column each.
     fn gap(&self, z: Vector3<f64>) -> (Vector2<f64>, [Vector2<f64>; 3]) {
         let x = [z[0], z[1]];
-        let image = self.map(z[2]).once(x);
+        let map = self.map(z[2]);
+        let image = map.once(x);
         let goal = x.map(|part| self.multiplier * part);
         let [above, below] = [DIFFERENCE, -DIFFERENCE].map(|by| self.map(z[2] + by).once(x).state);
-        let by_p = closing_gap(below, above) / (2.0 * DIFFERENCE);
+        let by_p = map.gap(below, above) / (2.0 * DIFFERENCE);
         let d = image.derivative - Matrix2::identity() * self.multiplier;
-        (closing_gap(goal, image.state), [d.column(0).into(), d.column(1).into(), by_p])
+        (map.gap(goal, image.state), [d.column(0).into(), d.column(1).into(), by_p])
     }
 
     /// The direction of the branch, in the sense of `before`.

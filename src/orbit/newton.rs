@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix2, Vector2};
 
 use super::floquet::{Multipliers, multipliers};
-use super::poincare::{PoincareMap, closing_gap};
+use super::poincare::PoincareMap;
 use crate::integrate::State;
-use crate::integrate::accuracy::{distance, wrapped};
+use crate::model::Angle;
 
 /// Largest `|P^n(x) - x|` of an orbit that counts as found, where rounding allows it; ...
 pub const RESIDUAL: f64 = 1e-12;
@@ -36,6 +36,8 @@ pub struct PeriodicOrbit {
     pub multipliers: Multipliers,
     /// Derivative of `P^n` at each point.
     pub monodromy: Vec<Matrix2<f64>>,
+    /// Where the angle lives.
+    pub angle: Angle,
 }
 
 impl PeriodicOrbit {
@@ -65,7 +67,7 @@ impl PeriodicOrbit {
     /// Whether `state` is one of its points, within `tolerance`.
     #[must_use]
     pub fn contains(&self, state: State, tolerance: f64) -> bool {
-        self.points.iter().any(|p| distance(*p, state) < tolerance)
+        self.points.iter().any(|p| self.angle.distance(*p, state) < tolerance)
     }
 }
 
@@ -93,7 +95,7 @@ pub fn find_other(
     reach: f64,
     known: &[State],
 ) -> Option<PeriodicOrbit> {
-    let mut point = polish(map, [wrapped(start[0]), start[1]], n, reach, known)?;
+    let mut point = polish(map, [map.angle.wrapped(start[0]), start[1]], n, reach, known)?;
     if !known.is_empty() {
         // Where zeros lie close the gap is small all about: once more without what repels.
         point = polish(map, point, n, reach, &[])?;
@@ -101,9 +103,9 @@ pub fn find_other(
     let image = |d: usize| map.iterate(point, d);
     let smallest = (1..=n)
         .filter(|d| n.is_multiple_of(*d))
-        .find(|d| *d == n || distance(image(*d).state, point) < SAME_POINT)?;
+        .find(|d| *d == n || map.angle.distance(image(*d).state, point) < SAME_POINT)?;
     let point = if smallest == n { point } else { polish(map, point, smallest, reach, &[])? };
-    complete(map, [wrapped(point[0]), point[1]], smallest)
+    complete(map, [map.angle.wrapped(point[0]), point[1]], smallest)
 }
 
 /// The place of the point with the lowest angle.
@@ -123,7 +125,7 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
     let mut first = f64::INFINITY;
     for iteration in 0..ITERATIONS {
         let image = map.iterate(point, n);
-        let gap = closing_gap(point, image.state);
+        let gap = map.gap(point, image.state);
         let size = gap.norm() / least_gap(&image.derivative);
         if iteration == 0 {
             first = size;
@@ -132,7 +134,7 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
         if iteration == PROMISING && known.is_empty() && size > 0.1 * first && size > 1.0 {
             break;
         }
-        if !size.is_finite() || distance(point, start) > reach {
+        if !size.is_finite() || map.angle.distance(point, start) > reach {
             break;
         }
         match best {
@@ -143,7 +145,7 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
         }
         // None where all that is near closes too, as about rest without damping and drive.
         let Some(step) = (Matrix2::identity() - image.derivative).lu().solve(&gap) else { break };
-        let step = repelled(step, point, known);
+        let step = repelled(map.angle, step, point, known);
         let length = step.norm();
         let damped = if length > 0.5 { 0.5 / length } else { 1.0 };
         point = [point[0] + damped * step[0], point[1] + damped * step[1]];
@@ -153,10 +155,10 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
 }
 
 /// Newton's step of the gap times `m(x)`: along the step of the gap, over `1 - step . grad m / m`.
-fn repelled(step: Vector2<f64>, point: State, known: &[State]) -> Vector2<f64> {
+fn repelled(angle: Angle, step: Vector2<f64>, point: State, known: &[State]) -> Vector2<f64> {
     let mut slope = 0.0;
     for other in known {
-        let away = Vector2::new(wrapped(point[0] - other[0]), point[1] - other[1]);
+        let away = Vector2::new(angle.wrapped(point[0] - other[0]), point[1] - other[1]);
         let square = away.norm_squared();
         slope -= 2.0 * away.dot(&step) / (square * (1.0 + square));
     }
@@ -180,7 +182,7 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
         state = image.state;
     }
     let w = (way / TAU).round() as i64;
-    let residual = closing_gap(first, state).norm();
+    let residual = map.gap(first, state).norm();
     let lowest = lowest(&points);
     points.rotate_left(lowest);
     derivatives.rotate_left(lowest);
@@ -206,5 +208,6 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
         residual,
         multipliers,
         monodromy,
+        angle: map.angle,
     })
 }

@@ -4,13 +4,12 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::integrate::accuracy::wrapped;
 use crate::integrate::flow::Flow;
 use crate::integrate::tangent::Tangent;
 use crate::integrate::{Moving, Schedule, State, Strobe};
-use crate::lanes::sine::{Fine, wrap};
-use crate::model::Pendulum;
+use crate::lanes::sine::Fine;
 use crate::model::pendulum::Route;
+use crate::model::{Angle, Pendulum};
 
 /// A step short enough for errors near 1e-15 a period: the method's error falls as the eighth
 /// power, and is 1e-9 after five periods at 0.095.
@@ -21,6 +20,8 @@ const STEP: f64 = 0.025;
 pub struct PoincareMap {
     /// The model.
     pub pendulum: Pendulum,
+    /// Where its angle lives.
+    pub angle: Angle,
     way: Way,
 }
 
@@ -36,7 +37,7 @@ enum Way {
 /// An image of the map with its derivative.
 #[derive(Clone, Copy, Debug)]
 pub struct Image {
-    /// Angle in [-pi, pi] and velocity.
+    /// Angle, on the circle in [-pi, pi], and velocity.
     pub state: State,
     /// Whole turns taken off the angle.
     pub turns: i64,
@@ -59,13 +60,14 @@ impl PoincareMap {
         } else {
             Way::Any(Box::new(Flow::new(pendulum)))
         };
-        Self { pendulum: pendulum.clone(), way }
+        Self { pendulum: pendulum.clone(), angle: pendulum.angle(), way }
     }
 
     /// The map that `strobe` steps: as precise as that, and as quick.
     #[must_use]
     pub fn of_steps(strobe: &Strobe) -> Self {
-        Self { pendulum: strobe.pendulum.clone(), way: Way::Lanes(Box::new(strobe.clone())) }
+        let way = Way::Lanes(Box::new(strobe.clone()));
+        Self { pendulum: strobe.pendulum.clone(), angle: strobe.angle, way }
     }
 
     /// One period on.
@@ -74,20 +76,26 @@ impl PoincareMap {
         let flow_of = match &self.way {
             Way::Plain(schedule) => {
                 let shrinking = (-self.pendulum.gamma * self.pendulum.period()).exp();
-                return Image { product: Some(shrinking), ..flow(schedule, state) };
+                return Image { product: Some(shrinking), ..flow(self.angle, schedule, state) };
             }
             Way::Any(flow_of) => flow_of,
             Way::Lanes(strobe) => return stretched(strobe, state),
         };
         let arrival = flow_of.carry(state, 0.0, self.pendulum.period());
         let [[a, b], [c, d]] = arrival.derivative;
-        let (half_turns, turns) = wrap(arrival.state[0] * FRAC_1_PI);
+        let (half_turns, turns) = self.angle.wrap(arrival.state[0] * FRAC_1_PI);
         Image {
             state: [half_turns * PI, arrival.state[1]],
             turns: turns as i64,
             derivative: Matrix2::new(a, b, c, d),
             product: arrival.product,
         }
+    }
+
+    /// The way from one state to another, on the circle modulo a turn.
+    #[must_use]
+    pub fn gap(&self, from: State, to: State) -> Vector2<f64> {
+        Vector2::new(self.angle.wrapped(to[0] - from[0]), to[1] - from[1])
     }
 
     /// `periods` periods on, with the derivative of the whole.
@@ -137,7 +145,7 @@ fn stretched(strobe: &Strobe, state: State) -> Image {
 
 /// A schedule's flow with its derivative.
 #[must_use]
-pub fn flow(schedule: &Schedule, state: State) -> Image {
+pub fn flow(angle: Angle, schedule: &Schedule, state: State) -> Image {
     let seed = |i: usize| {
         let mut slope = [0.0; 2];
         slope[i] = 1.0;
@@ -147,7 +155,7 @@ pub fn flow(schedule: &Schedule, state: State) -> Image {
     moving.run::<Fine>(schedule);
     let velocity = moving.velocity(schedule);
     let theta = moving.theta();
-    let (half_turns, turns) = wrap(moving.half_turns.value);
+    let (half_turns, turns) = angle.wrap(moving.half_turns.value);
     Image {
         state: [half_turns * PI, velocity.value],
         turns: turns as i64,
@@ -159,10 +167,4 @@ pub fn flow(schedule: &Schedule, state: State) -> Image {
         ),
         product: None,
     }
-}
-
-/// `P^n(x) - x`, the angle modulo a turn.
-#[must_use]
-pub fn closing_gap(from: State, to: State) -> Vector2<f64> {
-    Vector2::new(wrapped(to[0] - from[0]), to[1] - from[1])
 }

@@ -10,7 +10,7 @@ use crate::integrate::general::{Own, Running, STEP as ALL_STAGES, Stages, Steppi
 use crate::integrate::tangent::Tangent;
 use crate::lanes::Work;
 use crate::model::pendulum::Route;
-use crate::model::{Equation, Pendulum};
+use crate::model::{Angle, Equation, Pendulum};
 
 /// A number with its derivatives by the first angle and velocity.
 type Number = Tangent<f64, 2>;
@@ -116,7 +116,11 @@ fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Opt
 /// fall onto its highest fixed point, or the pendulum stops going round and there is none.
 #[must_use]
 pub fn running_states(pendulum: &Pendulum) -> Vec<Rotation> {
-    if !pendulum.is_autonomous() || !pendulum.is_dissipative() || pendulum.torque == 0.0 {
+    if !pendulum.is_autonomous()
+        || !pendulum.is_dissipative()
+        || pendulum.torque == 0.0
+        || pendulum.angle() == Angle::Line
+    {
         return Vec::new();
     }
     let sense = pendulum.torque.signum();

@@ -3,10 +3,9 @@
 use super::newton::{self, PeriodicOrbit};
 use super::poincare::PoincareMap;
 use crate::integrate::State;
-use crate::integrate::accuracy::{distance, wrapped};
 use crate::integrate::flow::Flow;
-use crate::model::Pendulum;
 use crate::model::pendulum::Symmetry;
+use crate::model::{Angle, Pendulum};
 
 /// Error of a step of the flow over half a period.
 const STEP_ERROR: f64 = 1e-12;
@@ -16,6 +15,7 @@ const REACH: f64 = 0.1;
 /// The symmetry of a pendulum, acting on stroboscopic states.
 #[derive(Debug)]
 pub struct Mirror {
+    angle: Angle,
     /// Half a period, where the symmetry takes it.
     half: Option<(Flow, f64)>,
 }
@@ -31,7 +31,7 @@ impl Mirror {
                 Some((flow, 0.5 * pendulum.period()))
             }
         };
-        Some(Self { half })
+        Some(Self { angle: pendulum.angle(), half })
     }
 
     /// The stroboscopic state of the mirrored motion.
@@ -41,7 +41,7 @@ impl Mirror {
             None => state,
             Some((flow, half)) => flow.carry(state, 0.0, *half).state,
         };
-        [wrapped(-theta), -velocity]
+        [self.angle.wrapped(-theta), -velocity]
     }
 
     /// How far the image of a point of an orbit may lie from that of the image's orbit: a map of steps errs,
@@ -67,7 +67,8 @@ impl Mirror {
         }
         let image = self.image(orbit.points[0]);
         let found = newton::find(map, image, orbit.n, REACH)?;
-        let own = found.n == orbit.n && found.points.iter().any(|p| distance(*p, image) < 1e-2);
+        let own = found.n == orbit.n
+            && found.points.iter().any(|p| self.angle.distance(*p, image) < 1e-2);
         own.then_some((found, None))
     }
 }

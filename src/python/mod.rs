@@ -20,6 +20,7 @@ use crate::error::Error;
 use crate::lanes::Path;
 use crate::maps::bounds::{LEAST, cell_periods, max_periods};
 use crate::memory;
+use crate::model::Angle;
 use crate::model::effects::Role;
 use crate::model::formula::{ParameterSpec, Spec};
 use crate::model::{Effect, Formula, Kind, Pendulum};
@@ -94,6 +95,12 @@ fn period(parameters: Parameters) -> PyResult<f64> {
     Ok(pendulum(parameters)?.period())
 }
 
+/// Whether an effect counts turns, so that angles are not wrapped.
+#[pyfunction]
+fn counts_turns(parameters: Parameters) -> PyResult<bool> {
+    Ok(pendulum(parameters)?.angle() == Angle::Line)
+}
+
 /// Periods after which a start of a basin map, and a cell of a map over parameters, is undecided where
 /// none are given; and the first of the two where damping is not small.
 #[pyfunction]
@@ -139,6 +146,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(library::roles, module)?)?;
     module.add_function(wrap_pyfunction!(library::formula, module)?)?;
     module.add_function(wrap_pyfunction!(period, module)?)?;
+    module.add_function(wrap_pyfunction!(counts_turns, module)?)?;
     module.add_function(wrap_pyfunction!(bounds, module)?)?;
     module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
     module.add_function(wrap_pyfunction!(motion::choose_steps, module)?)?;

@@ -9,7 +9,7 @@ use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
 use pendmap::maps::basins::{BasinMap, Plane};
 use pendmap::maps::label::NEVER;
-use pendmap::model::Pendulum;
+use pendmap::model::{Angle, Pendulum};
 
 use crate::support::{basins_on_plane, driven};
 use crate::truths::{attractors_at, fractions_at};
@@ -150,7 +150,7 @@ fn no_two_attractors_of_a_catalogue_share_a_name() {
             .map(|_| {
                 // First angles are often the same to four digits, and sometimes to all.
                 let theta = 0.1 * below(3) as f64 + [0.0, 1e-6, 1e-9][below(3)];
-                let mut one = Attractor::resting(theta);
+                let mut one = Attractor::resting(Angle::Circle, theta);
                 let kinds = [Kind::Oscillation, Kind::TumblingChaos, Kind::LibrationChaos];
                 one.kind = kinds[below(3)];
                 (one.n, one.w) = match one.kind {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from typing import TYPE_CHECKING, Any
 
@@ -98,14 +97,14 @@ def figure(
         if one == "labels":
             colours = legend.colours(dataset)
             _image(axes, colours[plane.pixels(dataset, dataset["label"], limit) + 1], extent)
-            _attractors(axes, listed, extent)
+            _attractors(axes, dataset, listed, extent)
         else:
             _scalar(axes, bar, dataset, one, extent=extent, limit=limit, colormap=colormap)
         style.phase_plane(axes, theta, velocity, units)
     if "labels" in shown and not layering.reliable(dataset):
         _warn(sheet, sheet.axes[shown.index("labels")], dataset)
     if aside:
-        _section(sheet.axes[-1], chaos, units)
+        _section(sheet.axes[-1], dataset, chaos)
         sheet.note(sheet.axes[-1], [(note, style.QUIET, "normal")])
     return sheet.figure
 
@@ -250,12 +249,14 @@ def _drawn(entry: legend.Entry, size: float) -> dict[str, Any]:
     }
 
 
-def _attractors(axes: Axes, listed: list[legend.Entry], extent: Extent) -> None:
+def _attractors(
+    axes: Axes, dataset: xr.Dataset, listed: list[legend.Entry], extent: Extent
+) -> None:
     """Mark the points of all attractors, with their copies 2 pi further."""
     box = axes.get_window_extent()
     size = min(6.5, max(3.5, 1.1 + 1.3 * box.width / axes.figure.dpi))
     for entry in listed:
-        at = plane.copies(entry.points, extent[0], extent[1])
+        at = plane.copies(dataset, entry.points, extent[0], extent[1])
         at = at[(at[:, 1] >= extent[2]) & (at[:, 1] <= extent[3])]
         if entry.chaotic:
             _dots(axes, at, style.INK)
@@ -263,11 +264,12 @@ def _attractors(axes: Axes, listed: list[legend.Entry], extent: Extent) -> None:
             axes.plot(at[:, 0], at[:, 1], clip_on=False, zorder=5, **_drawn(entry, size))
 
 
-def _section(axes: Axes, chaos: list[legend.Entry], units: Units) -> None:
+def _section(axes: Axes, dataset: xr.Dataset, chaos: list[legend.Entry]) -> None:
     """Draw the stroboscopic points of chaotic attractors on a plane of their own."""
     for entry in chaos:
         _dots(axes, entry.points, entry.colour)
-    style.phase_plane(axes, (-math.pi, math.pi), _section_range(chaos), units)
+    theta = plane.angles(dataset, np.concatenate([entry.points[:, 0] for entry in chaos]))
+    style.phase_plane(axes, theta, _section_range(chaos), Units.of(dataset.attrs))
 
 
 def _section_range(chaos: list[legend.Entry]) -> tuple[float, float]:

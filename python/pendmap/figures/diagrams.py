@@ -128,8 +128,9 @@ def _points(axes: Axes, dataset: xr.Dataset, every: list[Family], shown: str) ->
     loose = dataset["loose_value"].values, dataset[f"loose_{shown}"].values
     axes.plot(*loose, "o", ms=0.45, mew=0, color=palette.UNNAMED, rasterized=True, zorder=1)
     if shown == "theta":
-        axes.set_ylim(-math.pi, math.pi)
-        style.scale(axes, "y", (-math.pi, math.pi), names.ANGLE, angle=True)
+        angles = plane.angles(dataset, dataset["point_theta"].values)
+        axes.set_ylim(angles)
+        style.scale(axes, "y", angles, names.ANGLE, angle=True)
     else:
         low, high = plane.padded(dataset["point_velocity"].values)
         axes.set_ylim(low, high)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.lines import Line2D
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["figure"]
 
-THETA = (-math.pi, math.pi)
-
 
 def figure(
     dataset: xr.Dataset,
@@ -43,7 +40,7 @@ def figure(
         raise InputError(f"colormap {colormap!r}: a figure of orbits has no colour map")
     orbits = drawn.closed(dataset)
     units = Units.of(dataset.attrs)
-    velocity = drawn.speeds(orbits, dataset)
+    theta, velocity = drawn.angles(orbits, dataset), drawn.speeds(orbits, dataset)
     low, high = (units.bare(end, VELOCITY) for end in velocity)
     named = sorted(orbits, key=lambda one: one.id)[: drawn.MOST]
     texts = [one.text for one in named]
@@ -53,19 +50,19 @@ def figure(
         handles.append(Line2D([], [], linestyle="none"))
     sheet = Sheet(
         [Panel()],
-        ratio=min(max((high - low) / (2 * math.pi), 0.6), 1.1),
+        ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
         title=drawn.title(dataset),
         subtitle=layering.parameters(dataset.attrs),
         handles=handles,
         texts=texts,
-        labels=(style.widest(*velocity), style.widest(*THETA, angle=True)),
+        labels=(style.widest(*velocity), style.widest(*theta, angle=True)),
         size=size,
         dpi=dpi,
     )
     axes = sheet.axes[0]
     for one in orbits:
-        _orbit(axes, one)
-    style.phase_plane(axes, THETA, velocity, units)
+        _orbit(axes, one, dataset, theta)
+    style.phase_plane(axes, theta, velocity, units)
     return sheet.figure
 
 
@@ -89,8 +86,8 @@ def _handle(one: Closed) -> Line2D:
     return Line2D([], [], **_look(one))
 
 
-def _orbit(axes: Axes, one: Closed) -> None:
+def _orbit(axes: Axes, one: Closed, dataset: xr.Dataset, theta: tuple[float, float]) -> None:
     look = _look(one)
     axes.plot(one.path[:, 0], one.path[:, 1], **(look | {"marker": ""}))
-    at = plane.copies(one.points, *THETA)
+    at = plane.copies(dataset, one.points, *theta)
     axes.plot(at[:, 0], at[:, 1], zorder=4, clip_on=False, **(look | {"linestyle": "none"}))

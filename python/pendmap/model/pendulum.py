@@ -133,16 +133,31 @@ class Pendulum:
         return (*own, self.lab_time, [effect.kernel for effect in self.effects])
 
     @property
+    def effect_attributes(self) -> dict[str, float | str]:
+        """The effects as JSON, and ``angle = "line"`` where one counts turns."""
+        line: dict[str, float | str] = {"angle": "line"} if self.counts_turns else {}
+        return {"effects": effects_json(self.effects)} | line
+
+    @property
+    def counts_turns(self) -> bool:
+        """Whether a turn makes a difference, as with an elastic torque: angles are not wrapped."""
+        if not self.effects:
+            return False
+        from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
+
+        return _core.counts_turns(self.parameters)
+
+    @property
     def attributes(self) -> dict[str, float | str]:
         """The parameters as a dataset's attributes; effects as JSON."""
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
-        return {"units": self.units.name} | numbers | {"effects": effects_json(self.effects)}
+        return {"units": self.units.name} | numbers | self.effect_attributes
 
     @property
     def title(self) -> str:
         """The parameters in one line, zeros left out, a time that effects drift from not."""
         shown = [("\N{GREEK SMALL LETTER GAMMA}", self.gamma), ("p", self.p)]
-        if self.p != 0:
+        if is_driven(self.p, self.effects):
             shown.append(("\N{GREEK SMALL LETTER OMEGA}", self.omega))
         others = (
             ("\N{GREEK SMALL LETTER PHI}", self.phase),
@@ -225,6 +240,11 @@ def effects_json(effects: tuple[Effect, ...]) -> str:
             for e in effects
         ]
     )
+
+
+def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:
+    """Return whether the equation depends on time, by the pivot's motion or by an effect."""
+    return p != 0 or any(effect.definition["group"] == "drive" for effect in effects)
 
 
 def effects_of(attributes: Mapping[Any, Any]) -> tuple[Effect, ...]:

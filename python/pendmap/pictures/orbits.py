@@ -94,8 +94,17 @@ def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:
     parts = [np.empty((0, 2))]
     for k in np.unique(piece):
         own = piece == k
-        parts += [plane.broken_at_wrap(theta[own], velocity[own]), gap]
+        whole = np.stack([theta[own], velocity[own]], axis=1)
+        broken = plane.broken_at_wrap(theta[own], velocity[own])
+        parts += [whole if plane.on_line(dataset) else broken, gap]
     return np.concatenate(parts)
+
+
+def angles(orbits: list[Closed], dataset: xr.Dataset) -> tuple[float, float]:
+    """Return the angles that a picture shows."""
+    theta = [one.path[:, 0] for one in orbits] + [one.points[:, 0] for one in orbits]
+    shown = np.concatenate([*theta, np.empty(0)])
+    return plane.angles(dataset, shown[np.isfinite(shown)])
 
 
 def speeds(orbits: list[Closed], dataset: xr.Dataset) -> tuple[float, float]:

@@ -110,11 +110,24 @@ def _cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
     return inside
 
 
-def copies(points: Floats, low: float, high: float) -> Floats:
-    """Return the points, shape (m, 2), and their copies 2 pi k further that are in [low, high].
+def on_line(dataset: xr.Dataset) -> bool:
+    """Return whether angles are not wrapped: an effect counts turns."""
+    return str(dataset.attrs.get("angle")) == "line"
 
-    None are returned where there would be more than a hundred of each.
+
+def angles(dataset: xr.Dataset, theta: Floats) -> tuple[float, float]:
+    """Return the limits of an axis of these angles: a turn, or on the line all of them."""
+    return padded(theta) if on_line(dataset) and theta.size else (-math.pi, math.pi)
+
+
+def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floats:
+    """Return the points, shape (m, 2), that are in [low, high], and their copies 2 pi k further.
+
+    On the line there are no copies. None are returned where there would be more than a hundred
+    of each.
     """
+    if on_line(dataset):
+        return points[(points[:, 0] >= low) & (points[:, 0] <= high)]
     if high - low > MOST_COPIES * TWO_PI:
         return np.empty((0, 2))
     slack = 1e-9 * max(1.0, abs(low), abs(high))

@@ -70,11 +70,11 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
         around.log(stream, ROOTS[one])
         _LOGS[one](stream, dataset, around)
         if one == "labels" or not layering.finite_time(dataset):
-            _attractors(stream, ROOTS[one], listed, around, named=one == "labels")
+            _attractors(stream, ROOTS[one], dataset, around, named=one == "labels")
     if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
         alone = _around_attractors(dataset, listed)
         alone.log(stream, ROOTS["labels"])
-        _attractors(stream, ROOTS["labels"], listed, alone, named=False)
+        _attractors(stream, ROOTS["labels"], dataset, alone, named=False)
 
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
@@ -87,7 +87,8 @@ def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame
     velocity = np.concatenate([entry.points[:, 1] for entry in listed])
     low, high = float(velocity.min()), float(velocity.max())
     pad = max(0.06 * (high - low), 0.05)
-    return frame.Frame((-np.pi, np.pi), (low - pad, high + pad), Units.of(dataset.attrs))
+    theta = plane.angles(dataset, np.concatenate([entry.points[:, 0] for entry in listed]))
+    return frame.Frame(theta, (low - pad, high + pad), Units.of(dataset.attrs))
 
 
 def _title(dataset: xr.Dataset, layer: str) -> str:
@@ -227,7 +228,7 @@ def _cover(
 def _attractors(
     stream: rr.RecordingStream,
     root: str,
-    listed: list[legend.Entry],
+    dataset: xr.Dataset,
     around: frame.Frame,
     *,
     named: bool,
@@ -240,8 +241,8 @@ def _attractors(
     colours: list[tuple[int, int, int]] = []
     tints: list[tuple[int, int, int]] = []
     sizes: list[float] = []
-    for entry in listed:
-        at = plane.copies(entry.points, *around.x)
+    for entry in legend.entries(dataset):
+        at = plane.copies(dataset, entry.points, *around.x)
         at = at[(at[:, 1] >= around.y[0]) & (at[:, 1] <= around.y[1])]
         here = [(float(x), float(v)) for x, v in at]
         spots += here

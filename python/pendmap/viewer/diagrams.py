@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["blueprint", "log"]
-
-ANGLES = (-math.pi, math.pi)
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
@@ -47,10 +44,11 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
             _points(stream, f"{root}/data/{k}/points", at, colour, size)
         _points(stream, f"exponent/data/{k}/points", one.exponents, colour, 1.5)
     values = dataset[str(dataset.attrs["varied"])].values
-    for name, height in (("up", 1.05), ("down", 1.11)):
+    low, high = plane.angles(dataset, dataset["point_theta"].values)
+    for name, height in (("up", 0.025), ("down", 0.055)):
         for k, one in enumerate(every):
             on = values[getattr(one, name)]
-            at = np.stack([on, np.full(on.size, ANGLES[1] * height)], axis=1)
+            at = np.stack([on, np.full(on.size, high + height * (high - low))], axis=1)
             _points(stream, f"bifurcation/data/{k}/{name}", at, one.rgb, 2.0)
     lines = ["| attractor | colour |", "|---|---|"]
     lines += [f"| {one.text} | {one.shade} |" for one in every[: drawn.MOST]]
@@ -80,8 +78,9 @@ def _frames(dataset: xr.Dataset) -> list[tuple[str, str, frame.Frame]]:
     speeds = plane.padded(np.append(dataset["point_velocity"].values, 0.0))
     growth = plane.padded(np.append(known, 0.0))
     exponent = f"exponent {names.per_time(units)}"
+    angles = plane.angles(dataset, dataset["point_theta"].values)
     return [
-        ("bifurcation", "Angles", frame.Frame(across, ANGLES, axes=(name, names.ANGLE))),
+        ("bifurcation", "Angles", frame.Frame(across, angles, axes=(name, names.ANGLE))),
         ("velocity", "Velocities", frame.Frame(across, speeds, axes=(name, names.speed(units)))),
         ("exponent", "Exponents", frame.Frame(across, growth, axes=(name, exponent))),
     ]

@@ -121,14 +121,16 @@ def _panels(dataset: xr.Dataset) -> dict[str, tuple[Panel, str]]:
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
     speeds = plane.padded(dataset["point_velocity"].values)
-    return frame.Frame((-math.pi, math.pi), speeds, Units.of(dataset.attrs))
+    angles = plane.angles(dataset, dataset["point_theta"].values)
+    return frame.Frame(angles, speeds, Units.of(dataset.attrs))
 
 
 def _attractor(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     name, kind = (str(dataset[key].values[0]) for key in ("attractor", "kind"))
-    _frame(dataset).log(stream, "attractor")
+    around = _frame(dataset)
+    around.log(stream, "attractor")
     points = _columns(dataset["point_theta"].values, dataset["point_velocity"].values)
-    at = plane.copies(points, -math.pi, math.pi).astype(np.float32)
+    at = plane.copies(dataset, points, *around.x).astype(np.float32)
     size = rr.Radius.ui_points(1.5 if kind.endswith("chaos") else 5.0)
     shown = rr.Points2D(at, colors=[palette.rgb(name, kind)], radii=size)
     stream.log("attractor/data/points", shown, static=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["blueprint", "log"]
 
-THETA = (-math.pi, math.pi)
-
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
     """Return the layout: the phase plane, legend and summary beside it."""
@@ -36,7 +33,8 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     """Log each orbit's path, pieces between two wraps, and its points."""
     frame.summary(stream, dataset)
-    _frame(dataset).log(stream, "phase")
+    around = _frame(dataset)
+    around.log(stream, "phase")
     orbits = drawn.closed(dataset)
     for one in orbits:
         colour = palette.rgb(one.name, one.kind)
@@ -45,7 +43,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
         if strips:
             path = rr.LineStrips2D(strips, colors=[colour], radii=thick)
             stream.log(f"phase/data/{one.id}/path", path, static=True)
-        at = plane.copies(one.points, *THETA).astype(np.float32)
+        at = plane.copies(dataset, one.points, *around.x).astype(np.float32)
         size = rr.Radius.ui_points(5.0 if one.stable else 3.0)
         points = rr.Points2D(at, colors=[colour], radii=size)
         stream.log(f"phase/data/{one.id}/points", points, static=True)
@@ -59,8 +57,9 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
-    speeds = drawn.speeds(drawn.closed(dataset), dataset)
-    return frame.Frame(THETA, speeds, Units.of(dataset.attrs))
+    orbits = drawn.closed(dataset)
+    angles, speeds = drawn.angles(orbits, dataset), drawn.speeds(orbits, dataset)
+    return frame.Frame(angles, speeds, Units.of(dataset.attrs))
 
 
 def _pieces(path: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float32]]:

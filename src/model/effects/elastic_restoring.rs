@@ -1,7 +1,7 @@
 //! A cable or a spiral spring that winds up turn by turn.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
+    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point,
     Power, Role,
 };
 use crate::lanes::Real;
@@ -24,7 +24,7 @@ impl Law for ElasticRestoring {
             meaning: "stiffness over the moment of inertia",
         }],
         revealed_by: "many turns in one direction",
-        mappable: Mappable::No,
+        mappable: Mappable::Yes,
     };
 
     #[inline(always)]
@@ -32,7 +32,7 @@ impl Law for ElasticRestoring {
         -(*k * at.theta)
     }
 
-    fn bars_maps(_: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
-        Some(NOT_PERIODIC)
+    fn counts_turns([k, ..]: &[f64; MOST_PARAMETERS]) -> bool {
+        *k != 0.0
     }
 }

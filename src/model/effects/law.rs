@@ -9,9 +9,8 @@ use crate::model::drive::Motion;
 /// No effect has more parameters.
 pub const MOST_PARAMETERS: usize = 3;
 
-/// Why a map cannot have a torque that differs from turn to turn.
-pub const NOT_PERIODIC: &str =
-    "it does not repeat every turn, and a map takes whole turns off the angle";
+/// Why a map cannot have a torque that differs from turn to turn, unless another one counts turns.
+pub const NOT_PERIODIC: &str = "it does not repeat every turn, and nothing bounds the angle";
 
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -304,6 +303,12 @@ pub trait Law {
     #[must_use]
     fn keeps_mirror(_: &[f64; MOST_PARAMETERS]) -> bool {
         true
+    }
+
+    /// Whether the torque pulls back from however many turns away, so that the angle lives on the line.
+    #[must_use]
+    fn counts_turns(_: &[f64; MOST_PARAMETERS]) -> bool {
+        false
     }
 
     /// Why a map over initial conditions cannot have the effect with these parameters; nothing

@@ -124,6 +124,15 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::counts_turns`].
+            #[must_use]
+            pub fn counts_turns(self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
+                match self {
+                    $(Self::$law => $module::$law::counts_turns(parameters),)*
+                    Self::Formula(formula) => formula.counts_turns(parameters),
+                }
+            }
+
             /// [`Law::bars_maps`].
             #[must_use]
             pub fn bars_maps(self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {

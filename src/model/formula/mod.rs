@@ -250,6 +250,12 @@ impl Formula {
         probe::mirrors(&self.tree, parameters, PI)
     }
 
+    /// Whether it pulls back from however many turns away.
+    #[must_use]
+    pub fn counts_turns(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
+        probe::pulls_back(&self.tree, parameters)
+    }
+
     /// Why a map cannot have it with these parameters.
     #[must_use]
     pub fn bars_maps(&self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
@@ -437,7 +443,7 @@ fn action(tree: &Tree, jumps: bool, only_rubs: bool, loaded: bool) -> Action {
 }
 
 fn bar(tree: &Tree, values: &[f64]) -> Option<&'static str> {
-    if !probe::repeats_every_turn(tree, values) {
+    if !probe::repeats_every_turn(tree, values) && !probe::pulls_back(tree, values) {
         return Some(NOT_PERIODIC);
     }
     (!probe::repeats_every_period(tree, values)).then_some(NOT_IN_STEP)

@@ -24,6 +24,8 @@ pub const NOWHERE: Place = Place {
 const CLOSE: f64 = 1e-9;
 /// The unit of time is changed by this much to see whether units balance.
 const UNIT: f64 = 1.37;
+/// An angle that many turns lead to.
+const FAR: f64 = 1e6;
 /// Where in their typical ranges parameters are tried.
 const PARTS: [f64; 3] = [0.23, 0.51, 0.87];
 
@@ -67,6 +69,12 @@ fn always(term: &Tree, values: &[f64], other: impl Fn(&Place) -> f64) -> bool {
 /// Whether the term is the same one turn on.
 pub fn repeats_every_turn(term: &Tree, values: &[f64]) -> bool {
     always(term, values, |at| term.value(values, &Place { theta: at.theta + TAU, ..*at }))
+}
+
+/// Whether the term pulls back, on both sides, from angles that many turns lead to.
+pub fn pulls_back(term: &Tree, values: &[f64]) -> bool {
+    let pull = |theta: f64, at: Place| theta.signum() * term.value(values, &Place { theta, ..at });
+    places().all(|at| [-FAR, FAR].iter().all(|theta| pull(*theta, at) < -1.0))
 }
 
 /// Whether the term is the same one period of the drive on.
