@@ -79,9 +79,10 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     as long again, in four windows. Windows that turn alike in regions that meet form a group; a
     set of groups that no trajectory leaves, with an exponent that is positive by four standard
     errors, is chaos of its kind, unless it holds a stable orbit of period 1 to 4 (Newton's method
-    from the least gaps of 64 by 64 starts) that captures it. Where friction holds rest, and could
-    end chaos, from sixteen of its points none may end within 5000 periods. What is left is
-    undecided.
+    from the least gaps of 64 by 64 starts) that captures it. A run goes on where nothing tells what
+    its last group leads to, and a set of fewer than 16 runs gets 16 more from its own points.
+    Beside another attractor, which could end chaos, none of 16 may end within 5000 periods. What is
+    left is undecided.
 
     Parameters
     ----------
