@@ -258,7 +258,7 @@ fn a_phase_drives_where_the_pivot_rests() {
 #[test]
 fn maps_refuse_formulas_that_do_not_repeat() {
     for (term, power, why) in [
-        ("-k*theta", 2.0, "every turn"),
+        ("k*theta", 2.0, "every turn"),
         ("-k*sin(theta/2)", 2.0, "every turn"),
         ("k*cos(phase/2)", 2.0, "every period"),
     ] {

@@ -30,14 +30,14 @@ impl<D: Degree> Function for Cosine<D> {
 impl Function for Wrapped {
     #[inline(always)]
     fn of<L: Lane>(x: L) -> L {
-        wrap(x).0
+        wrap(x, 0.5).0
     }
 }
 
 impl Function for Turns {
     #[inline(always)]
     fn of<L: Lane>(x: L) -> L {
-        wrap(x).1
+        wrap(x, 0.5).1
     }
 }
 
