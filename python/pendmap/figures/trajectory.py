@@ -175,7 +175,8 @@ def resting(dataset: xr.Dataset) -> npt.NDArray[np.float64]:
     begins, releases = times[kinds == "stick"], times[kinds == "release"]
     ends = np.append(releases, np.inf)[np.searchsorted(releases, begins)]
     spans = np.clip(np.stack([begins, ends], axis=1), first, last)
-    return spans[spans[:, 0] < spans[:, 1]]
+    within: npt.NDArray[np.float64] = spans[spans[:, 0] < spans[:, 1]]
+    return within
 
 
 def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
