@@ -78,7 +78,7 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
         thick = 1.5 if multiplier < 0 else 1.1
         both = [*chart.lines[multiplier], *chart.inverted_lines[multiplier]]
         axes.add_collection(LineCollection(both, colors=colour, linewidths=thick))
-    for look, (near, far) in zip(_LOOKS, chart.asymptotic.values(), strict=True):
+    for look, (near, far) in zip(_LOOKS, chart.asymptotic.values(), strict=False):
         axes.plot(near[:, 0], near[:, 1], linestyle=look, color=style.INK, linewidth=1.0)
         axes.plot(far[:, 0], far[:, 1], linestyle=look, color=style.INK, linewidth=0.5, alpha=0.45)
     axes.plot(chart.fold[:, 0], chart.fold[:, 1], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
@@ -125,7 +125,7 @@ def _legend(chart: drawn.Chart, *, own: bool, damped: bool) -> tuple[list[Any], 
     if (chart.fold == chart.fold).any(axis=0)[1]:
         fold = Line2D([], [], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
         entries.append((fold, "fold: the oscillation exists from here"))
-    for look, (name, parts) in zip(_LOOKS, chart.asymptotic.items(), strict=True):
+    for look, (name, parts) in zip(_LOOKS, chart.asymptotic.items(), strict=False):
         if np.isnan(parts).all():
             continue
         entries.append((Line2D([], [], color=style.INK, linewidth=1.0, linestyle=look), name))
