@@ -142,6 +142,24 @@ def test_sigterm_at_any_moment_leaves_whole_files_or_none(tmp_path: Path) -> Non
             assert pendmap.load(folder / "basins.nc").sizes["theta"] == 20
 
 
+def test_what_a_library_makes_of_a_signal_is_an_interrupt(
+    pendmap_command: Run, tmp_path: Path
+) -> None:
+    # A module in C that is stopped while it is imported says ImportError.
+    stub = tmp_path / "stub" / "matplotlib"
+    stub.mkdir(parents=True)
+    (stub / "__init__.py").write_text(
+        "import os, signal\n"
+        "try: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "except KeyboardInterrupt: raise ImportError('initialization failed')\n"
+    )
+    paths = os.pathsep.join([str(stub.parent), os.environ.get("PYTHONPATH", "")])
+    run = pendmap_command(*SMALL, env={"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"})
+    assert run.returncode == 130
+    assert run.stderr == "pendmap: interrupted, nothing was written\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["stub"]
+
+
 def test_ctrl_c_at_the_start_is_no_traceback(tmp_path: Path) -> None:
     # Before pendmap is imported at all it is Python that is interrupted.
     words = [sys.executable, "-X", "importtime", "-m", "pendmap", *SMALL]
