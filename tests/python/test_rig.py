@@ -142,4 +142,4 @@ def test_requests_are_checked_in_python_too() -> None:
 def test_no_parameter_of_an_effect_is_without_bound(name: str) -> None:
     for field in dataclasses.fields(EFFECTS[name]):
         with pytest.raises(InputError, match=rf"{field.name} is 1e\+300: allowed is "):
-            make(Request("free_decay", effects=(f"{name},{field.name}=1e300",)))
+            make(Request("forced", effects=(f"{name},{field.name}=1e300",)))
