@@ -71,6 +71,13 @@ def test_what_fits_is_kept(tmp_path: Path) -> None:
     assert pendmap.load(tmp_path / "m.nc").sizes["theta"] == 20
 
 
+def test_the_table_of_the_paper_that_does_not_fit_is_named(tmp_path: Path) -> None:
+    run = bounded(("paper", "table1"), tmp_path, 8192)
+    missed = "cannot write table_1.csv: File too large; written: nothing"
+    assert (run.returncode, run.stderr) == (1, f"pendmap: {missed}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_rig_and_a_figure_meet_a_full_disk(tmp_path: Path) -> None:
     run = bounded(("rig", "free_decay", "--duration", "9", "--out", "lab"), tmp_path, 8192)
     assert (run.returncode, len(run.stderr.splitlines())) == (1, 1)
@@ -241,6 +248,10 @@ def test_a_zarr_replaces_nothing_but_a_result(tmp_path: Path, result: xr.Dataset
     xr.Dataset({"x": ("t", [1.0])}).to_zarr(tmp_path / "other.zarr", zarr_format=2)
     with pytest.raises(InputError, match="something else"):
         pendmap.save(result, tmp_path / "other.zarr")
+    others = xr.Dataset({"x": ("t", [1.0])}, attrs={"format_version": 3, "kind": "raw"})
+    others.to_zarr(tmp_path / "marked.zarr", zarr_format=2)
+    with pytest.raises(InputError, match="something else"):
+        pendmap.save(result, tmp_path / "marked.zarr")
     assert (tmp_path / "foreign.zarr" / "thesis.tex").read_text() == "mine"
 
 

@@ -75,7 +75,7 @@ def command(  # noqa: PLR0913 (an option each)
     if as_json:
         click.echo(json.dumps({"files": written}))
     elif not quiet:
-        if paper_figures.TABLE in keys:
+        if any(Path(name).suffix == ".csv" for name in written):
             _say(paper_figures.report(seed))
         written.say()
     written.check()
@@ -91,8 +91,13 @@ def _files(
         if path.suffix != ".csv":
             yield functools.partial(paper_figures.draw, key, seed=seed), path
         if key == paper_figures.TABLE:
-            table = functools.partial(paper_figures.write_table, paper_figures.report(seed))
-            yield table, path.with_suffix(".csv")
+            yield functools.partial(_write_table, seed), path.with_suffix(".csv")
+
+
+def _write_table(seed: int, path: Path) -> Path:
+    from pendmap import paper_figures
+
+    return paper_figures.write_table(paper_figures.report(seed), path)
 
 
 def _say(found: IdentificationReport) -> None:
