@@ -47,7 +47,7 @@ def figure(
     at = {str(name): p[:, k] for k, name in enumerate(dataset["branch"].values)}
     apart = np.abs(at["forward"] - at["backward"])
     alike = bool(np.isfinite(apart).any()) and np.nanmax(apart) < 1e-9 * top
-    there = [name for name, values in at.items() if np.isfinite(values).any()]
+    there = [name for name, values in at.items() if (values <= top).any()]
     looped = "loop" in at
     branches = ["forward"] if alike and not looped else there
     handles, texts = [], []
