@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from pendmap import _core, grid
+from pendmap import _core, checks, grid
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.separatrices import loop, separatrix
@@ -141,6 +141,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         "p_backward": at["backward"],
         "p_loop": at.get("loop", math.nan),
         "p_tangency": math.nan,
+        "simd": checks.instruction_set(),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pendmap.checks import MOST_SEED
+from pendmap.cli.options import simd_option
 from pendmap.cli.show import write_all
 from pendmap.cli.types import OutputFile, Whole
 
@@ -41,6 +42,7 @@ _PICTURES = (".png", ".svg", ".pdf")
     "--seed", type=Whole(0, MOST_SEED), default=0, help="Of the rig's noise.  [default: 0]"
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@simd_option
 @click.option("--quiet", is_flag=True, help="Do not say what was written.")
 def command(  # noqa: PLR0913 (an option each)
     *,
