@@ -132,7 +132,8 @@ def _legend(chart: drawn.Chart, *, own: bool, damped: bool) -> tuple[list[Any], 
     if _ends_in_view(chart):
         edge = Line2D([], [], color="#c8c8c8", linewidth=3.0)
         entries.append((edge, "largest p computed"))
-    if own:
+    (left, right), (low, high) = chart.x, chart.y
+    if own and left <= chart.own[0] <= right and low <= chart.own[1] <= high:
         star = Line2D([], [], color=style.INK, marker="*", markersize=9, linestyle="none")
         entries.append((star, "this pendulum"))
     return [e[0] for e in entries], [e[1] for e in entries]
