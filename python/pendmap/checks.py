@@ -17,6 +17,7 @@ __all__ = [
     "MOST_THREADS",
     "call",
     "flag",
+    "instruction_set",
     "number",
     "of_type",
     "shown",
@@ -44,6 +45,22 @@ def shown(value: object) -> str:
 def _bare(value: Any) -> Any:  # noqa: ANN401 (whatever was given)
     """Take a number out of numpy's scalars and arrays without dimensions."""
     return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+
+
+def instruction_set() -> str:
+    """Return the instruction set that is computed with.
+
+    Raises
+    ------
+    InputError
+        If ``PENDMAP_SIMD`` names none that this processor has.
+    """
+    from pendmap import _core  # noqa: PLC0415 (heavy; the command line reads only the bounds)
+
+    try:
+        return _core.simd()
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 def number(name: str, value: object) -> float:

@@ -208,6 +208,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         "own_p": pendulum.p,
         "own_omega": pendulum.omega,
         "seconds": time.perf_counter() - began,
+        "simd": checks.instruction_set(),
         "threads": workers or _core.default_threads(),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,

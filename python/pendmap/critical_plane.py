@@ -31,10 +31,14 @@ def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
 
 
 def window(omega: Floats, p_max: float, plane: str) -> tuple[tuple[float, float], float]:
-    """Return from where to where a picture is wide, and up to where it is high from 0."""
+    """Return from where to where a picture is wide, and up to where it is high from 0.
+
+    A single frequency stands in the middle.
+    """
     low, high = float(omega[0]), float(omega[-1])
     if plane == PLANES[0]:
-        return (low, high), p_max
+        aside = 0.0 if low < high else 0.05 * low
+        return (low - aside, high + aside), p_max
     return (0.0, 1 / low**2), min(_HIGHEST, p_max / low**2)
 
 

@@ -190,8 +190,9 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
     with open(source, "rb", opener=_at_once) as stream:
         _check_regular(source, os.fstat(stream.fileno()).st_mode)
         data = bytearray()
-        while len(data) <= most and (read := stream.read(_PROBE)):
-            data += read
+        with _named(source):
+            while len(data) <= most and (read := stream.read(_PROBE)):
+                data += read
     if len(data) > most:
         raise InputError(
             f"{source}: is larger than {most / 2**20:g} MiB: allowed are smaller files"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from pendmap import _core, grid
+from pendmap import _core, checks, grid
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.separatrices import loop, separatrix
@@ -84,8 +84,9 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         ``p_melnikov`` over ``omega`` and ``branch`` (forward, backward, before them loop where the
         torque keeps up a rotation); nan where the drive's work cannot be told from rounding. The
         attributes hold the values at the model's own frequency: ``p_forward``, ``p_backward``,
-        ``p_loop`` (nan without a loop) and ``p_melnikov``, that of the loop where there is one,
-        else the lower of the others. ``p_tangency`` is nan: to be computed by following manifolds.
+        ``p_loop`` (nan without a torque) and ``p_melnikov``, that of the loop where the torque
+        keeps up a rotation, else the lower of the others. ``p_tangency`` is nan: to be computed by
+        following manifolds.
 
     Raises
     ------
@@ -110,15 +111,17 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     frequencies = grid.frequencies(omega)
     try:
         orbits, sense = _orbits(pendulum)
-        own, *curve = (
+        at = {name: _threshold(pendulum, pendulum.omega, orbit) for name, orbit in orbits.items()}
+        if not sense:
+            orbits.pop("loop", None)
+        curve = [
             [_threshold(pendulum, float(w), orbit) for orbit in orbits.values()]
-            for w in (pendulum.omega, *frequencies)
-        )
+            for w in frequencies
+        ]
     except ValueError as error:
         raise InputError(str(error)) from None
-    at = dict(zip(orbits, own, strict=True))
-    known = [p for p in own if math.isfinite(p)]
-    first = at["loop"] if "loop" in at else min(known, default=math.nan)
+    known = [at[name] for name in orbits if math.isfinite(at[name])]
+    first = at["loop"] if sense else min(known, default=math.nan)
     dataset = xr.Dataset(
         {
             "p_melnikov": (
@@ -143,6 +146,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         "p_backward": at["backward"],
         "p_loop": at.get("loop", math.nan),
         "p_tangency": math.nan,
+        "simd": checks.instruction_set(),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
@@ -164,10 +168,11 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
             f"torque must be above -1 and below 1 for Melnikov's criterion, got {torque:.6g}: "
             "a larger one leaves no upright rest"
         )
-    sense = max(won, key=lambda name: won[name])
-    if won[sense] <= _ROUNDING or abs(torque) <= _ROUNDING:
+    if abs(torque) <= _ROUNDING:
         return orbits, ""
-    return {"loop": loop(torque), **orbits}, sense
+    sense = max(won, key=lambda name: won[name])
+    kept_up = won[sense] > _ROUNDING
+    return {"loop": loop(torque), **orbits}, sense if kept_up else ""
 
 
 def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
@@ -227,6 +232,8 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
     lines = []
     if sense:
         lines.append(f"The torque keeps up the rotation {sense}: it belongs to the potential.")
+    elif "loop" in own:
+        lines.append("The torque is not above the losses of a turn: a perturbation as they are.")
     if sense and "loop" in known:
         lines.append(
             f"Homoclinic tangles on the loop of upright rest from p = {first:.9g} on, {where} "
@@ -247,12 +254,17 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
             f"Homoclinic tangles {name} from p = {p:.9g} on, {where} (Melnikov, first order)."
             for name, p in apart.items()
         ]
+    if not sense and "loop" in known:
+        lines.append(
+            "On the loop that the torque makes of upright rest they begin at p = "
+            f"{known['loop']:.9g}."
+        )
     if hidden := [name for name in own if name not in known]:
         names = " and ".join(hidden)
         lines.append(f"No threshold {where} ({names}): rounding hides the drive's work.")
-    if first == 0:
+    if own.get("loop", first) == 0:
         return [*lines, "Without damping nothing attracts, and there are no basins."]
-    if math.isfinite(first) and pendulum.p:
+    if first > 0 and pendulum.p:
         ratio = abs(pendulum.p) / first
         side = "above" if ratio > 1 else "below"
         lines.append(f"The pendulum's own p = {pendulum.p:g} lies {side}: {ratio:.3g} of it.")

@@ -158,7 +158,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         "cells": grid.cells,
         "begun": raw["begun"],
         "seconds": time.perf_counter() - began,
-        "simd": _core.simd(),
+        "simd": checks.instruction_set(),
         "threads": workers or _core.default_threads(),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,

@@ -127,7 +127,7 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
         said = json.loads((target / ".zattrs").read_bytes())
     except (FileNotFoundError, ValueError):
         said = {}
-    if not isinstance(said, dict) or not said.keys() >= _MARKS:
+    if not isinstance(said, dict) or not said.keys() >= _MARKS or said["kind"] not in [*KINDS]:
         raise InputError(f"{target}: is a folder of something else: {allowed}")
     for entry in target.rglob("*"):
         if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):

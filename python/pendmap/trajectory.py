@@ -184,6 +184,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "stuck": int(raw["stuck"]),
         "lyapunov": int(lyapunov),
         **_exponent(raw, time, units),
+        "simd": checks.instruction_set(),
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }

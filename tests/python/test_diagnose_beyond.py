@@ -107,3 +107,22 @@ def test_a_model_that_cannot_be_given_out_costs_no_verdict(
         assert "Verdict: named" in said
         assert f"Not computed: model_file: {LOST}" in said
     assert not (tmp_path / "m.toml").exists()
+
+
+def test_records_of_another_law_are_refused_by_their_name(tmp_path: Path) -> None:
+    # Of a spring: gravity goes to nothing, and the fit's own derivatives are lost.
+    t = np.arange(0, 30, 0.02)
+    record = tmp_path / "spring.csv"
+    rows = np.c_[t, 3.1 * np.exp(-0.5 * t) * np.cos(6 * t)]
+    np.savetxt(record, rows, "%.6f", ",", header="t_s,theta_rad", comments="")
+    with pytest.raises(InputError, match=r"spring\.csv: no model follows these records: "):
+        pendmap.discrepancy.diagnose(pendmap.read_experiment(record))
+
+
+def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Path) -> None:
+    record = tmp_path / "run.csv"
+    rows = "".join(f"{k / 100},{np.exp(-k / 2000) * np.cos(k / 20):.4f}\n" for k in range(1500))
+    record.write_text(rows)
+    model = pendmap.Rig.of(w0=5.0, torque=1e9)
+    with pytest.raises(InputError, match=r"run\.csv: no model follows these records: "):
+        pendmap.discrepancy.diagnose(pendmap.read_experiment(record), model=model)

@@ -71,6 +71,13 @@ def test_what_fits_is_kept(tmp_path: Path) -> None:
     assert pendmap.load(tmp_path / "m.nc").sizes["theta"] == 20
 
 
+def test_the_table_of_the_paper_that_does_not_fit_is_named(tmp_path: Path) -> None:
+    run = bounded(("paper", "table1"), tmp_path, 8192)
+    missed = "cannot write table_1.csv: File too large; written: nothing"
+    assert (run.returncode, run.stderr) == (1, f"pendmap: {missed}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_rig_and_a_figure_meet_a_full_disk(tmp_path: Path) -> None:
     run = bounded(("rig", "free_decay", "--duration", "9", "--out", "lab"), tmp_path, 8192)
     assert (run.returncode, len(run.stderr.splitlines())) == (1, 1)
@@ -140,6 +147,24 @@ def test_sigterm_at_any_moment_leaves_whole_files_or_none(tmp_path: Path) -> Non
             assert process.returncode in {0, 130}
         if "basins.nc" in names:
             assert pendmap.load(folder / "basins.nc").sizes["theta"] == 20
+
+
+def test_what_a_library_makes_of_a_signal_is_an_interrupt(
+    pendmap_command: Run, tmp_path: Path
+) -> None:
+    # A module in C that is stopped while it is imported says ImportError.
+    stub = tmp_path / "stub" / "matplotlib"
+    stub.mkdir(parents=True)
+    (stub / "__init__.py").write_text(
+        "import os, signal\n"
+        "try: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "except KeyboardInterrupt: raise ImportError('initialization failed')\n"
+    )
+    paths = os.pathsep.join([str(stub.parent), os.environ.get("PYTHONPATH", "")])
+    run = pendmap_command(*SMALL, env={"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"})
+    assert run.returncode == 130
+    assert run.stderr == "pendmap: interrupted, nothing was written\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["stub"]
 
 
 def test_ctrl_c_at_the_start_is_no_traceback(tmp_path: Path) -> None:
@@ -223,6 +248,10 @@ def test_a_zarr_replaces_nothing_but_a_result(tmp_path: Path, result: xr.Dataset
     xr.Dataset({"x": ("t", [1.0])}).to_zarr(tmp_path / "other.zarr", zarr_format=2)
     with pytest.raises(InputError, match="something else"):
         pendmap.save(result, tmp_path / "other.zarr")
+    others = xr.Dataset({"x": ("t", [1.0])}, attrs={"format_version": 3, "kind": "raw"})
+    others.to_zarr(tmp_path / "marked.zarr", zarr_format=2)
+    with pytest.raises(InputError, match="something else"):
+        pendmap.save(result, tmp_path / "marked.zarr")
     assert (tmp_path / "foreign.zarr" / "thesis.tex").read_text() == "mine"
 
 

@@ -267,7 +267,16 @@ def test_an_instruction_set_that_is_asked_for_counts_for_one_command(
 ) -> None:
     monkeypatch.delenv("PENDMAP_SIMD", raising=False)
     for path in available_paths():
-        for words in ("basins --p 0.6 --grid 8", "orbit --p 0.6 --grid 8", "lyapunov --p 0.6"):
+        for words in (
+            "basins --p 0.6 --grid 8",
+            "map --p 0.5:0.6:2 --omega 2:2.1:2",
+            "bifurcation --vary p 0.5:0.6:2",
+            "orbit --p 0.6 --grid 8",
+            "lyapunov --p 0.6",
+            "tongues --omega 2",
+            "melnikov",
+            "simulate --until 5",
+        ):
             line = ["pendmap", *words.split(), "--simd", path, "--json", "--quiet"]
             monkeypatch.setattr(sys, "argv", line)
             with pytest.raises(SystemExit) as end:
@@ -275,6 +284,17 @@ def test_an_instruction_set_that_is_asked_for_counts_for_one_command(
             assert not end.value.code
             assert json.loads(capsys.readouterr().out)["simd"] == path
             assert "PENDMAP_SIMD" not in os.environ
+    monkeypatch.setenv("PENDMAP_SIMD", "mmx")
+    for words in ("basins --grid 8", "tongues --omega 2", "melnikov", "simulate", "orbit", "info"):
+        monkeypatch.setattr(sys, "argv", ["pendmap", *words.split(), "--json"])
+        with pytest.raises(SystemExit) as end:
+            cli.run()
+        assert end.value.code == 2
+        said = capsys.readouterr()
+        assert not said.out
+        assert said.err.startswith("pendmap: PENDMAP_SIMD is 'mmx': ")
+        assert said.err.count("\n") == 1
+    monkeypatch.delenv("PENDMAP_SIMD")
     monkeypatch.setattr(sys, "argv", ["pendmap", "basins", "--simd", "mmx"])
     with pytest.raises(SystemExit) as end:
         cli.run()

@@ -247,6 +247,38 @@ def test_a_bias_torque_is_a_torque_and_a_weak_one_a_perturbation() -> None:
         assert found.attrs["p_melnikov"] == pytest.approx(formula(0.1, 2.0), rel=10 * torque)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_loop_stands_beside_what_a_weak_torque_perturbs(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    gamma, omega = float(random.uniform(0.02, 0.2)), float(random.uniform(0.5, 2.5))
+    torque = 4 * gamma / math.pi * float(random.uniform(0.1, 1.0)) * (-1) ** seed
+    found = pendmap.melnikov(Pendulum(gamma=gamma, omega=omega, torque=torque), [omega])
+    expected, _ = loop_by_scipy(gamma, omega, 0.0, abs(torque))
+    assert found.attrs["p_loop"] == pytest.approx(expected, rel=1e-8)
+    assert found.attrs["p_melnikov"] < found.attrs["p_loop"]
+    assert found["branch"].values.tolist() == ["forward", "backward"]
+    assert "perturbation" in found.attrs["summary"]
+
+
+def test_losses_that_a_torque_makes_up_for_are_losses_still() -> None:
+    made_up = Pendulum(gamma=0.1, omega=2.0, torque=0.4 / math.pi)
+    said = pendmap.melnikov(made_up, [2.0]).attrs
+    assert said["p_melnikov"] == pytest.approx(0.0, abs=1e-12)
+    assert "fractal" in said["summary"]
+    assert "Without damping" not in said["summary"]
+    free = pendmap.melnikov(Pendulum(gamma=0.0, omega=2.0, torque=0.3), [2.0])
+    assert "Without damping" in free.attrs["summary"]
+
+
+def test_the_figure_names_what_it_shows() -> None:
+    # Heteroclinic thresholds lie above what is shown.
+    found = pendmap.melnikov(Pendulum(gamma=0.02, p=0.1, torque=0.5), np.linspace(1.5, 2.5, 11))
+    assert found["p_melnikov"].sel(branch="forward").values.min() > 1
+    texts = named(made(found))
+    assert any("loop" in text for text in texts)
+    assert not any("heteroclinic" in text for text in texts)
+
+
 @pytest.mark.parametrize("torque", [1.0, -1.0, 1.3])
 def test_no_rest_no_loop(torque: float) -> None:
     with pytest.raises(pendmap.InputError, match="torque must be above -1 and below 1"):

@@ -146,3 +146,17 @@ def test_the_last_digit_of_a_file_is_no_counter(tmp_path: Path) -> None:
     (run,) = pendmap.read_experiment(path).runs
     assert run.count_rad == pytest.approx(1e-6)
     assert "a turn" not in as_text(pendmap.read_experiment(path))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_stamps_that_differ_by_rounding_are_one(tmp_path: Path, seed: int) -> None:
+    # As of a clock that was set back by seconds: its stamps come again, a digit off.
+    rng = np.random.default_rng(seed)
+    time, theta = clean()
+    again = rng.choice(np.arange(1, time.size - 1), 20, replace=False)
+    ulps = rng.choice([-2, -1, 1, 2], again.size) * np.spacing(time[-1])
+    stamps = np.concatenate([time, time[again] + ulps])
+    order = np.argsort(stamps) if seed % 2 else np.arange(stamps.size)
+    run = read(tmp_path, text((stamps[order], np.r_[theta, theta[again]][order]), form="%.17g"))
+    np.testing.assert_allclose(run.time, time, atol=1e-9)
+    np.testing.assert_allclose(run.theta, theta, atol=1e-9)

@@ -6,6 +6,7 @@ import base64
 import dataclasses
 import math
 import re
+import resource
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING
 
@@ -251,6 +252,20 @@ def test_a_file_of_each_kind(tmp_path: Path) -> None:
         assert (tmp_path / name).exists()
     with pytest.raises(InputError, match=r"\.pdf.*\.html, \.md"):
         figures.write_report(found, tmp_path / "c.pdf")
+
+
+@pytest.mark.parametrize("name", ["new", "there", "a.md", "a.html"])
+def test_a_report_that_does_not_fit_leaves_nothing(name: str, tmp_path: Path) -> None:
+    found = once("quadratic_drag")
+    (tmp_path / "there").mkdir()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))  # most figures fit
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            figures.write_report(found, tmp_path / name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
 
 
 @pytest.mark.parametrize("report", ["a.pdf", "absent/report", "file"])

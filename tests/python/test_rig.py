@@ -136,3 +136,10 @@ def test_requests_are_checked_in_python_too() -> None:
         Request("hidden", size=math.nan)
     with pytest.raises(InputError, match="noise is inf"):
         make(Request("hidden", noise=math.inf))
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_no_parameter_of_an_effect_is_without_bound(name: str) -> None:
+    for field in dataclasses.fields(EFFECTS[name]):
+        with pytest.raises(InputError, match=rf"{field.name} is 1e\+300: allowed is "):
+            make(Request("forced", effects=(f"{name},{field.name}=1e300",)))

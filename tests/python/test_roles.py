@@ -6,6 +6,8 @@ import copy
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import pendmap
 from pendmap import InputError
@@ -115,6 +117,28 @@ def test_roles_in_a_formula_are_declared_or_seen(
     values = dict.fromkeys(parameters, 1.0)
     expected = [n for n, role in zip(parameters, roles, strict=True) if role in {"size", "phase"}]
     assert formula(**values).sizes == expected
+
+
+ranges = st.tuples(st.floats(-3, 3), st.floats(0.01, 3)).map(lambda at: (at[0], sum(at)))
+shapes = st.sampled_from(["width", "place", "power", "order", "time constant"])
+
+
+@given(first=ranges, second=ranges, roles=st.tuples(shapes, shapes))
+def test_a_search_looks_where_is_typical(
+    first: tuple[float, float], second: tuple[float, float], roles: tuple[str, str]
+) -> None:
+    said = dict(zip("bc", zip((first, second), roles, strict=True), strict=True))
+    shape = {n: {"power": 0, "role": r, "typical": typical} for n, (typical, r) in said.items()}
+    formula = pendmap.Formula("own_effect", "-k*exp(-(b*theta)^2)*v/(1+c^2)", {"k": 1} | shape)
+    ((*found,),) = (c for c in candidates((), driven=False, own=[formula]) if c[0].formula)
+    assert found
+    for one in found:
+        for name, ((low, high), role) in said.items():
+            rounded = 0.5 if role == "order" else 1e-12
+            assert low - rounded <= one.shape[name] <= high + rounded
+            assert role != "order" or one.shape[name] == round(one.shape[name])
+    scanned = [one.shape["b"] for one in found]
+    assert scanned == sorted(set(scanned))
 
 
 def test_a_role_that_does_not_exist_is_refused() -> None:

@@ -14,6 +14,7 @@ from matplotlib.colors import to_rgb
 import pendmap
 from drawn import made, named
 from pendmap import InputError, Pendulum, figures, palette, viewer
+from pendmap.figures.trajectory import resting
 from pendmap.pictures import planes
 from pendmap.pictures.selection import shown
 from recordings import recorded
@@ -246,6 +247,12 @@ def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path) -> None:
         (DIAGRAM.isel(entry=slice(1, None)), "entry: a selection of it cannot be drawn"),
         (DIAGRAM.isel(kind=slice(1, None)), "kind: a selection of kinds cannot be drawn"),
         (PLANE.isel(set=slice(1, None)), "set: a selection of it cannot be drawn"),
+        (PLANE.isel(set=0), "regime_kinds is over nothing here: allowed is over set"),
+        (MAP.isel(attractor=[0]), "attractor: a selection of it cannot be drawn"),
+        (MAP.isel(attractor=[2], theta=slice(0, 4)), "attractor: a selection of it cannot be"),
+        (MAP.isel(attractor=0), "fraction is over nothing here: allowed is over attractor"),
+        (MAP.where(MAP["theta"] > 0, drop=True), "fraction is over attractor, theta here"),
+        (MAP[["label"]], "fraction is missing here: allowed is over attractor"),
     ):
         for write, name in ((figures.draw, "a.png"), (viewer.record, "a.rrd")):
             with pytest.raises(InputError, match=says):
@@ -265,3 +272,49 @@ def test_a_part_says_what_its_summary_is_of(tmp_path: Path) -> None:
     pendmap.save(part, tmp_path / "part.nc")
     again = pendmap.load(tmp_path / "part.nc")
     assert made(again).axes[0].get_xlim() == pytest.approx((-math.pi, -math.pi / 9))
+
+
+RUN = pendmap.simulate(Pendulum(p=1.5, omega=0.87, theta_r=0.2), 1.0, 0.0, 120)
+TIMES = RUN["time"].values
+
+
+@settings(max_examples=6, phases=FEW)
+@given(
+    first=st.integers(0, TIMES.size // 2),
+    count=st.integers(2, TIMES.size // 2),
+    step=st.integers(-3, 3).filter(bool),
+)
+def test_a_part_of_a_trajectory(first: int, count: int, step: int) -> None:
+    part = RUN.isel(time=slice(first, first + count)).isel(time=slice(None, None, step))
+    low, high = float(part["time"].min()), float(part["time"].max())
+    figure = made(part)
+    for axes in figure.axes[:2]:
+        assert axes.get_xlim() == pytest.approx((low, high))
+    points = [line.get_xydata() for line in figure.axes[3].lines]
+    inside = (low <= RUN["section_time"]) & (RUN["section_time"] <= high)
+    assert sum(map(len, points)) == int(inside.sum())
+    # At rest is what has not moved at all: friction holds it from one event to the next.
+    held = resting(shown(part))
+    middle = 0.5 * (TIMES[:-1] + TIMES[1:])
+    still = np.diff(RUN["theta"].values) == 0.0
+    within = np.any([(begin < middle) & (middle < end) for begin, end in held], axis=0)
+    seen = (low < middle) & (middle < high)
+    # In the samples in which a stick begins or ends it moves as well.
+    assert np.count_nonzero((within != still)[seen]) <= 2 * max(len(held), 1)
+
+
+@pytest.mark.usefixtures("strict_recordings")
+def test_inverted_rest_is_stable_at_the_frequencies_that_are_there(tmp_path: Path) -> None:
+    found = pendmap.tongues(Pendulum(), np.linspace(4.0, 9.0, 11), 20.0)
+    part = shown(found.isel(omega=slice(None, 3, -2)))
+    own = part["omega"].values[part["inverted_index"].values]
+    assert own.size
+    assert list(zip(own, part["inverted_p"].values, strict=True)) == [
+        (omega, p)
+        for omega, p in zip(found["inverted_omega"].values, found["inverted_p"].values, strict=True)
+        if omega in part["omega"].values
+    ]
+    alone = found.isel(omega=slice(10, 11))
+    low, high = made(alone).axes[0].get_xlim()
+    assert low < 9.0 < high
+    viewer.record(alone, tmp_path / "a.rrd")

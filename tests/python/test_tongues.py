@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
-from drawn import made
+from drawn import made, named
 from pendmap import Effect, Formula, Pendulum, Rig, asymptotic, figures
 from pendmap.pictures import tongues as drawn
 from recordings import recorded
@@ -415,3 +415,9 @@ def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
     assert "unstable from p = 0 on at omega = 2." in found.attrs["summary"]
     assert "soonest" not in found.attrs["summary"]
     assert found.attrs["title"] == "\N{GREEK SMALL LETTER GAMMA} = 0"
+
+
+def test_the_legend_names_the_pendulum_where_it_is_in_view() -> None:
+    for omega, shown in (([1.5, 2.5], True), ([6.0, 8.0], False)):
+        texts = named(made(pendmap.tongues(DAMPED, omega, 6.0)))
+        assert ("this pendulum" in texts) == shown

@@ -51,6 +51,13 @@ def test_what_is_no_file_is_refused_without_waiting(tmp_path: Path, suffix: str,
         READERS[suffix](source)
 
 
+@pytest.mark.skipif(not os.path.exists("/proc/self/mem"), reason="needs a file that fails")  # noqa: PTH110
+def test_a_file_that_cannot_be_read_is_named() -> None:
+    with pytest.raises(OSError, match="error") as failed:
+        pendmap.load_model("/proc/self/mem")
+    assert failed.value.filename == "/proc/self/mem"
+
+
 def test_formulas_and_descriptions_are_files_too(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "experiment.toml")
     with pytest.raises(InputError):

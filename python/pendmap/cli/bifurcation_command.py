@@ -70,6 +70,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "failed",
         "chaos_periods",
         "seconds",
+        "simd",
         "threads",
         "reached_error",
     )

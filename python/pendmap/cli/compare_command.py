@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from pendmap.checks import MOST_SEED, MOST_THREADS
+from pendmap.checks import MOST_SEED, MOST_THREADS, instruction_set
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import simd_option
@@ -82,7 +82,8 @@ def command(  # noqa: PLR0913 (an option each)
         draw = functools.partial(figures.draw_comparison, comparison)
         written = write_all([(draw, plot)], keep=True)
     if as_json:
-        click.echo(json.dumps(plain(fields(comparison) | {"model": str(model)}), allow_nan=False))
+        more = {"model": str(model), "simd": instruction_set()}
+        click.echo(json.dumps(plain(fields(comparison) | more), allow_nan=False))
     elif not quiet:
         doubts = list(doubts_said(experiment, *(one.run for one in comparison.every)))
         for line in doubts:

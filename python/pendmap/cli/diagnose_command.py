@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pendmap.checks import instruction_set
 from pendmap.cli.inputs import keep_inputs, report_files
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import check_view, simd_option
@@ -144,8 +145,8 @@ def command(  # noqa: PLR0913 (an option each)
     if as_json:
         from pendmap.discrepancy.summary import as_json as fields
 
-        model_file = {"model": written.name(outputs[0])}
-        click.echo(json.dumps(plain(fields(found) | model_file), allow_nan=False))
+        more = {"model": written.name(outputs[0]), "simd": instruction_set()}
+        click.echo(json.dumps(plain(fields(found) | more), allow_nan=False))
     elif not quiet:
         _say(found)
         written.say()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.checks import instruction_set
 from pendmap.cli.options import Outputs, output_options, simd_option
 from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
 
@@ -100,7 +101,7 @@ def _show(report: IdentificationReport, outputs: Outputs, model: str | None = No
     if outputs.as_json:
         from pendmap.identification.summary import as_json
 
-        fields = as_json(report) | {"model": model}
+        fields = as_json(report) | {"model": model, "simd": instruction_set()}
         click.echo(json.dumps(plain(fields), allow_nan=False))
     elif not outputs.quiet:
         _say(report)

@@ -28,12 +28,9 @@ _LEANS_ON = (
 def command(*, as_json: bool) -> None:
     """Show the version, the instruction set used, the threads."""
     from pendmap import _core
-    from pendmap.errors import InputError
+    from pendmap.checks import instruction_set
 
-    try:
-        simd = _core.simd()
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    simd = instruction_set()
     versions = {name: _version(name) for name in _LEANS_ON}
     facts = {
         "version": _core.__version__,

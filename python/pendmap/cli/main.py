@@ -165,42 +165,49 @@ def _stoppable(stops: list[int]) -> Iterator[None]:
 
 def _exit_code(stops: Sequence[int]) -> int:
     try:
-        return _ended()
-    except (click.Abort, KeyboardInterrupt) as stop:
-        # click makes an Abort of the interrupt that names what is complete.
-        files = (stop.__cause__ or stop.__context__ or stop).args
-    except Exception:
-        if not stops:
-            raise
-        files = ()  # a library made an error of its own of the interrupt
+        result = command.main(prog_name="pendmap", standalone_mode=False)
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (told apart below)
+        interrupted = isinstance(error, (click.Abort, KeyboardInterrupt))
+        # What a library makes of a signal, in the middle of its import for one, is the signal; a
+        # trajectory that is stopped is written, and may not fit.
+        if interrupted or (stops and not isinstance(error, NotWrittenError)):
+            return _interrupted(error)
+        return _failed(error)
+    return result if isinstance(result, int) else 0
+
+
+def _interrupted(error: BaseException) -> int:
+    # click makes an Abort of the interrupt that names what is complete.
+    chain = (error, error.__cause__, error.__context__)
+    stop = next((e for e in chain if isinstance(e, KeyboardInterrupt) and e.args), None)
+    files = stop.args if stop else ()
     _say(f"interrupted, {', '.join(files) or 'nothing was'} written")
     return INTERRUPTED
 
 
-def _ended() -> int:  # noqa: PLR0911 (one for each way to end)
-    try:
-        result = command.main(prog_name="pendmap", standalone_mode=False)
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message(), err=True)
-        return BAD_INPUT
-    except click.ClickException as error:
-        return _refuse(error.format_message())
-    except InputError as error:
-        return _refuse(str(error))
-    except _ReaderGone:
-        # No message, and none from the interpreter at the end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 128 + signal.SIGPIPE
-    except MemoryError as error:
-        return _refuse(f"not enough memory: {str(error) or 'choose a smaller grid'}")
-    except NotWrittenError as error:
-        _say(str(error))
-        return FAILED
-    except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        _say(f"{where}{error.strerror or error}")
-        return FAILED if error.errno in _FULL else BAD_INPUT
-    return result if isinstance(result, int) else 0
+def _failed(error: BaseException) -> int:  # noqa: PLR0911 (one for each way to end)
+    match error:
+        case click.exceptions.NoArgsIsHelpError():
+            click.echo(error.format_message(), err=True)
+            return BAD_INPUT
+        case click.ClickException():
+            return _refuse(error.format_message())
+        case InputError():
+            return _refuse(str(error))
+        case _ReaderGone():
+            # No message, and none from the interpreter at the end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 128 + signal.SIGPIPE
+        case MemoryError():
+            return _refuse(f"not enough memory: {str(error) or 'choose a smaller grid'}")
+        case NotWrittenError():
+            _say(str(error))
+            return FAILED
+        case OSError():
+            where = f"{error.filename}: " if error.filename else ""
+            _say(f"{where}{error.strerror or error}")
+            return FAILED if error.errno in _FULL else BAD_INPUT
+    raise error
 
 
 def _refuse(message: str) -> int:

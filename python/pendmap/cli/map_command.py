@@ -64,6 +64,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "failed",
         "chaos_periods",
         "seconds",
+        "simd",
         "threads",
         "reached_error",
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.model_options import model_from, model_options
-from pendmap.cli.options import Outputs, output_options
+from pendmap.cli.options import Outputs, output_options, simd_option
 from pendmap.cli.show import show
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ __all__ = ["command"]
 
 @click.command("melnikov")
 @model_options
+@simd_option
 @click.option("--quiet", is_flag=True, help="No summary.")
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
@@ -39,5 +40,5 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the JSON object of Melnikov's threshold; p_tangency is not computed yet."""
     a = dataset.attrs
-    names = ("units", "p_melnikov", "p_tangency", "p_forward", "p_backward", "p_loop")
+    names = ("units", "p_melnikov", "p_tangency", "p_forward", "p_backward", "p_loop", "simd")
     return {**{name: a[name] for name in names}, "summary": a["summary"].split("\n")}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pendmap.checks import MOST_SEED
+from pendmap.cli.options import simd_option
 from pendmap.cli.show import write_all
 from pendmap.cli.types import OutputFile, Whole
 
@@ -41,6 +42,7 @@ _PICTURES = (".png", ".svg", ".pdf")
     "--seed", type=Whole(0, MOST_SEED), default=0, help="Of the rig's noise.  [default: 0]"
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@simd_option
 @click.option("--quiet", is_flag=True, help="Do not say what was written.")
 def command(  # noqa: PLR0913 (an option each)
     *,
@@ -75,7 +77,7 @@ def command(  # noqa: PLR0913 (an option each)
     if as_json:
         click.echo(json.dumps({"files": written}))
     elif not quiet:
-        if paper_figures.TABLE in keys:
+        if any(Path(name).suffix == ".csv" for name in written):
             _say(paper_figures.report(seed))
         written.say()
     written.check()
@@ -91,8 +93,13 @@ def _files(
         if path.suffix != ".csv":
             yield functools.partial(paper_figures.draw, key, seed=seed), path
         if key == paper_figures.TABLE:
-            table = functools.partial(paper_figures.write_table, paper_figures.report(seed))
-            yield table, path.with_suffix(".csv")
+            yield functools.partial(_write_table, seed), path.with_suffix(".csv")
+
+
+def _write_table(seed: int, path: Path) -> Path:
+    from pendmap import paper_figures
+
+    return paper_figures.write_table(paper_figures.report(seed), path)
 
 
 def _say(found: IdentificationReport) -> None:

@@ -11,6 +11,7 @@ from pendmap.cli.model_options import model_from, model_options
 from pendmap.cli.options import (
     Outputs,
     output_options,
+    simd_option,
 )
 from pendmap.cli.show import show
 from pendmap.cli.types import NUMBER, Whole
@@ -49,6 +50,7 @@ _VIEWER = "127.0.0.1:9876"
     metavar="[HOST:PORT]",
     help=f"Show it in a running viewer while it is computed.  [default: {_VIEWER}]",
 )
+@simd_option
 @click.option("--quiet", is_flag=True, help="No summary.")
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
@@ -114,6 +116,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         "end_error": a["end_error"],
         "interrupted": bool(a.get("interrupted", 0)),
         "energy": float(dataset["energy"].values[-1]),
+        "simd": a["simd"],
     }
     if a["lyapunov"]:
         names = {"exponent": "exponent", "stderr": "exponent_stderr"}

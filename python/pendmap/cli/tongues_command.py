@@ -85,6 +85,6 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
             str(name): dataset["asymptotic"].values[k][asked].tolist()
             for k, name in enumerate(dataset["curve"].values)
         },
-        **{name: a[name] for name in ("p_max", "seconds", "threads")},
+        **{name: a[name] for name in ("p_max", "seconds", "simd", "threads")},
         "summary": a["summary"].split("\n"),
     }

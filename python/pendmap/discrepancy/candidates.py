@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
-from pendmap.model.effects import Effect, definition, is_shape, library
+from pendmap.model.effects import Effect, definition, is_shape, library, middle
 from pendmap.model.formula import Formula
 from pendmap.model.rig import COUNTERPARTS
 
@@ -26,7 +25,8 @@ __all__ = ["Candidate", "candidates", "checked_own", "own_name", "placed"]
 
 SCANNED: Final = 6
 """Values of a shape parameter at which a candidate is scored, from the least typical one to the
-greatest in equal ratios: neighbouring shapes are then alike to a few percent."""
+greatest in equal ratios: neighbouring shapes are then alike to a few percent. Where 0 is typical
+too there are no ratios: the middles of as many equal parts."""
 
 PLACES: Final = 9
 """The same of a place on the circle, in equal steps."""
@@ -206,7 +206,7 @@ def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
         yield {}
         return
     first, *others = shapes
-    fixed = {e["name"]: math.sqrt(e["typical"][0] * e["typical"][1]) for e in others}
+    fixed = {e["name"]: middle(e) for e in others}
     for value in _scan(first):
         yield {first["name"]: float(value)} | fixed
 
@@ -214,7 +214,10 @@ def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
 def _scan(entry: Mapping[str, Any]) -> NDArray[np.float64]:
     low, high = entry["typical"]
     if entry["role"] == "order":
-        return np.arange(low, high + 0.5)
+        return np.arange(round(low), round(high) + 1.0)
     if entry["role"] == "place":
         return np.linspace(low, high, PLACES)
-    return np.geomspace(low, high, SCANNED)
+    if low > 0:
+        return np.geomspace(low, high, SCANNED)
+    width = (high - low) / SCANNED
+    return np.linspace(low + 0.5 * width, high - 0.5 * width, SCANNED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 from typing import TYPE_CHECKING, Any, Final
@@ -30,7 +31,7 @@ from pendmap.notebook import Readable
 from pendmap.records.summary import unit_wrong
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterator
 
     from pendmap.discrepancy.attempts import Attempt
     from pendmap.discrepancy.functions import TorqueFunction
@@ -240,25 +241,22 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     steps = max_effects + 3
     evidence = evidence_of(experiment)
     call_once(evidence.runs, functions)
-    begin = baseline(evidence, model)
+    with _followed(experiment):
+        begin = baseline(evidence, model)
     # Windows are as long as it could follow the runs.
     evidence = dataclasses.replace(evidence, fitted=begin.runs)
     report(1, steps)
     search = Search(
         evidence, begin, max_effects, without, lambda done: report(1 + done, steps), own=own
     )
-    nearest = search.run()
+    with _followed(experiment):
+        nearest = search.run()
     if not unit_wrong(experiment, *evidence.runs):
         refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
     report(steps - 1, steps)
-    runs = run_by_run(evidence, nearest.trial)
-    try:
+    with _followed(experiment):
+        runs = run_by_run(evidence, nearest.trial)
         after = residual_torque(evidence, nearest.trial)
-    except InputError as error:
-        raise InputError(
-            f"{experiment.path}: no model follows these records: {error}. A run under a drive is "
-            'allowed with the drive, in an experiment.toml: kind = "forced"'
-        ) from None
     judgement = judge(evidence, search, nearest, runs, after.chance)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else search.base
@@ -299,3 +297,17 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         ),
         reasons,
     )
+
+
+@contextlib.contextmanager
+def _followed(experiment: Experiment) -> Iterator[None]:
+    """Say of which records a motion is lost that the verdict rests on."""
+    try:
+        yield
+    except InputError as error:
+        if str(error).startswith(str(experiment.path)):
+            raise
+        raise InputError(
+            f"{experiment.path}: no model follows these records: {error}. A run under a drive is "
+            'allowed with the drive, in an experiment.toml: kind = "forced"'
+        ) from None

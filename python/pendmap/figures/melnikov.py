@@ -45,9 +45,9 @@ def figure(
     top = highest(dataset)
     x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
     at = {str(name): p[:, k] for k, name in enumerate(dataset["branch"].values)}
-    apart = np.abs(at["forward"] - at["backward"])
+    apart = np.abs(at["forward"] - at["backward"]) if {"forward", "backward"} <= set(at) else p[:0]
     alike = bool(np.isfinite(apart).any()) and np.nanmax(apart) < 1e-9 * top
-    there = [name for name, values in at.items() if np.isfinite(values).any()]
+    there = [name for name, values in at.items() if (values <= top).any()]
     looped = "loop" in at
     branches = ["forward"] if alike and not looped else there
     handles, texts = [], []

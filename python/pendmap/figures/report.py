@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 from typing import TYPE_CHECKING, Final
 
@@ -13,10 +14,10 @@ from pendmap.figures import candidates, gap, lacking, style
 from pendmap.figures import sheet as sheets
 from pendmap.figures.blocks import Box
 from pendmap.figures.errors import draw_errors
-from pendmap.files import whole_file
+from pendmap.files import whole_file, whole_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from matplotlib.figure import Figure
@@ -162,13 +163,23 @@ def write(found: Discrepancy, path: Path) -> Path:
     document = report.diagnosis(found)
     pictures = {name: png for name in document.pictures if (png := _png(found, name)) is not None}
     if path.suffix.lower() == ".html" and not path.is_dir():
-        return _text(path, report.as_html(document, pictures))
-    if path.suffix.lower() == ".md" and not path.is_dir():
-        return _beside(path, document, pictures)
-    path.mkdir(exist_ok=True)
-    _text(path / "report.html", report.as_html(document, pictures))
-    _beside(path / "report.md", document, pictures, alone=True)
+        _put({path: _html(document, pictures)})
+    elif path.suffix.lower() == ".md" and not path.is_dir():
+        _put(_beside(path, document, pictures))
+    elif path.is_dir():
+        _put(_both(path, document, pictures))
+    else:
+        with whole_folder(path) as part:
+            part.mkdir()
+            _put(_both(part, document, pictures))
     return path
+
+
+def _put(files: Mapping[Path, bytes]) -> None:
+    """Put the files of a report in their places: all of them, or none."""
+    with contextlib.ExitStack() as places:
+        for path, content in files.items():
+            places.enter_context(whole_file(path, (*SUFFIXES, ".png"))).write_bytes(content)
 
 
 def _png(found: Discrepancy, name: str) -> bytes | None:
@@ -181,18 +192,19 @@ def _png(found: Discrepancy, name: str) -> bytes | None:
     return buffer.getvalue()
 
 
+def _html(document: Document, pictures: dict[str, bytes]) -> bytes:
+    return report.as_html(document, pictures).encode()
+
+
 def _beside(
     path: Path, document: Document, pictures: dict[str, bytes], *, alone: bool = False
-) -> Path:
-    """Write Markdown and its figures beside it, which have its name before theirs."""
-    files = {n: f"{n}.png" if alone else f"{path.stem}_{n}.png" for n in pictures}
-    for name, content in pictures.items():
-        with whole_file(path.with_name(files[name]), (".png",)) as part:
-            part.write_bytes(content)
-    return _text(path, report.as_markdown(document, files))
+) -> dict[Path, bytes]:
+    """Return Markdown and its figures beside it, which have its name before theirs."""
+    names = {n: f"{n}.png" if alone else f"{path.stem}_{n}.png" for n in pictures}
+    files = {path.with_name(names[n]): content for n, content in pictures.items()}
+    return files | {path: report.as_markdown(document, names).encode()}
 
 
-def _text(path: Path, content: str) -> Path:
-    with whole_file(path, SUFFIXES) as part:
-        part.write_text(content, encoding="utf-8")
-    return path
+def _both(folder: Path, document: Document, pictures: dict[str, bytes]) -> dict[Path, bytes]:
+    beside = _beside(folder / "report.md", document, pictures, alone=True)
+    return beside | {folder / "report.html": _html(document, pictures)}

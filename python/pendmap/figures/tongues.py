@@ -78,7 +78,7 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
         thick = 1.5 if multiplier < 0 else 1.1
         both = [*chart.lines[multiplier], *chart.inverted_lines[multiplier]]
         axes.add_collection(LineCollection(both, colors=colour, linewidths=thick))
-    for look, (near, far) in zip(_LOOKS, chart.asymptotic.values(), strict=True):
+    for look, (near, far) in zip(_LOOKS, chart.asymptotic.values(), strict=False):
         axes.plot(near[:, 0], near[:, 1], linestyle=look, color=style.INK, linewidth=1.0)
         axes.plot(far[:, 0], far[:, 1], linestyle=look, color=style.INK, linewidth=0.5, alpha=0.45)
     axes.plot(chart.fold[:, 0], chart.fold[:, 1], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
@@ -125,14 +125,15 @@ def _legend(chart: drawn.Chart, *, own: bool, damped: bool) -> tuple[list[Any], 
     if (chart.fold == chart.fold).any(axis=0)[1]:
         fold = Line2D([], [], color=_FOLD, linewidth=1.6, linestyle=(0, (5, 2)))
         entries.append((fold, "fold: the oscillation exists from here"))
-    for look, (name, parts) in zip(_LOOKS, chart.asymptotic.items(), strict=True):
+    for look, (name, parts) in zip(_LOOKS, chart.asymptotic.items(), strict=False):
         if np.isnan(parts).all():
             continue
         entries.append((Line2D([], [], color=style.INK, linewidth=1.0, linestyle=look), name))
     if _ends_in_view(chart):
         edge = Line2D([], [], color="#c8c8c8", linewidth=3.0)
         entries.append((edge, "largest p computed"))
-    if own:
+    (left, right), (low, high) = chart.x, chart.y
+    if own and left <= chart.own[0] <= right and low <= chart.own[1] <= high:
         star = Line2D([], [], color=style.INK, marker="*", markersize=9, linestyle="none")
         entries.append((star, "this pendulum"))
     return [e[0] for e in entries], [e[1] for e in entries]

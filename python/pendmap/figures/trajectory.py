@@ -167,14 +167,16 @@ def _at_rest(axes: Axes, dataset: xr.Dataset) -> None:
 
 
 def resting(dataset: xr.Dataset) -> npt.NDArray[np.float64]:
-    """Return when friction holds the pendulum, from and to, shape (n, 2)."""
+    """Return when friction holds the pendulum within the times shown, from and to, shape (n, 2)."""
     if "event_kind" not in dataset:
         return np.empty((0, 2))
     kinds, times = dataset["event_kind"].values, dataset["event_time"].values
-    last = float(dataset["time"].values[-1])
-    begins = times[kinds == "stick"]
-    ends = np.append(times[kinds == "release"], last)[: begins.size]
-    return np.stack([begins, ends], axis=1)
+    first, last = (float(dataset["time"].values[end]) for end in (0, -1))
+    begins, releases = times[kinds == "stick"], times[kinds == "release"]
+    ends = np.append(releases, np.inf)[np.searchsorted(releases, begins)]
+    spans = np.clip(np.stack([begins, ends], axis=1), first, last)
+    within: npt.NDArray[np.float64] = spans[spans[:, 0] < spans[:, 1]]
+    return within
 
 
 def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
@@ -188,7 +190,7 @@ def _phase(axes: Axes, dataset: xr.Dataset, mark: str) -> None:
     last = plane.broken_at_wrap(theta[late:], velocity[late:])
     axes.plot(early[:, 0], early[:, 1], color=_EARLY_COLOUR, lw=0.5)
     axes.plot(last[:, 0], last[:, 1], color=_LATE_COLOUR, lw=0.7)
-    if dataset.attrs.get("stuck") or (np.ptp(theta) == 0.0 and not np.any(velocity)):
+    if (dataset.attrs.get("stuck") or np.ptp(theta) == 0.0) and velocity[-1] == 0.0:
         rest = plane.wrapped(theta[-1:])
         axes.plot(rest, velocity[-1:], "o", ms=3.5, mew=0, color=_LATE_COLOUR)
     style.phase_plane(axes, (-math.pi, math.pi), plane.padded(velocity), Units.of(dataset.attrs))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap import _core
+from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.identification.free import SENSOR
 from pendmap.identification.from_start import OFFSET
@@ -79,7 +79,7 @@ def provenance(files: Mapping[str, str], command: str) -> dict[str, Any]:
     command : str
         How it was made; left out if empty.
     """
-    table: dict[str, Any] = {"version": version("pendmap"), "simd": _core.simd()}
+    table: dict[str, Any] = {"version": version("pendmap"), "simd": checks.instruction_set()}
     if command:
         table["command"] = command
     return table | {"records": [{"file": name, "sha256": code} for name, code in files.items()]}

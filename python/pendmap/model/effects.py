@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import functools
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from pendmap.model.formula import Formula, FormulaKey
     from pendmap.model.units import Units
 
-__all__ = ["Effect", "definition", "is_shape", "library"]
+__all__ = ["Effect", "definition", "is_shape", "library", "middle"]
 
 _NO_SHAPE: Final = ("size", "phase")
 
@@ -36,6 +37,13 @@ def library() -> dict[str, dict[str, Any]]:
 def is_shape(entry: Mapping[str, Any]) -> bool:
     """Whether a parameter says how an effect acts, not how strongly or at which phase."""
     return entry["role"] not in _NO_SHAPE
+
+
+def middle(entry: Mapping[str, Any]) -> float:
+    """Return a usual value of a shape: in the middle of what is typical, by ratio if positive."""
+    low, high = entry["typical"]
+    value: float = math.sqrt(low * high) if low > 0 else 0.5 * (low + high)
+    return float(round(value)) if entry["role"] == "order" else value
 
 
 def definition(name: object) -> dict[str, Any]:
@@ -144,13 +152,10 @@ class Effect:
         entry = definition(name)
         values = {}
         for parameter in entry["parameters"]:
-            low, high = parameter["typical"]
-            if not is_shape(parameter):
-                values[parameter["name"]] = low
-            elif low > 0:
-                values[parameter["name"]] = float(f"{(low * high) ** 0.5:.1g}")
+            if is_shape(parameter):
+                values[parameter["name"]] = float(f"{middle(parameter):.1g}")
             else:
-                values[parameter["name"]] = 0.5 * (low + high)
+                values[parameter["name"]] = parameter["typical"][0]
         return cls(entry["name"], values).given(units)
 
     @property

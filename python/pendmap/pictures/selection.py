@@ -15,7 +15,7 @@ from pendmap.pictures import plane
 from pendmap.words import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Hashable, Iterable
 
     import numpy.typing as npt
     import xarray as xr
@@ -27,6 +27,26 @@ _TABLES, _COLUMNS = ("kind", "curve", "attractor", "orbit"), ("eigenvalue", "par
 
 _KEYS = {"lyapunov": ("averaged",), "trajectory": ("event_time",)}
 """Variables that rise along dimensions without a coordinate."""
+
+_OVER: dict[str, dict[str, tuple[str, ...]]] = {
+    "basins": {"fraction": ("attractor",)},
+    "bifurcation": {"kind": ("kind",), "entry_kind": ("entry",), "point_value": ("point",)},
+    "lifetime": {"captured": ("attractor", "elapsed"), "tail_mean": ("tail_begin",)},
+    "lyapunov": {"growth": ("elapsed",), "kind": ("attractor",)},
+    "melnikov": {"p_melnikov": ("omega", "branch")},
+    "orbits": {"kind": ("orbit",), "point_theta": ("point",)},
+    "parameter_map": {"kind": ("kind",), "regime_kinds": ("set",)},
+    "tongues": {"p": ("critical",), "asymptotic": ("curve", "omega")},
+    "trajectory": {"theta": ("time",), "section_time": ("period",)},
+}
+"""What variables of a result are over, whatever is selected from it."""
+
+_CELLS = {
+    "basins": ("label", "settle_periods", "net_turns"),
+    "bifurcation": ("up", "down"),
+    "parameter_map": ("regime", "exponent"),
+}
+"""Variables over the axes of a picture."""
 
 _OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
 """Beginnings of the names of attributes that nobody can tell of a part of a map."""
@@ -49,8 +69,8 @@ def shown(dataset: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     InputError
-        If it is a list of starts, an axis has no values or only one without a range, or a table
-        that others refer to is not whole.
+        If it is a list of starts, an axis has no values or only one without a range, a variable
+        is missing or over other dimensions, or a table that others refer to is not whole.
     """
     kind = str(dataset.attrs["kind"])
     if kind == "basins" and "theta" not in dataset.coords:
@@ -64,10 +84,22 @@ def shown(dataset: xr.Dataset) -> xr.Dataset:
             )
         if not dataset.sizes[name]:
             raise InputError(f"{name} has no values here: allowed is a selection with one at least")
+    over = _OVER.get(kind, {}) | dict.fromkeys(_CELLS.get(kind, ()), axes)
+    for name, dimensions in over.items():
+        if name not in dataset or set(dataset[name].dims) != set(dimensions):
+            there = f"is over {_listed(dataset[name].dims)}" if name in dataset else "is missing"
+            raise InputError(
+                f"{name} {there} here: allowed is over {_listed(dimensions)},"
+                " as isel and sel of ranges leave it"
+            )
     dataset = _rising(dataset, _KEYS.get(kind, ()))
     dataset = dataset.transpose(*_TABLES, *axes, *_COLUMNS, ..., missing_dims="ignore")
     count = _COUNTED.get(kind)
     return dataset if count is None else count(dataset)
+
+
+def _listed(dimensions: Iterable[Hashable]) -> str:
+    return ", ".join(map(str, dimensions)) or "nothing"
 
 
 def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -102,9 +134,12 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
     """Count the cells of a part of a basin map anew."""
     label, settle = dataset["label"].values, dataset["settle_periods"].values
     whole = int(dataset.attrs["cells"])
+    ids = dataset["id"].values.astype(int)
+    present = np.unique(label)
+    if not np.isin(present[present > 0], ids).all():
+        raise InputError("attractor: a selection of it cannot be drawn; allowed is one of an axis")
     if label.size == whole:
         return dataset
-    ids = dataset["id"].values.astype(int)
     counts = np.zeros(int(ids.max(initial=0)) + 2, dtype=np.int64)
     settled, total, longest = 0, 0, -1
     for rows in np.array_split(np.arange(label.shape[0]), -(-label.size // _BLOCK)):
@@ -172,13 +207,21 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
 def _tongues(dataset: xr.Dataset) -> xr.Dataset:
     """Keep the critical points at the frequencies that are there."""
     omega = dataset["omega"].values
-    for prefix, table in (("", "critical"), ("undamped_", "undamped")):
+    for prefix in ("", "undamped_", "inverted_"):
+        table = prefix.removesuffix("_") or "critical"
         if f"{table}_omega" in dataset:
             own = dataset[f"{table}_omega"].values
             dataset = dataset.isel({table: np.isin(own, omega)})
             own = dataset[f"{table}_omega"].values
             dataset[f"{prefix}index"] = (table, np.searchsorted(omega, own))
     return dataset
+
+
+def _trajectory(dataset: xr.Dataset) -> xr.Dataset:
+    """Keep the points of the section that are within the times that are there."""
+    first, last = (float(dataset["time"].values[end]) for end in (0, -1))
+    at, slack = dataset["section_time"].values, 1e-9 * max(abs(first), abs(last))
+    return dataset.isel(period=(at >= first - slack) & (at <= last + slack))
 
 
 def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
@@ -208,4 +251,5 @@ _COUNTED: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
     "bifurcation": _bifurcation,
     "parameter_map": _parameter_map,
     "tongues": _tongues,
+    "trajectory": _trajectory,
 }

@@ -138,15 +138,16 @@ def _coarse(work: Work) -> None:
 
 
 def _ordered(work: Work) -> None:
+    # Stamps that are as near as this are one, rounded.
+    near = 2 * float(np.spacing(np.max(np.abs(work.time))))
     steps = np.diff(work.time)
-    if np.all(steps > 0):
+    if np.all(steps > near):
         return
-    backwards = np.flatnonzero(steps < 0) + 1
-    if backwards.size and np.all(steps < 0):
+    if np.all(steps < -near):
         work.keep(np.arange(work.time.size)[::-1])
         work.say("time-backwards", "the rows run backwards in time: turned round", mended=True)
         return
-    repeated = np.flatnonzero(steps == 0) + 1
+    repeated = np.flatnonzero(np.abs(steps) <= near) + 1
     if repeated.size:
         alike = np.sum(work.theta[repeated] == work.theta[repeated - 1])
         text = (
@@ -163,8 +164,7 @@ def _ordered(work: Work) -> None:
     if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
         text = f"{counted(out.size, 'row')} out of order in time: put where the times say"
         work.say("time-backwards", text, mended=True, at=out)
-        work.keep(order)
-        work.keep(np.concatenate([[True], np.diff(work.time) > 0]))
+        _keep_apart(work, order, near)
         return
     if out.size > MOST_OUT * work.time.size:
         raise InputError(
@@ -173,7 +173,13 @@ def _ordered(work: Work) -> None:
         )
     text = f"{counted(out.size, 'time stamp')} out of order, left out"
     work.say("time-backwards", text, mended=True, at=out)
-    work.keep(kept)
+    _keep_apart(work, kept, near)
+
+
+def _keep_apart(work: Work, places: NDArray[np.intp], near: float) -> None:
+    """Keep the rows at these places, in order of time, the first of each stamp."""
+    work.keep(places)
+    work.keep(np.concatenate([[True], np.diff(work.time) > near]))
 
 
 def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:

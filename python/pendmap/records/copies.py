@@ -47,6 +47,10 @@ WHOLE: Final = 1e-2
 """How far from whole multiples of a step the distances of readings are, in steps."""
 
 
+THINNED: Final = 10
+"""A copy that keeps one reading in so many is found, also where as many are lost in gaps."""
+
+
 @dataclasses.dataclass(frozen=True)
 class _Motion:
     """The readings of a run from its first to its last that counts."""
@@ -54,12 +58,19 @@ class _Motion:
     first: int
     theta: Floats
     step: float
+    tick: NDArray[np.int64]
+    """When each was taken, in whole intervals: lost readings leave ticks empty."""
+    interval: float
 
     @classmethod
     def of(cls, run: Run) -> _Motion:
         at = np.flatnonzero(run.trusted)
-        theta = run.theta[at[0] : at[-1] + 1] if at.size else np.empty(0)
-        return cls(int(at[0]) if at.size else 0, theta, _digit(theta))
+        part = slice(at[0], at[-1] + 1) if at.size else slice(0, 0)
+        theta, apart = run.theta[part], np.diff(run.time[part])
+        interval = float(np.median(apart)) if apart.size else 1.0
+        ticks = np.cumsum(np.maximum(np.round(apart / interval), 1.0))
+        tick = np.concatenate([[0.0], ticks])[: theta.size].astype(np.int64)
+        return cls(part.start, theta, _digit(theta), tick, interval)
 
 
 def once_each(runs: Sequence[Run]) -> list[Run]:
@@ -80,8 +91,8 @@ def once_each(runs: Sequence[Run]) -> list[Run]:
         for other in order[:place]:
             shared = _shared(motions[other], motions[k])
             if shared is not None and made[k].moves:
-                first = motions[k].first + shared[1]
-                made[k] = _without(made[k], runs[other], first, shared[2])
+                first = motions[k].first + shared[0]
+                made[k] = _without(made[k], runs[other], first, shared[1])
     return made
 
 
@@ -99,51 +110,96 @@ def _digit(theta: Floats) -> float:
     return step if float(np.quantile(away, 0.9)) < WHOLE * max(multiples.mean(), 1.0) else 0.0
 
 
-def _shared(one: _Motion, other: _Motion) -> tuple[int, int, int] | None:
-    """Return where the readings begin that two motions share, in each, and how many they are."""
-    a, b = one.theta, other.theta
-    least = max(FEWEST, round(PART * min(a.size, b.size)))
-    if min(a.size, b.size) < least:
-        return None
-    lags = {_lag(a, b, least)} | ({0} if a.size == b.size else set())
-    for lag in lags:
-        first, begin = max(lag, 0), max(-lag, 0)
-        count = min(a.size - first, b.size - begin)
-        if _alike(a[first : first + count], b[begin : begin + count], one.step, other.step):
-            return first, begin, count
+def _shared(one: _Motion, other: _Motion) -> tuple[int, int] | None:
+    """Return from which reading of the other on two motions share how many of its readings."""
+    for mine, its in _ticks(one, other):
+        found = _along(one, other, mine, its)
+        if found is not None:
+            return found
     return None
 
 
-def _lag(a: Floats, b: Floats, least: int) -> int:
-    """Return by how many readings ``b`` begins after ``a`` where the two differ least."""
-    size = a.size + b.size
-    wide = 1 << (size - 1).bit_length()
-    middle = float(a.mean())
-    a, b = a - middle, b - middle
-    product = np.fft.irfft(np.fft.rfft(a, wide) * np.conj(np.fft.rfft(b, wide)), wide)
-    lags = np.arange(least - b.size, a.size - least + 1)
-    first, begin = np.maximum(lags, 0), np.maximum(-lags, 0)
-    count = np.minimum(a.size - first, b.size - begin)
+def _ticks(one: _Motion, other: _Motion) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Return how readings may lie on one clock: one after another, and by their times."""
+    in_a_row = np.arange(one.theta.size), np.arange(other.theta.size)
+    ratio = other.interval / one.interval
+    times = round(max(ratio, 1 / ratio))
+    whole = abs(max(ratio, 1 / ratio) / times - 1) < WHOLE
+    by_time = (
+        one.tick * (times if whole and ratio < 1 else 1),
+        other.tick * (times if whole and ratio > 1 else 1),
+    )
+    wide = any(t.size and t[-1] >= THINNED * t.size for t in by_time)
+    if wide or all(np.array_equal(a, b) for a, b in zip(in_a_row, by_time, strict=True)):
+        return [in_a_row]
+    return [in_a_row, by_time]
 
-    def total(values: Floats, start: NDArray[np.int64]) -> Floats:
-        summed = np.concatenate(([0.0], np.cumsum(values)))
-        return np.asarray(summed[start + count] - summed[start])
 
-    square = total(a * a, first) + total(b * b, begin) - 2 * product[lags % wide]
-    mean = (total(a, first) - total(b, begin)) / count
-    # The variance of the difference: where it is least over what moves there.
-    return int(lags[np.argmin(square / count - mean**2)])
+def _along(
+    one: _Motion, other: _Motion, mine: NDArray[np.int64], its: NDArray[np.int64]
+) -> tuple[int, int] | None:
+    """Return what :func:`_shared` does, for readings that lie so on one clock."""
+    size = min(one.theta.size, other.theta.size)
+    least = max(FEWEST, round(PART * size))
+    if size < least:
+        return None
+    lags = _lags(_spread(one.theta, mine), _spread(other.theta, its), least)
+    for lag in lags | ({0} if one.theta.size == other.theta.size else set()):
+        _, a, b = np.intersect1d(mine, its + lag, assume_unique=True, return_indices=True)
+        if a.size >= least and _alike(one.theta[a], other.theta[b], one.step, other.step):
+            return int(b[0]), int(b[-1] - b[0]) + 1
+    return None
+
+
+def _spread(theta: Floats, tick: NDArray[np.int64]) -> Floats:
+    """Return readings at their ticks; no number at the others."""
+    spread = np.full(int(tick[-1]) + 1, np.nan)
+    spread[tick] = theta
+    return spread
+
+
+def _lags(a: Floats, b: Floats, least: int) -> set[int]:
+    """Return by how many ticks ``b``, or its mirror image, begins after ``a`` where it is alike."""
+    wide = 1 << (a.size + b.size - 1).bit_length()
+    middle = float(np.nanmean(a))
+    lags = np.arange(1 - b.size, a.size)
+
+    def spectra(values: Floats) -> list[NDArray[np.complex128]]:
+        there = np.isfinite(values)
+        moved = np.where(there, values - middle, 0.0)
+        return [np.fft.rfft(part, wide) for part in (there.astype(float), moved, moved * moved)]
+
+    def product(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> Floats:
+        return np.asarray(np.fft.irfft(x * np.conj(y), wide)[lags % wide])
+
+    (there_a, one_a, two_a), (there_b, one_b, two_b) = spectra(a), spectra(b)
+    count = np.round(product(there_a, there_b))
+    enough = count >= least
+    if not enough.any():
+        return set()
+    count = np.maximum(count, 1.0)
+    mean_a, mean_b = product(one_a, there_b) / count, product(there_a, one_b) / count
+    own = (product(two_a, there_b) + product(there_a, two_b)) / count - mean_a**2 - mean_b**2
+    both = 2 * (product(one_a, one_b) / count - mean_a * mean_b)
+    # The variance of the difference, and that of the sum.
+    found = (np.argmin(np.where(enough, own + sign * both, np.inf)) for sign in (-1, 1))
+    return {int(lags[k]) for k in found}
 
 
 def _alike(a: Floats, b: Floats, step: float, other: float) -> bool:
     """Whether ``b`` is ``a`` up to a factor and a zero, to within half a step of either."""
     columns = np.column_stack([a, np.ones(a.size)])
-    (factor, zero), *_ = np.linalg.lstsq(columns, b, rcond=None)
+    away = np.zeros(a.size)
+    # Readings that were edited move the first line.
+    for _ in range(2):
+        near = away <= np.quantile(away, ALIKE)
+        (factor, zero), *_ = np.linalg.lstsq(columns[near], b[near], rcond=None)
+        away = np.abs(b - factor * a - zero)
     steps = max(abs(factor) * step, other)
     if float(np.ptp(b)) <= LEVELS * steps:
         return False
-    allowed = 0.5 * (1 + WHOLE) * steps + EXACT * float(np.ptp(b))
-    away = np.abs(b - factor * a - zero)
+    # The line is known to a part of a step that falls with the root of the readings.
+    allowed = (0.5 + a.size**-0.5) * steps + EXACT * float(np.ptp(b))
     return bool(np.mean(away <= allowed) >= ALIKE)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -122,12 +123,12 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
 def _names(files: list[str]) -> list[str]:
     """Name runs after their files, apart where several share one or a stem."""
     stems = {file: file.rsplit(".", 1)[0] for file in files}
+    alike, every, before = Counter(stems.values()), Counter(files), Counter[str]()
     names = []
-    for k, file in enumerate(files):
-        alone = list(stems.values()).count(stems[file]) == 1
-        name = stems[file] if alone else file
-        same = files[: k + 1].count(file)
-        names.append(f"{name} ({same})" if files.count(file) > 1 else name)
+    for file in files:
+        before[file] += 1
+        name = stems[file] if alike[stems[file]] == 1 else file
+        names.append(f"{name} ({before[file]})" if every[file] > 1 else name)
     return names
 
 

@@ -60,7 +60,7 @@ def _drive(work: Work) -> None:
         return
     slow = abs(drive - rate * round(drive / rate))
     text = (
-        f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.2g} readings a "
+        f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a "
         f"period do not resolve it, {RESOLVED:g} and more would; it looks like one of "
         f"{slow:.3g} Hz"
     )

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from pendmap.errors import InputError
 
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 __all__ = ["Effect", "Motion", "shape", "size"]
+
+MOST: Final = 1e4
+"""Largest value of a parameter, in the largest that is drawn: what is quicker takes for ever."""
 
 
 class Motion:
@@ -87,11 +90,13 @@ class Motion:
         return (1 + self.vertical) * self.cos + (self.velocity / self.w0) ** 2
 
 
-def size(low: float, high: float, unit: str, most: float = math.inf) -> Any:  # noqa: ANN401 (of a field)
+def size(low: float, high: float, unit: str, most: float | None = None) -> Any:  # noqa: ANN401 (of a field)
     """Describe the parameter that says how strong an effect is.
 
-    It is drawn log-uniformly between ``low`` and ``high``; the absolute value may be ``most``.
+    It is drawn log-uniformly between ``low`` and ``high``; the absolute value may be ``most``, by
+    default :data:`MOST` times ``high``.
     """
+    most = MOST * high if most is None else most
     return dataclasses.field(
         metadata={"low": low, "high": high, "unit": unit, "size": True, "most": most}
     )
@@ -103,13 +108,16 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     unit: str,
     *,
     whole: bool = False,
-    least: float = -math.inf,
-    most: float = math.inf,
+    least: float | None = None,
+    most: float | None = None,
 ) -> Any:  # noqa: ANN401 (of a field)
     """Describe a parameter that says what form an effect has.
 
-    It is drawn uniformly between ``low`` and ``high``; allowed is ``least`` to ``most``.
+    It is drawn uniformly between ``low`` and ``high``; allowed is ``least`` to ``most``, by
+    default up to :data:`MOST` times the larger of them, of either sign.
     """
+    most = MOST * max(abs(low), abs(high)) if most is None else most
+    least = -most if least is None else least
     metadata = {"low": low, "high": high, "unit": unit, "whole": whole}
     return dataclasses.field(metadata=metadata | {"least": least, "most": most})
 
