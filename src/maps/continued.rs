@@ -23,14 +23,17 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 const STEP: f64 = 0.05;
 /// A step is accepted if Newton's method moves the foreseen point by at most this.
 const NEAR: f64 = 0.1;
-/// The least step in `p`, and of the torque in its own units.
+/// The least step in `p`; the first and the least step of the torque, in parts of it.
 const LEAST_STEP: f64 = 1e-9;
-const LEAST_SHARE: f64 = 1.0 / 256.0;
+const FIRST_SHARE: f64 = 0.25;
+const LEAST_SHARE: f64 = 1e-6;
+/// The next point is foreseen from this many places.
+const FORESEEN: usize = 5;
 /// A fold this far ahead in `p` is known well enough: the square of the gap falls linearly to it.
 const AT_FOLD: f64 = 1e-7;
 /// Places in a stable interval of the pendulum without torque, in parts of it, where orbits begin.
 const PLACES: [f64; 3] = [0.5, 0.02, 0.98];
-/// The last step to a place with the multiplier -1: it is where an orbit is followed from.
+/// The first step and the last one to a place with the multiplier -1: it is where an orbit is followed from.
 const DOUBLED: f64 = 1e-6;
 /// Refinements of a zero at most, and the last one's size in parts of `1 + p`.
 const REFINEMENTS: usize = 40;
@@ -97,6 +100,12 @@ pub(super) fn curve(pendulum: &Pendulum, balance: Balance, level: &Curve, p_max:
     Curve { omega, critical, stable_at_first: between[0], fold: None }
 }
 
+impl Place {
+    fn coordinates(&self) -> [f64; 3] {
+        [self.point[0], self.point[1], self.p]
+    }
+}
+
 impl Sheet {
     /// Whether the orbit is there and stable: it is so from one critical amplitude to the next.
     fn is_stable(&self, p: f64) -> bool {
@@ -158,31 +167,37 @@ impl Course<'_> {
             let first = self.solved(&pendulum, p, guess)?;
             if doubling { self.doubled(&pendulum, first) } else { Some(first) }
         };
-        let mut here = (0.0, at(0.0, p, [self.angle, 0.0])?);
-        let mut last = here;
-        let mut step = 0.25;
-        while here.0 < 1.0 {
-            let share = f64::min(here.0 + step, 1.0);
-            let ratio = if here.0 > last.0 { (share - here.0) / (here.0 - last.0) } else { 0.0 };
-            let guess = extrapolated(&last.1, &here.1, ratio);
-            let ahead = here.1.p + ratio * (here.1.p - last.1.p);
-            match at(share, ahead, guess).filter(|next| continues(&here.1, next)) {
-                Some(next) => {
-                    last = here;
-                    here = (share, next);
+        let mut known = vec![(0.0, at(0.0, p, [self.angle, 0.0])?)];
+        let mut step = FIRST_SHARE;
+        loop {
+            let (share, here) = known[known.len() - 1];
+            if share == 1.0 {
+                return Some(here);
+            }
+            let next = f64::min(share + step.min(FIRST_SHARE), 1.0);
+            let coordinates = known.iter().map(|(share, place)| (*share, place.coordinates()));
+            let [theta, velocity, ahead] = foreseen(coordinates, next);
+            let guess = [theta, velocity];
+            let follows = |place: &Place| {
+                let away = (place.p - ahead).abs() / (1.0 + ahead);
+                continues(&here, place) && distance(place.point, guess).max(away) < NEAR
+            };
+            match at(next, ahead, guess).filter(follows) {
+                Some(place) => {
+                    known.push((next, place));
+                    step *= 2.0;
                 }
                 None if step > LEAST_SHARE => step *= 0.5,
                 None => return None,
             }
         }
-        Some(here.1)
     }
 
     /// The orbit with the multiplier -1 near one of another `p`, by the secant method.
     fn doubled(&self, pendulum: &Pendulum, near: Place) -> Option<Place> {
         let size = |place: &Place| gap(-1.0, place.monodromy);
         let mut before = near;
-        let mut here = self.solved(pendulum, near.p + 1e-4 * (1.0 + near.p), near.point)?;
+        let mut here = self.solved(pendulum, near.p + DOUBLED * (1.0 + near.p), near.point)?;
         for _ in 0..ITERATIONS {
             let step = size(&here) * (here.p - before.p) / (size(&here) - size(&before));
             if step.abs() > NEAR * (1.0 + here.p) || step.is_nan() || here.p <= step {
@@ -240,9 +255,7 @@ impl Course<'_> {
             let length = usual.min(step).min(ahead).min(away.abs());
             // The goal itself, not what rounding makes of it.
             let p = if length < away.abs() { here.p + length.copysign(away) } else { goal };
-            let span = here.p - before.p;
-            let ratio = if span == 0.0 { 0.0 } else { (p - here.p) / span };
-            let guess = extrapolated(&before, &here, ratio);
+            let guess = foreseen(places.iter().map(|place| (place.p, place.point)), p);
             let next = self
                 .solved(self.pendulum, p, guess)
                 .filter(|next| continues(&here, next) && distance(next.point, guess) < NEAR);
@@ -355,6 +368,23 @@ fn distance(a: State, b: State) -> f64 {
 /// The point on the line through two places, `ratio` of their distance beyond the second.
 fn extrapolated(a: &Place, b: &Place, ratio: f64) -> State {
     [0, 1].map(|k| b.point[k] + ratio * (b.point[k] - a.point[k]))
+}
+
+/// Where the polynomial through the last of these values leads to, by Lagrange's formula.
+fn foreseen<const N: usize>(
+    values: impl ExactSizeIterator<Item = (f64, [f64; N])>,
+    at: f64,
+) -> [f64; N] {
+    let skipped = values.len().saturating_sub(FORESEEN);
+    let last: Vec<(f64, [f64; N])> = values.skip(skipped).collect();
+    let weight = |x: f64| {
+        let others = last.iter().map(|(other, _)| *other).filter(|other| *other != x);
+        others.map(|other| (at - other) / (x - other)).product::<f64>()
+    };
+    last.iter().fold([0.0; N], |sum, (x, value)| {
+        let weight = weight(*x);
+        std::array::from_fn(|k| sum[k] + weight * value[k])
+    })
 }
 
 /// Whether one place may follow another: not across a fold, where the gap to +1 changes its sign.

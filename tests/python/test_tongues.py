@@ -421,3 +421,15 @@ def test_the_legend_names_the_pendulum_where_it_is_in_view() -> None:
     for omega, shown in (([1.5, 2.5], True), ([6.0, 8.0], False)):
         texts = named(made(pendmap.tongues(DAMPED, omega, 6.0)))
         assert ("this pendulum" in texts) == shown
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.70, 0.76), (1.0, 1.3)])
+def test_orbits_under_a_torque_keep_to_their_balance(low: float, high: float) -> None:
+    omega = np.linspace(low, high, 13)
+    found = pendmap.tongues(Pendulum(gamma=0.1, torque=0.2), omega)
+    for place in range(omega.size):
+        hanging = found["p"].values[found["index"].values == place]
+        inverted = found["inverted_p"].values[found["inverted_index"].values == place]
+        # A strip is found at every frequency that it is at, however narrow.
+        assert inverted.size == 2, omega[place]
+        assert np.abs(np.subtract.outer(hanging, inverted)).min() > 1e-3, omega[place]
