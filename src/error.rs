@@ -94,13 +94,21 @@ pub enum Error {
     Threads(String),
 }
 
+/// A number without the zeros of its power of ten.
+fn short(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Range { name, value, allowed } => {
+                let value = short(*value);
                 write!(f, "{name} is {value}: allowed is {allowed}")
             }
             Self::Parameter { effect, parameter, value, allowed: [low, high] } => {
+                let value = short(*value);
                 write!(f, "{effect}: {parameter} is {value}: allowed is {low} to {high}, finite")
             }
             Self::Effect { name } => {

@@ -15,6 +15,7 @@ use super::approach::approach;
 use super::control::{Control, pool};
 use super::starts::{Axis, Starts};
 use super::vanishing;
+use crate::attractor::capture::CREEPING;
 use crate::error::Error;
 use crate::integrate::{State, accuracy};
 use crate::lanes::Path;
@@ -39,6 +40,8 @@ const REACH_CELLS: f64 = 8.0;
 const LEAST_REACH: f64 = 0.3;
 /// Points nearer than this are of one orbit.
 const SAME: f64 = 1e-6;
+/// Under friction a speed below this is none.
+const STILL: f64 = 1e-9;
 /// Angles at which the pull on an undriven pendulum is looked at, and halvings between two of them.
 const LOOKS: usize = 2000;
 const BISECTIONS: usize = 60;
@@ -101,6 +104,11 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     let map = PoincareMap::new(pendulum);
     let mirror = Mirror::of(pendulum);
     let rubs = pendulum.has_friction();
+    let equation = pendulum.equation();
+    // Newton's method leaves a speed of the size of rounding, and creeps to the edge of what is held.
+    let held = |p: &State| {
+        rubs && p[1].abs() < STILL && equation.excess(p[0]) < CREEPING * equation.hold(p[0])
+    };
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
     let begin = if pendulum.is_autonomous() {
@@ -127,6 +135,9 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
             pool.install(|| next.par_iter().map(search).collect::<Result<_, Error>>())?;
         let before = all.len();
         for orbit in found.into_iter().flatten() {
+            if orbit.points.iter().any(held) {
+                continue;
+            }
             let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
             for one in std::iter::once(orbit).chain(image) {
                 if !all.iter().any(|other| other.contains(one.points[0], SAME)) {
@@ -142,10 +153,9 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         let within = |turn: &f64| request.theta.holds(p[0] + turn);
         map.angle.turns().iter().any(within) && request.velocity.holds(p[1])
     };
-    let held = |p: &State| rubs && p[1] == 0.0 && pendulum.equation().holds_for_ever(p[0]);
     all.retain(|orbit| {
         let asked = (orbit.n, orbit.w) == (request.n, request.w);
-        asked && orbit.points.iter().any(inside) && !orbit.points.iter().any(held)
+        asked && orbit.points.iter().any(inside)
     });
     Ok(Orbits { closed: all, begun, ..none })
 }
