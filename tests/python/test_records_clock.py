@@ -23,6 +23,22 @@ def test_milliseconds_become_seconds(tmp_path: Path, factor: float) -> None:
     np.testing.assert_allclose(run.time, time, rtol=1e-9)
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_a_pause_longer_than_all_the_rest_cuts_the_record(tmp_path: Path, *, late: bool) -> None:
+    time, theta = clean()
+    first = time.size // 3 if late else 2 * time.size // 3
+    jumped = np.where(np.arange(time.size) < first, time, time + 1e6)
+    run = read(tmp_path, text((jumped, theta)))
+    assert found(run)["time-pause"].text.startswith("nothing for 1e+06 s")
+    assert run.time.size == max(first, time.size - first)
+    assert np.ptp(run.time) < np.ptp(time)
+    limits = "from_s = 5e5" if not late else "to_s = 5e5"
+    other = f'[[run]]\nfile = "a.csv"\n{limits}\n'
+    (part,) = experiment(tmp_path, other, a=text((jumped, theta))).runs
+    assert part.time.size == min(first, time.size - first)
+    assert "time-pause" not in found(part)
+
+
 def test_a_declared_unit_is_not_overruled(tmp_path: Path) -> None:
     time, theta = clean()
     description = '[columns]\ntime = { unit = "s" }\n[[run]]\nfile = "a.csv"\n'

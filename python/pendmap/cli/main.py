@@ -81,6 +81,9 @@ class _Commands(click.Group):
             return super().invoke(ctx)
         except BrokenPipeError:
             raise _ReaderGone from None
+        except KeyboardInterrupt as error:
+            # click writes an empty line for it, and none for what it would make of it.
+            raise click.Abort from error
         except InputError as error:
             called = self.get_command(ctx, ctx.invoked_subcommand or "")
             options = {p.name: p.opts[0] for p in called.params} if called else {}

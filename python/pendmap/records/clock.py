@@ -61,6 +61,24 @@ def mend(work: Work) -> None:
     _spacing(work)
 
 
+def cut_at_pauses(work: Work) -> None:
+    """Keep the side with more samples of a pause that is longer than the rest of the record."""
+    while work.time.size > 2:
+        steps = np.diff(work.time)
+        pause = int(np.argmax(steps))
+        rest = float(work.time[-1] - work.time[0] - steps[pause])
+        if steps[pause] <= max(rest, RESET * float(np.median(steps))):
+            return
+        before = pause + 1 >= work.time.size - pause - 1
+        kept = np.arange(pause + 1) if before else np.arange(pause + 1, work.time.size)
+        text = (
+            f"nothing for {steps[pause]:.3g} s, longer than all the rest: what is"
+            f" {'before' if before else 'after'} is used; from_s and to_s choose another part"
+        )
+        work.say("time-pause", text, at=np.array([pause + 1]))
+        work.keep(kept)
+
+
 def _finite(work: Work) -> None:
     missing = np.flatnonzero(~np.isfinite(work.time))
     if missing.size == work.time.size:

@@ -150,6 +150,8 @@ def _runs(
         work.say("drive-missing", text)
     clock.mend(work)
     work.cut(plan.from_s, plan.to_s)
+    if not work.peaks_only:
+        clock.cut_at_pauses(work)
     unmarked_peaks.check(work, channels.columns)
     angle.make(work)
     if work.peaks_only:
