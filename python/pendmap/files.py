@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from typing import IO
 
 __all__ = [
+    "COMPLETE",
     "STOPS",
     "check_regular",
     "check_room",
@@ -41,6 +42,9 @@ __all__ = [
     "whole_file",
     "whole_folder",
 ]
+
+COMPLETE: Final[list[str]] = []
+"""Names of the files that the running command has written: an interrupt names them."""
 
 STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)

@@ -161,10 +161,10 @@ def test_files_of_formulas(tmp_path: Path, pendmap_command: Run) -> None:
 
 
 def test_maps_refuse_what_does_not_repeat() -> None:
-    spring = Formula("spring", "-k*theta", {"k": 2})
-    with pytest.raises(InputError, match="spring: allowed in one trajectory, not in maps"):
-        pendmap.basins(Pendulum(effects=(spring(k=0.1),)), pendmap.Grid.square(10))
-    assert pendmap.simulate(Pendulum(effects=(spring(k=0.1),)), 1.0, 0.0, until=1.0) is not None
+    uneven = Formula("uneven", "-k*sin(theta/2)", {"k": 2})
+    with pytest.raises(InputError, match="uneven: allowed in one trajectory, not in maps"):
+        pendmap.basins(Pendulum(effects=(uneven(k=0.1),)), pendmap.Grid.square(10))
+    assert pendmap.simulate(Pendulum(effects=(uneven(k=0.1),)), 1.0, 0.0, until=1.0) is not None
 
 
 # ruff: noqa: ARG001, ARG005 (each function takes all that a torque may depend on)

@@ -8,6 +8,7 @@ import re
 from typing import Any
 
 import pytest
+import xarray as xr
 from matplotlib import rc_context
 from matplotlib.text import Text
 
@@ -95,9 +96,10 @@ def test_there_is_a_handful_of_ticks_whatever_the_window(low: float, high: float
 
 
 def test_copies_are_left_out_where_nobody_could_tell_them_apart() -> None:
+    circle = xr.Dataset()
     points = synthetic.USUAL[1].points
-    assert len(plane.copies(points, -10 * math.pi, 10 * math.pi)) == 10
-    assert len(plane.copies(points, 1e300, 2e300)) == 0
+    assert len(plane.copies(circle, points, -10 * math.pi, 10 * math.pi)) == 10
+    assert len(plane.copies(circle, points, 1e300, 2e300)) == 0
 
 
 def test_what_nothing_settles_on_is_not_titled_so() -> None:

@@ -188,7 +188,7 @@ def test_what_is_there_is_replaced_only_if_asked(rig: Run, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("moment", ["computing", "writing"])
 def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path, moment: str) -> None:
-    runs = ["--free", "60"] if moment == "computing" else ["--rate", "2000"]
+    runs = ["--free", "60", "--duration", "200"] if moment == "computing" else ["--rate", "2000"]
     words = [str(COMMAND), "rig", "hidden", *runs, "--out", "lab"]
     with started(words, cwd=tmp_path, stderr=subprocess.PIPE) as process:
         if moment == "computing":

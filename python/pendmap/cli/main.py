@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.errors import InputError, NotWrittenError, one_line
-from pendmap.files import STOPS
+from pendmap.files import COMPLETE, STOPS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -120,9 +120,8 @@ def run() -> None:
         with _stoppable(stops):
             code = _exit_code(stops)
     except KeyboardInterrupt:
-        if not stops:  # it came before the handlers were set
-            _say("interrupted, nothing was written")
-        code = INTERRUPTED
+        # It came before the handlers were set, or at the very end.
+        code = INTERRUPTED if stops else _interrupted()
     if stops and code == INTERRUPTED:
         # A library that was stopped in its middle, while it was imported for one, may not survive
         # that Python takes it down.
@@ -167,6 +166,7 @@ def _stoppable(stops: list[int]) -> Iterator[None]:
 
 
 def _exit_code(stops: Sequence[int]) -> int:
+    COMPLETE.clear()
     try:
         result = command.main(prog_name="pendmap", standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (told apart below)
@@ -174,17 +174,13 @@ def _exit_code(stops: Sequence[int]) -> int:
         # What a library makes of a signal, in the middle of its import for one, is the signal; a
         # trajectory that is stopped is written, and may not fit.
         if interrupted or (stops and not isinstance(error, NotWrittenError)):
-            return _interrupted(error)
+            return _interrupted()
         return _failed(error)
     return result if isinstance(result, int) else 0
 
 
-def _interrupted(error: BaseException) -> int:
-    # click makes an Abort of the interrupt that names what is complete.
-    chain = (error, error.__cause__, error.__context__)
-    stop = next((e for e in chain if isinstance(e, KeyboardInterrupt) and e.args), None)
-    files = stop.args if stop else ()
-    _say(f"interrupted, {', '.join(files) or 'nothing was'} written")
+def _interrupted() -> int:
+    _say(f"interrupted, {', '.join(COMPLETE) or 'nothing was'} written")
     return INTERRUPTED
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.errors import InputError, NotWrittenError, one_line
-from pendmap.files import held_interrupts
+from pendmap.files import COMPLETE, held_interrupts
 from pendmap.notebook import columns
 
 if TYPE_CHECKING:
@@ -113,24 +113,23 @@ def write_all(
 
     Where the disk does not take one, the others are tried all the same (:meth:`Written.check`).
     What cannot be put into a file is refused and leaves none, unless ``keep`` asks for the others.
-    An interrupt takes effect between two files and names those that are complete.
+    An interrupt takes effect between two files; what is complete stands in ``files.COMPLETE``.
     """
     written = Written()
-    try:
-        for write, path in files:
-            with held_interrupts():
-                try:
-                    written.append(str(write(path)))
-                except InputError as error:
-                    if not keep:
-                        for name in written:
-                            Path(name).unlink(missing_ok=True)
-                        raise
-                    written.refused.append(error)
-                except OSError as error:
-                    written.missed.append(f"cannot write {path}: {error.strerror or error}")
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(*written) from None
+    for write, path in files:
+        with held_interrupts():
+            try:
+                written.append(str(write(path)))
+                COMPLETE.append(written[-1])
+            except InputError as error:
+                if not keep:
+                    for name in written:
+                        Path(name).unlink(missing_ok=True)
+                        COMPLETE.remove(name)
+                    raise
+                written.refused.append(error)
+            except OSError as error:
+                written.missed.append(f"cannot write {path}: {error.strerror or error}")
     return written
 
 

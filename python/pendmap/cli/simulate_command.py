@@ -75,8 +75,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     if gone is not None:
         raise click.ClickException(f"--live: {gone}")
     if dataset.attrs.get("interrupted"):
-        written = (outputs.out, outputs.plot, outputs.rerun)
-        raise KeyboardInterrupt(*(str(path) for path in written if path is not None))
+        raise KeyboardInterrupt
 
 
 def _sender(model: Pendulum | Rig, start: tuple[float, float], address: str) -> Live:

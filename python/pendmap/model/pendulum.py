@@ -133,10 +133,9 @@ class Pendulum:
         return (*own, self.lab_time, [effect.kernel for effect in self.effects])
 
     @property
-    def effect_attributes(self) -> dict[str, float | str]:
-        """The effects as JSON, and ``angle = "line"`` where one counts turns."""
-        line: dict[str, float | str] = {"angle": "line"} if self.counts_turns else {}
-        return {"effects": effects_json(self.effects)} | line
+    def angle_attributes(self) -> dict[str, float | str]:
+        """The attribute ``angle = "line"``, where an effect counts turns."""
+        return {"angle": "line"} if self.counts_turns else {}
 
     @property
     def counts_turns(self) -> bool:
@@ -151,7 +150,8 @@ class Pendulum:
     def attributes(self) -> dict[str, float | str]:
         """The parameters as a dataset's attributes; effects as JSON."""
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
-        return {"units": self.units.name} | numbers | self.effect_attributes
+        effects = {"effects": effects_json(self.effects)}
+        return {"units": self.units.name} | numbers | effects | self.angle_attributes
 
     @property
     def title(self) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.model import quantities
-from pendmap.model.pendulum import Pendulum, checked_effects
+from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
 from pendmap.model.units import Units
 
 if TYPE_CHECKING:
@@ -230,7 +230,8 @@ class Rig:
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
         pendulum = self.pendulum
         bare = {n: getattr(pendulum, n) for n in ("gamma", "omega", "phase", "theta_r")}
-        return {"units": self.units.name} | numbers | bare | pendulum.effect_attributes
+        effects = {"effects": effects_json(self.effects)} | pendulum.angle_attributes
+        return {"units": self.units.name} | numbers | bare | effects
 
     @property
     def title(self) -> str:
