@@ -131,6 +131,11 @@ def test_chaos_that_persists() -> None:
     assert (a["persistent"], a["captured"]) == (1, 0)
     assert a["exponent"] == pytest.approx(0.1454, abs=0.003)
     assert a["summary"].startswith("Persistent: tumbling chaos")
+    # Two chaotic attractors, one the mirror image of the other, and nothing else.
+    pair = pendmap.lifetime(Pendulum(p=1.808), starts=1000)
+    assert (pair.attrs["persistent"], pair.sizes["attractor"]) == (1, 2)
+    assert "rotating chaos -" in pair.attrs["summary"]
+    assert made(pair).axes
     # Beside other attractors the starts that end on it are left out.
     beside = pendmap.lifetime(Pendulum(p=1.52, omega=1.1), starts=4000).attrs
     assert beside["persistent"] == 0

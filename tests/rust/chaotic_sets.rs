@@ -97,6 +97,7 @@ fn rotating_chaos_is_two_attractors_with_half_of_the_starts_each() {
     let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["rotating chaos -", "rotating chaos +"]);
     assert_eq!((map.attractors[0].twin, map.attractors[1].twin), (Some(1), Some(0)));
+    assert!(map.share(0) < 1e-12, "{} undecided", map.share(0));
     assert!(map.fractions.iter().all(|share| (0.35..0.6).contains(share)), "{:?}", map.fractions);
     for attractor in &map.attractors {
         for point in some(attractor) {
@@ -129,11 +130,31 @@ fn sets_at_random_points_do_what_their_kind_says() {
     assert!(seen > 3, "{seen} sets");
 }
 
-fn searched(own: &Own) -> Cell {
-    let search =
-        Search { starts: plane(1000).sampled_states(9, 1), each: 9, bound: None, kept: 64 };
+/// What a search finds from the starts of cell `number`.
+fn searched_from(own: &Own, number: usize) -> Cell {
+    let starts = plane(1000).sampled_states(9 * (number + 1), 1);
+    let search = Search { starts, each: 9, bound: None, kept: 64 };
     let strobe = Strobe::new(&driven(0.1, own.p, own.omega), 40, paths()[0]);
-    search.cell(0, &strobe, &[], Control::default().flag())
+    search.cell(number, &strobe, &[], Control::default().flag())
+}
+
+fn searched(own: &Own) -> Cell {
+    searched_from(own, 0)
+}
+
+#[test]
+fn what_is_told_of_chaos_does_not_depend_on_the_starts() {
+    let tumbling = vec![Kind::TumblingChaos];
+    let rotating = vec![Kind::RotatingChaos; 2];
+    for (p, omega, kinds) in
+        [(1.03, 0.87, &tumbling), (1.7, 0.87, &tumbling), (1.808, 2.0, &rotating)]
+    {
+        for number in 0..30 {
+            let cell = searched_from(&Own { p, omega }, number);
+            let found: Vec<Kind> = cell.found.iter().map(|f| f.attractor.kind).collect();
+            assert_eq!(&found, kinds, "p = {p}, starts {number}");
+        }
+    }
 }
 
 #[test]

@@ -118,7 +118,8 @@ fn tolerances() {
     let range = |tol: f64| refusal(choose(&driven(0.1, 1.0, 2.0), &starts, tol, path()));
     assert_eq!(range(0.5), "tol is 0.5: allowed is 1e-13 to 1e-2");
     assert_eq!(range(0.0), "tol is 0: allowed is 1e-13 to 1e-2");
-    assert_eq!(range(-1e-6), "tol is -0.000001: allowed is 1e-13 to 1e-2");
+    assert_eq!(range(-1e-6), "tol is -1e-6: allowed is 1e-13 to 1e-2");
+    assert_eq!(range(1e300), "tol is 1e300: allowed is 1e-13 to 1e-2");
     assert_eq!(range(f64::NAN), "tol is NaN: allowed is 1e-13 to 1e-2");
     // Chaos makes more of rounding errors than 1e-13 within five periods.
     let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, path()).expect_err("refused");

@@ -288,3 +288,15 @@ fn without_drive_the_orbits_are_the_rests() {
     }
     assert!(all(&undriven(0.1, 1.3), 1, 0).closed.is_empty());
 }
+
+#[test]
+fn what_friction_holds_is_no_orbit() {
+    for (p, theta_r) in [(0.1, 0.5), (0.29, 0.013), (0.3, 3.0)] {
+        let pendulum = driven(0.008, p, 2.0).with_friction(theta_r).expect("in range");
+        let request = request(1, 0, 20);
+        let found = orbits(&pendulum, &request, &Control::default()).expect("a search");
+        let resting: Vec<_> =
+            found.closed.iter().filter(|orbit| orbit.points[0][1].abs() < 1e-9).collect();
+        assert!(resting.is_empty(), "p = {p}, theta_r = {theta_r}: {}", resting.len());
+    }
+}
