@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Matrix2, Vector2};
 
 use super::chebyshev::Values;
-use super::tongues::{Balance, Critical, Curve, gap, is_stable, under};
+use super::tongues::{Balance, Curve, bordered, gap, is_stable, under};
 use crate::integrate::State;
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
@@ -79,25 +79,10 @@ pub(super) fn curve(pendulum: &Pendulum, balance: Balance, level: &Curve, p_max:
             sheets.push(course.sheet(seed));
         }
     }
-    let mut critical: Vec<(f64, f64)> =
-        sheets.iter().flat_map(|sheet| sheet.critical.iter().copied()).collect();
-    critical.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let ends: Vec<f64> =
-        [0.0].into_iter().chain(critical.iter().map(|c| c.0)).chain([p_max]).collect();
-    let between: Vec<bool> = ends
-        .windows(2)
-        .map(|both| sheets.iter().any(|sheet| sheet.is_stable(0.5 * (both[0] + both[1]))))
-        .collect();
-    let critical = critical
-        .iter()
-        .zip(between.windows(2))
-        .map(|((p, multiplier), both)| Critical {
-            p: *p,
-            multiplier: *multiplier,
-            stable: [both[0], both[1]],
-        })
-        .collect();
-    Curve { omega, critical, stable_at_first: between[0], fold: None }
+    let critical = sheets.iter().flat_map(|sheet| sheet.critical.iter().copied()).collect();
+    let stable = |p: f64| sheets.iter().any(|sheet| sheet.is_stable(p));
+    let (critical, stable_at_first) = bordered(critical, p_max, stable);
+    Curve { omega, critical, stable_at_first, fold: None }
 }
 
 impl Place {

@@ -145,7 +145,8 @@ pub(super) fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
 fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> Result<(), Error> {
     pendulum.check_mappable()?;
     if pendulum.has_friction() {
-        let why = "friction holds it whatever the drive: rest never loses its stability";
+        let why = "friction holds it whatever the drive, and rest never loses its stability: take theta_r = 0 \
+                   and no effect that rubs";
         return Err(Error::NoRest { why });
     }
     for omega in omegas {
@@ -210,26 +211,11 @@ fn along(pendulum: &Pendulum, balance: Balance, omega: f64, p_max: f64, folds: b
         }
         panels.push((end(i + 1), panel));
     }
-    critical.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let middle_of = |i: usize| {
-        let low = if i == 0 { 0.0 } else { critical[i - 1].0 };
-        let high = critical.get(i).map_or(p_max, |c| c.0);
-        0.5 * (low + high)
-    };
     let stable = |p: f64| {
         let panel = panels.iter().find(|(end, _)| p <= *end).map_or(&panels[0].1, |(_, one)| one);
         is_stable(std::array::from_fn(|k| panel.value(k, p)))
     };
-    let between: Vec<bool> = (0..=critical.len()).map(|i| stable(middle_of(i))).collect();
-    let critical: Vec<Critical> = critical
-        .iter()
-        .zip(between.windows(2))
-        .map(|((p, multiplier), both)| Critical {
-            p: *p,
-            multiplier: *multiplier,
-            stable: [both[0], both[1]],
-        })
-        .collect();
+    let (critical, stable_at_first) = bordered(critical, p_max, stable);
     let onset = critical.iter().find(|c| c.stable == [true, false]);
     let mirrored = pendulum.is_mirror_symmetric();
     let fold = onset
@@ -237,7 +223,27 @@ fn along(pendulum: &Pendulum, balance: Balance, omega: f64, p_max: f64, folds: b
             folds && balance == Balance::Hanging && c.p > 0.0 && (mirrored || c.multiplier > 0.0)
         })
         .and_then(|c| fold_of_onset(&under(pendulum, c.p, omega), c.multiplier));
-    Curve { omega, critical, stable_at_first: between[0], fold }
+    Curve { omega, critical, stable_at_first, fold }
+}
+
+/// Critical amplitudes in order, each with the stability on both sides, and that before the first; `stable`
+/// tells it between two of them.
+pub(super) fn bordered(
+    mut critical: Vec<(f64, f64)>,
+    p_max: f64,
+    stable: impl Fn(f64) -> bool,
+) -> (Vec<Critical>, bool) {
+    critical.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let inner = critical.iter().map(|c| c.0);
+    let ends: Vec<f64> = [0.0].into_iter().chain(inner).chain([p_max]).collect();
+    let between: Vec<bool> =
+        ends.windows(2).map(|both| stable(0.5 * (both[0] + both[1]))).collect();
+    let with_sides = |((p, multiplier), both): (&(f64, f64), &[bool])| Critical {
+        p: *p,
+        multiplier: *multiplier,
+        stable: [both[0], both[1]],
+    };
+    (critical.iter().zip(between.windows(2)).map(with_sides).collect(), between[0])
 }
 
 /// A zero of the interpolant moved to that of the function itself, by one step of Newton's method.

@@ -8,7 +8,7 @@ import click
 
 from pendmap.cli.model_options import model_from, varied_model_options
 from pendmap.cli.options import Outputs, output_options, progress_options, search_options
-from pendmap.cli.show import progress_bar, show
+from pendmap.cli.show import progress_bar, searched, show
 from pendmap.cli.types import NUMBER
 
 if TYPE_CHECKING:
@@ -48,8 +48,6 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the JSON object of a bifurcation diagram."""
-    from pendmap.planes import undecided_cells
-
     a = dataset.attrs
     kinds = dataset["kind"].values
     rows = zip(
@@ -63,22 +61,10 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
         {"kind": str(kinds[kind]), "w": int(w), "first": float(first), "last": float(last)}
         for kind, w, first, last in rows
     ]
-    names = (
-        "points",
-        "starts",
-        "undecided",
-        "failed",
-        "chaos_periods",
-        "seconds",
-        "simd",
-        "threads",
-        "reached_error",
-    )
     return {
         "units": a["units"],
         "varied": a["varied"],
         "branches": branches,
-        **{name: a[name] for name in names},
-        "undecided_at": undecided_cells(dataset),
-        "summary": a["summary"].split("\n"),
+        "points": a["points"],
+        **searched(dataset),
     }

@@ -10,7 +10,7 @@ import click
 
 from pendmap.cli.model_options import model_from, varied_model_options
 from pendmap.cli.options import Outputs, output_options, progress_options, search_options
-from pendmap.cli.show import progress_bar, show
+from pendmap.cli.show import progress_bar, searched, show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,8 +48,6 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the JSON object of a map over two parameters."""
-    from pendmap.planes import undecided_cells
-
     a = dataset.attrs
     regimes = [
         {"kinds": json.loads(str(kinds)), "share": float(share)}
@@ -57,23 +55,11 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
             dataset["regime_kinds"].values, dataset["regime_share"].values, strict=True
         )
     ]
-    names = (
-        "cells",
-        "starts",
-        "undecided",
-        "failed",
-        "chaos_periods",
-        "seconds",
-        "simd",
-        "threads",
-        "reached_error",
-    )
     return {
         "units": a["units"],
         "columns": a["columns"],
         "rows": a["rows"],
         "regimes": regimes,
-        **{name: a[name] for name in names},
-        "undecided_at": undecided_cells(dataset),
-        "summary": a["summary"].split("\n"),
+        "cells": a["cells"],
+        **searched(dataset),
     }

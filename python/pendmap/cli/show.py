@@ -28,6 +28,7 @@ __all__ = [
     "open_viewer",
     "plain",
     "progress_bar",
+    "searched",
     "show",
     "write_all",
     "write_table",
@@ -56,6 +57,21 @@ def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], Non
             bar.update(task, completed=done, total=total or None)
 
         yield report
+
+
+_SEARCHED = (
+    *("starts", "undecided", "failed", "chaos_periods", "seconds", "simd", "threads"),
+    "reached_error",
+)
+
+
+def searched(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return what the JSON of a search over many pendulums says of the search."""
+    from pendmap.planes import undecided_cells
+
+    a = dataset.attrs
+    places = {"undecided_at": undecided_cells(dataset)}
+    return {name: a[name] for name in _SEARCHED} | places | {"summary": a["summary"].split("\n")}
 
 
 def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], Any]) -> None:
