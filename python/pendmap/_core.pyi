@@ -13,6 +13,7 @@ __all__ = [
     "bifurcation",
     "bounds",
     "choose_steps",
+    "counts_turns",
     "default_threads",
     "effects",
     "fit_equations",

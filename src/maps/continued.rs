@@ -156,7 +156,7 @@ impl Course<'_> {
         let mut step = FIRST_SHARE;
         loop {
             let (share, here) = known[known.len() - 1];
-            if share == 1.0 {
+            if share >= 1.0 {
                 return Some(here);
             }
             let next = f64::min(share + step.min(FIRST_SHARE), 1.0);
@@ -362,13 +362,14 @@ fn foreseen<const N: usize>(
 ) -> [f64; N] {
     let skipped = values.len().saturating_sub(FORESEEN);
     let last: Vec<(f64, [f64; N])> = values.skip(skipped).collect();
-    let weight = |x: f64| {
-        let others = last.iter().map(|(other, _)| *other).filter(|other| *other != x);
+    let weight = |k: usize| {
+        let x = last[k].0;
+        let others = (0..last.len()).filter(|other| *other != k).map(|other| last[other].0);
         others.map(|other| (at - other) / (x - other)).product::<f64>()
     };
-    last.iter().fold([0.0; N], |sum, (x, value)| {
-        let weight = weight(*x);
-        std::array::from_fn(|k| sum[k] + weight * value[k])
+    last.iter().enumerate().fold([0.0; N], |sum, (k, (_, value))| {
+        let weight = weight(k);
+        std::array::from_fn(|part| sum[part] + weight * value[part])
     })
 }
 
