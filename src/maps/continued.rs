@@ -26,7 +26,7 @@ const NEAR: f64 = 0.1;
 /// The least step in `p`; the first and the least step of the torque, in parts of it.
 const LEAST_STEP: f64 = 1e-9;
 const FIRST_SHARE: f64 = 0.25;
-const LEAST_SHARE: f64 = 1e-6;
+const LEAST_SHARE: f64 = 1e-4;
 /// The next point is foreseen from this many places.
 const FORESEEN: usize = 5;
 /// A fold this far ahead in `p` is known well enough: the square of the gap falls linearly to it.
