@@ -42,7 +42,7 @@ impl Rests {
 /// At the edge of a set at rest a pendulum creeps into it, ever more slowly, and never arrives: held
 /// in two periods running, nearer in the second, and within this part of the friction of being
 /// held for ever, it counts as at rest. Held states form a line, on which their map is monotone.
-pub const CREEPING: f64 = 0.05;
+const CREEPING: f64 = 0.05;
 
 /// How a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

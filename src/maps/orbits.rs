@@ -15,7 +15,6 @@ use super::approach::approach;
 use super::control::{Control, pool};
 use super::starts::{Axis, Starts};
 use super::vanishing;
-use crate::attractor::capture::CREEPING;
 use crate::error::Error;
 use crate::integrate::{State, accuracy};
 use crate::lanes::Path;
@@ -42,6 +41,8 @@ const LEAST_REACH: f64 = 0.3;
 const SAME: f64 = 1e-6;
 /// Under friction a speed below this is none.
 const STILL: f64 = 1e-9;
+/// A multiplier this near to 1 is that.
+const CREEPS: f64 = 1e-3;
 /// Angles at which the pull on an undriven pendulum is looked at, and halvings between two of them.
 const LOOKS: usize = 2000;
 const BISECTIONS: usize = 60;
@@ -105,9 +106,12 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     let mirror = Mirror::of(pendulum);
     let rubs = pendulum.has_friction();
     let equation = pendulum.equation();
-    // Newton's method leaves a speed of the size of rounding, and creeps to the edge of what is held.
-    let held = |p: &State| {
-        rubs && p[1].abs() < STILL && equation.excess(p[0]) < CREEPING * equation.hold(p[0])
+    // Newton's method leaves a speed of the size of rounding, and creeps to the edge of what is held: there,
+    // too, the neighbours stay where they are, and a multiplier is 1.
+    let held = |orbit: &PeriodicOrbit| {
+        let creeps = (orbit.multipliers.largest() - 1.0).abs() < CREEPS;
+        let stays = |p: &State| p[1].abs() < STILL && (creeps || equation.holds_for_ever(p[0]));
+        rubs && orbit.points.iter().any(stays)
     };
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
@@ -135,7 +139,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
             pool.install(|| next.par_iter().map(search).collect::<Result<_, Error>>())?;
         let before = all.len();
         for orbit in found.into_iter().flatten() {
-            if orbit.points.iter().any(held) {
+            if held(&orbit) {
                 continue;
             }
             let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
