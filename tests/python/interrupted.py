@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import signal
 import subprocess
 from typing import TYPE_CHECKING, Any
@@ -28,3 +29,8 @@ def started(words: Sequence[str], **given: Any) -> Iterator[subprocess.Popen[str
             yield process
         finally:
             process.kill()
+
+
+def any_file(folder: Path, pattern: str) -> bool:
+    """Whether a file matches, also while folders beside it come and go."""
+    return bool(glob.glob(str(folder / pattern)))  # noqa: PTH207 (Path.glob fails where one goes)

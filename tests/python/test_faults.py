@@ -84,10 +84,16 @@ def test_a_rig_and_a_figure_meet_a_full_disk(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_stdout_may_be_full() -> None:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_stdout_may_be_full(unbuffered: str) -> None:
     with open("/dev/full", "w", encoding="utf-8") as full:  # noqa: PTH123
         run = subprocess.run(
-            [str(COMMAND), "info"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+            [str(COMMAND), "info"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
         )
     assert run.returncode == 1
     assert run.stderr == "pendmap: No space left on device\n"

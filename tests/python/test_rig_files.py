@@ -14,7 +14,7 @@ import pytest
 from matplotlib import rc_context
 
 from conftest import COMMAND
-from interrupted import started
+from interrupted import any_file, started
 from pendmap import InputError, figures
 from pendmap.figures import runs as records
 from pendmap.figures import style
@@ -196,7 +196,7 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path, moment: str) -> None
         while (
             moment == "writing"
             and process.poll() is None
-            and not list(tmp_path.glob(".pendmap-*/new/*"))
+            and not any_file(tmp_path, ".pendmap-*/new/*")
         ):
             time.sleep(0.001)
         process.send_signal(signal.SIGINT)

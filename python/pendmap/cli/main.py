@@ -128,7 +128,25 @@ def run() -> None:
         with contextlib.suppress(OSError):
             sys.stdout.flush()
         os._exit(code)
-    sys.exit(code)
+    sys.exit(_flushed(code))
+
+
+def _flushed(code: int) -> int:
+    """Write what stdout still holds; where it cannot, Python says nothing more of it at its end."""
+    try:
+        if sys.stdout is not None:  # it may be closed
+            sys.stdout.flush()
+    except OSError as error:
+        if not code:
+            _say(error.strerror or str(error))
+        _silence()
+        return code or FAILED
+    return code
+
+
+def _silence() -> None:
+    """Let stdout take all that is still written to it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager
@@ -195,7 +213,7 @@ def _failed(error: BaseException) -> int:  # noqa: PLR0911 (one for each way to 
             return _refuse(str(error))
         case _ReaderGone():
             # No message, and none from the interpreter at the end.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _silence()
             return 128 + signal.SIGPIPE
         case MemoryError():
             return _refuse(f"not enough memory: {str(error) or 'choose a smaller grid'}")
