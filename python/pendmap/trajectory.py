@@ -37,6 +37,8 @@ _APART = 0.1
 _SMOOTH_SAMPLES = 200_000
 """Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
 _MOST_SAMPLES = 2_000_000
+_STRONGEST = 1e6
+"""Acceleration of the pivot over gravity up to which a trajectory takes seconds."""
 _ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
 
 
@@ -109,6 +111,11 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     theta, velocity = checks.number("theta", theta), checks.number("velocity", velocity)
     until, tol = checks.number("until", until), checks.number("tol", tol)
     lyapunov = checks.flag("lyapunov", lyapunov)
+    if abs(pendulum.p) > _STRONGEST:
+        raise InputError(
+            f"p is {pendulum.p:g}: allowed is up to {_STRONGEST:g} times gravity; steps become as "
+            "short as the root of it is large"
+        )
     if until <= 0:
         raise InputError(f"until is {until:g}: allowed is a time above 0")
     periods = until / model.period

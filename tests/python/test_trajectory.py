@@ -214,3 +214,10 @@ def test_half_a_turn_is_no_turn() -> None:
     swing = pendmap.simulate(Pendulum(gamma=0.0, p=0.0), 2.0, 0.0, 3.6)
     assert swing.attrs["turns"] == 0
     assert "full turn" not in swing.attrs["summary"]
+
+
+def test_a_drive_that_takes_steps_without_end_is_refused() -> None:
+    assert pendmap.simulate(pendmap.Pendulum(p=1e4), 1.0, 0.0, 1.0).theta.size > 1
+    for p in (-2e6, 1e14):
+        with pytest.raises(InputError, match="times gravity"):
+            pendmap.simulate(pendmap.Pendulum(p=p), 1.0, 0.0, 1.0)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 import unicodedata
 from typing import TYPE_CHECKING
@@ -178,3 +180,27 @@ def test_a_description_is_read_or_refused_whatever_its_values(tmp_path: Path) ->
                 said.append(str(refused))
     assert len(said) > 100
     assert max(map(len, said)) <= 500
+
+
+def test_a_parquet_file_with_one_byte_wrong_ends_no_process(tmp_path: Path) -> None:
+    # In a process of its own: a library that aborts takes the process down.
+    code = (
+        "import sys, numpy as np, pyarrow as pa\n"
+        "from pyarrow import parquet\n"
+        "from pendmap import InputError, read_experiment\n"
+        "time = np.arange(60) / 20\n"
+        "parquet.write_table(pa.table({'t_s': time, 'theta_rad': np.cos(6 * time)}), sys.argv[1])\n"
+        "whole, refused = open(sys.argv[1], 'rb').read(), 0\n"
+        "footer = int.from_bytes(whole[-8:-4], 'little')\n"
+        "for place in range(len(whole) - 8 - footer, len(whole) - 8):\n"
+        "    data = bytearray(whole)\n"
+        "    data[place] = (data[place] + 1) % 256\n"
+        "    open(sys.argv[1], 'wb').write(data)\n"
+        "    try: read_experiment(sys.argv[1])\n"
+        "    except InputError: refused += 1\n"
+        "print(refused)\n"
+    )
+    words = [sys.executable, "-c", code, str(tmp_path / "run.parquet")]
+    run = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert int(run.stdout) > 40

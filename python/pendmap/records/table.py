@@ -91,9 +91,9 @@ def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.
     from pyarrow import parquet
 
     file = parquet.ParquetFile(io.BytesIO(data))
+    # What the groups say of themselves: to ask a damaged column ends the process.
     groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
-    parts = [group.column(k) for group in groups for k in range(group.num_columns)]
-    size = sum(max(8 * part.num_values, part.total_uncompressed_size) for part in parts)
+    size = sum(max(8 * g.num_rows * g.num_columns, g.total_byte_size) for g in groups)
     if file.metadata.num_columns > MOST_COLUMNS:
         count = file.metadata.num_columns
         raise InputError(f"{where}: has {count} columns: allowed are up to {MOST_COLUMNS}")
@@ -101,8 +101,13 @@ def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.
         raise InputError(f"{where}: unpacks to {size / 2**20:.0f} MiB: allowed are 1024 MiB")
     # A text is unpacked once, however many rows have it.
     kinds = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary)
-    texts = [field.name for field in file.schema_arrow if any(kind(field.type) for kind in kinds)]
-    frame = parquet.read_table(io.BytesIO(data), read_dictionary=texts).to_pandas()
+    fields = list(file.schema_arrow)
+    texts = [field.name for field in fields if any(kind(field.type) for kind in kinds)]
+    # Lists have no bound, and are no numbers. One thread: what a damaged file raises in another
+    # one ends the process, too.
+    flat = [field.name for field in fields if not pa.types.is_nested(field.type)]
+    whole = parquet.ParquetFile(io.BytesIO(data), read_dictionary=texts, pre_buffer=False)
+    frame = whole.read(columns=flat, use_threads=False).to_pandas()
     frame = frame.reset_index() if frame.index.name else frame
     columns = []
     for k in range(frame.shape[1]):
