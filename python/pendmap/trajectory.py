@@ -113,8 +113,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     lyapunov = checks.flag("lyapunov", lyapunov)
     if abs(pendulum.p) > _STRONGEST:
         raise InputError(
-            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number of steps "
-            "grows with its root"
+            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number "
+            "of steps grows with its root"
         )
     if until <= 0:
         raise InputError(f"until is {until:g}: allowed is a time above 0")
