@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 from blind_cases import SOUND, Case, record
 from blind_difficulty import difficulty
 from pendmap import virtual_rig
-from pendmap.discrepancy import diagnose
-from pendmap.discrepancy.baseline import baseline
-from pendmap.discrepancy.evidence import evidence_of
+from pendmap.diagnosis import diagnose
+from pendmap.diagnosis.baseline import baseline
+from pendmap.diagnosis.data import evidence_of
 from pendmap.errors import InputError
 from pendmap.model.effects import library
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 FAMILIES = {
     "damping": "damping",

@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blind_cases import record
-from pendmap.discrepancy.baseline import baseline
-from pendmap.discrepancy.candidates import candidates
-from pendmap.discrepancy.evidence import Evidence, evidence_of
-from pendmap.discrepancy.refit import Refits
-from pendmap.discrepancy.scores import scores_of
-from pendmap.discrepancy.trial import fitted
+from pendmap.diagnosis.baseline import baseline
+from pendmap.diagnosis.candidates import candidates
+from pendmap.diagnosis.data import Evidence, evidence_of
+from pendmap.diagnosis.refit import Refits
+from pendmap.diagnosis.scores import scores_of
+from pendmap.diagnosis.fitted_model import fitted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from blind_cases import Case
-    from pendmap.discrepancy.trial import Trial, Windows
+    from pendmap.diagnosis.fitted_model import Trial, Windows
 
 CLEAR = 25.0
 """Separation times score from which names are told apart nearly always."""

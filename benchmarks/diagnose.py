@@ -44,7 +44,7 @@ class Timed:
 def one(case: str, seed: int) -> Timed:
     """Make, read and diagnose an experiment of a case."""
     from pendmap import read_experiment, virtual_rig  # noqa: PLC0415 (after the threads are set)
-    from pendmap.discrepancy import diagnose  # noqa: PLC0415
+    from pendmap.diagnosis import diagnose  # noqa: PLC0415
 
     effects, without = CASES[case]
     request = virtual_rig.Request(

@@ -33,13 +33,13 @@ import numpy as np
 from blind_report import wilson
 from peers.report import machine, say, table
 from pendmap import virtual_rig
-from pendmap.discrepancy import diagnose
+from pendmap.diagnosis import diagnose
 from pendmap.records import read_experiment
 from pendmap.virtual_rig import RunPlan
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy import Discrepancy
-    from pendmap.discrepancy.menu import Proposal
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.diagnosis.next_experiment.proposals import Proposal
     from pendmap.records import Experiment
 
 EFFECTS = {

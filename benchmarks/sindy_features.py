@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.diagnosis.candidates import Candidate, candidates
 from pendmap.model import Rig
 from pendmap.virtual_rig import EFFECTS
 from pendmap.virtual_rig.drive import Drive

@@ -24,7 +24,7 @@ from pendmap import (
     simulate,
     virtual_rig,
 )
-from pendmap.discrepancy import diagnose
+from pendmap.diagnosis import diagnose
 from pendmap.figures import style
 
 HERE = Path(__file__).resolve().parent

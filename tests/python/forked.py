@@ -21,7 +21,7 @@ from pendmap import discrepancy, figures, identification, viewer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-ROOMS = ("pendmap", "pendmap.identification", "pendmap.discrepancy")
+ROOMS = ("pendmap", "pendmap.identification", "pendmap.diagnosis")
 PATIENCE = 60
 """Seconds after which a child is taken to wait for ever."""
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pendmap import virtual_rig
-from pendmap.discrepancy import Discrepancy, diagnose
+from pendmap.diagnosis import Discrepancy, diagnose
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:

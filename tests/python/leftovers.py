@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import pendmap
-from pendmap.discrepancy.noise import Remainder, remainder_of
+from pendmap.diagnosis.noise import Remainder, remainder_of
 from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:

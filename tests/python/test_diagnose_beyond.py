@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-import pendmap.discrepancy
+import pendmap.diagnosis
 from hidden import once
 from pendmap import InputError, _core, figures, viewer
 from pendmap.cli import main
 from pendmap.cli.show import plain
-from pendmap.discrepancy import Discrepancy, summary
+from pendmap.diagnosis import Discrepancy, summary
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -89,7 +89,7 @@ def test_a_model_that_cannot_be_given_out_costs_no_verdict(
     record = tmp_path / "run.csv"
     record.write_text("".join(f"{k / 100},{np.cos(k / 20):.4f}\n" for k in range(500)))
     found = anew()
-    monkeypatch.setattr(pendmap.discrepancy, "diagnose", lambda *_, **__: found)
+    monkeypatch.setattr(pendmap.diagnosis, "diagnose", lambda *_, **__: found)
 
     def refuse(*_: Any) -> None:  # noqa: ANN401 (as the one it stands for)
         raise InputError(LOST)
@@ -116,7 +116,7 @@ def test_records_of_another_law_are_refused_by_their_name(tmp_path: Path) -> Non
     rows = np.c_[t, 3.1 * np.exp(-0.5 * t) * np.cos(6 * t)]
     np.savetxt(record, rows, "%.6f", ",", header="t_s,theta_rad", comments="")
     with pytest.raises(InputError, match=r"spring\.csv: no model follows these records: "):
-        pendmap.discrepancy.diagnose(pendmap.read_experiment(record))
+        pendmap.diagnosis.diagnose(pendmap.read_experiment(record))
 
 
 def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Path) -> None:
@@ -125,4 +125,4 @@ def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Pat
     record.write_text(rows)
     model = pendmap.Rig.of(w0=5.0, torque=1e9)
     with pytest.raises(InputError, match=r"run\.csv: no model follows these records: "):
-        pendmap.discrepancy.diagnose(pendmap.read_experiment(record), model=model)
+        pendmap.diagnosis.diagnose(pendmap.read_experiment(record), model=model)

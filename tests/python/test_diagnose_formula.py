@@ -12,9 +12,9 @@ import pytest
 
 from bumpy import BUMP, FILE, experiment, torque
 from pendmap import Formula, InputError, Rig, load_formulas, load_model
-from pendmap.discrepancy import TorqueFunction, diagnose
-from pendmap.discrepancy.functions import call_once
-from pendmap.discrepancy.summary import as_text
+from pendmap.diagnosis import TorqueFunction, diagnose
+from pendmap.diagnosis.functions import call_once
+from pendmap.diagnosis.summary import as_text
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def test_a_function_s_faults_are_said_on_one_line(
 ) -> None:
     records = read_experiment(experiment(tmp_path / "records"))
     # Before anything is fitted, which takes a while.
-    module = importlib.import_module("pendmap.discrepancy.diagnose")
+    module = importlib.import_module("pendmap.diagnosis.diagnose")
     monkeypatch.setattr(module, "baseline", pytest.fail)
     with (
         np.errstate(divide="ignore", invalid="ignore"),

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import pytest
 
 from hidden import diagnosed
-from pendmap.discrepancy.sides import better_side
-from pendmap.discrepancy.trial import fitted
+from pendmap.diagnosis.sides import better_side
+from pendmap.diagnosis.fitted_model import fitted
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pendmap.discrepancy import Discrepancy
-    from pendmap.discrepancy.trial import Trial
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.diagnosis.fitted_model import Trial
 
 
 def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> Trial:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pendmap.discrepancy import diagnose
-from pendmap.discrepancy.physical import unphysical
-from pendmap.discrepancy.summary import as_json, as_text
+from pendmap.diagnosis import diagnose
+from pendmap.diagnosis.physical import unphysical
+from pendmap.diagnosis.summary import as_json, as_text
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 RECORDS = os.environ.get("PENDMAP_RECORDS", "")
 

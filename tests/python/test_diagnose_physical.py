@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pendmap import report, virtual_rig
-from pendmap.discrepancy import diagnose
-from pendmap.discrepancy.below_zero import below_zero
-from pendmap.discrepancy.candidates import candidates
-from pendmap.discrepancy.evidence import evidence_of
-from pendmap.discrepancy.held import Held, tried
-from pendmap.discrepancy.physical import physical, unphysical
-from pendmap.discrepancy.refit import Found
-from pendmap.discrepancy.summary import as_json, as_text
-from pendmap.discrepancy.trial import fitted
+from pendmap.diagnosis import diagnose
+from pendmap.diagnosis.below_zero import below_zero
+from pendmap.diagnosis.candidates import candidates
+from pendmap.diagnosis.data import evidence_of
+from pendmap.diagnosis.held import Held, tried
+from pendmap.diagnosis.physical import physical, unphysical
+from pendmap.diagnosis.state import Found
+from pendmap.diagnosis.summary import as_json, as_text
+from pendmap.diagnosis.fitted_model import fitted
 from pendmap.errors import InputError
 from pendmap.model import Effect, Rig
 from pendmap.records import read_experiment

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 from pendmap import read_experiment, virtual_rig
-from pendmap.discrepancy.baseline import baseline, taken_by
-from pendmap.discrepancy.candidates import candidates
-from pendmap.discrepancy.evidence import Evidence, evidence_of
-from pendmap.discrepancy.refit import Refits
-from pendmap.discrepancy.rests import Rests
-from pendmap.discrepancy.scores import Scores, scores_of
-from pendmap.discrepancy.slipped import from_short_windows, slipped
+from pendmap.diagnosis.baseline import baseline, taken_by
+from pendmap.diagnosis.candidates import candidates
+from pendmap.diagnosis.data import Evidence, evidence_of
+from pendmap.diagnosis.refit import Refits
+from pendmap.diagnosis.rests import Rests
+from pendmap.diagnosis.scores import Scores, scores_of
+from pendmap.diagnosis.slipped import from_short_windows, slipped
 from pendmap.errors import InputError
 from pendmap.identification.fitting import fit_runs
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pendmap.discrepancy.trial import Trial
+    from pendmap.diagnosis.fitted_model import Trial
 
 
 def recorded(folder: Path, *effects: str, **given: float) -> Evidence:
@@ -144,7 +144,7 @@ def test_where_nothing_is_found_without_an_effect_the_baseline_is(
         fit = dataclasses.replace(base.fit, chi2=2 * base.fit.chi2)
         return dataclasses.replace(base, chosen=both.chosen[1:], fit=fit)
 
-    monkeypatch.setattr("pendmap.discrepancy.rests.with_candidates", lost)
+    monkeypatch.setattr("pendmap.diagnosis.rests.with_candidates", lost)
     monkeypatch.setattr(Rests, "fit_without", astray)
     rests = Rests(evidence, base, refits)
     rest = rests.less(both, both.chosen[0])

@@ -9,11 +9,11 @@ import pytest
 
 import pendmap
 from hidden import diagnosed
-from pendmap.discrepancy.calibration import complete
-from pendmap.discrepancy.candidates import candidates
-from pendmap.discrepancy.rivals import SPECIAL, Rival, Standing
-from pendmap.discrepancy.trial import ALIKE
-from pendmap.discrepancy.verdict import CHANCE, SURE, closes_most
+from pendmap.diagnosis.calibration import complete
+from pendmap.diagnosis.candidates import candidates
+from pendmap.diagnosis.alternatives import SPECIAL, Rival, Standing
+from pendmap.diagnosis.fitted_model import ALIKE
+from pendmap.diagnosis.verdict import CHANCE, SURE, closes_most
 
 if TYPE_CHECKING:
     from pathlib import Path

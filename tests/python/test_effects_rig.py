@@ -13,10 +13,10 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import virtual_rig
-from pendmap.discrepancy.baseline import baseline
-from pendmap.discrepancy.candidates import Candidate, placed
-from pendmap.discrepancy.evidence import Evidence, evidence_of
-from pendmap.discrepancy.trial import fitted
+from pendmap.diagnosis.baseline import baseline
+from pendmap.diagnosis.candidates import Candidate, placed
+from pendmap.diagnosis.data import Evidence, evidence_of
+from pendmap.diagnosis.fitted_model import fitted
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:

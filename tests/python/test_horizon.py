@@ -10,15 +10,15 @@ import pytest
 
 from hidden import once
 from pendmap import Rig
-from pendmap.discrepancy import diagnosed_model
-from pendmap.discrepancy.horizon import forecasts_of
-from pendmap.discrepancy.replay import Motion, replayed
-from pendmap.discrepancy.strength import strength_of
+from pendmap.diagnosis import diagnosed_model
+from pendmap.diagnosis.forecast import forecasts_of
+from pendmap.diagnosis.replay import Motion, replayed
+from pendmap.diagnosis.strength import strength_of
 from pendmap.identification import compare
 from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 
 @pytest.fixture

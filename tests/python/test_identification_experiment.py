@@ -12,7 +12,7 @@ import pendmap
 from decays import decay, record
 from driven_decays import motion
 from pendmap import InputError
-from pendmap.discrepancy import diagnose
+from pendmap.diagnosis import diagnose
 from pendmap.identification import find_peaks, identify, identify_experiment
 from pendmap.identification.left_out import left_out
 from pendmap.records import Experiment, Run

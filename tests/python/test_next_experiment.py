@@ -15,14 +15,14 @@ import pytest
 
 from hidden import once
 from pendmap import virtual_rig
-from pendmap.discrepancy import Discrepancy, diagnose
-from pendmap.discrepancy.ahead import Prospects
-from pendmap.discrepancy.information import Columns, Information
-from pendmap.discrepancy.limits import needed
-from pendmap.discrepancy.menu import menu_of
-from pendmap.discrepancy.outlook import one_left, wrong_name
-from pendmap.discrepancy.summary import as_json
-from pendmap.discrepancy.trial import fitted
+from pendmap.diagnosis import Discrepancy, diagnose
+from pendmap.diagnosis.next_experiment.ahead import Prospects
+from pendmap.diagnosis.next_experiment.information import Columns, Information
+from pendmap.diagnosis.next_experiment.limits import needed
+from pendmap.diagnosis.next_experiment.proposals import menu_of
+from pendmap.diagnosis.next_experiment.outlook import one_left, wrong_name
+from pendmap.diagnosis.summary import as_json
+from pendmap.diagnosis.fitted_model import fitted
 from pendmap.errors import InputError
 from pendmap.identification.joint import as_fit_run
 from pendmap.identification.reading import reading_of
@@ -30,7 +30,7 @@ from pendmap.records import read_experiment
 from pendmap.virtual_rig import Request, RunPlan
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy.menu import Proposal
+    from pendmap.diagnosis.next_experiment.proposals import Proposal
     from pendmap.records import Experiment, Run
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from hidden import diagnosed
 from leftovers import COUNT, INTERVAL, SAMPLES, W0, coloured, counted, remainder, swing
-from pendmap.discrepancy.verdict import CHANCE
+from pendmap.diagnosis.verdict import CHANCE
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,11 +12,11 @@ import pytest
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import virtual_rig
-from pendmap.discrepancy.baseline import baseline
-from pendmap.discrepancy.candidates import candidates
-from pendmap.discrepancy.evidence import evidence_of
-from pendmap.discrepancy.named import diagnosed_model
-from pendmap.discrepancy.trial import with_candidates
+from pendmap.diagnosis.baseline import baseline
+from pendmap.diagnosis.candidates import candidates
+from pendmap.diagnosis.data import evidence_of
+from pendmap.diagnosis.named import diagnosed_model
+from pendmap.diagnosis.fitted_model import with_candidates
 from pendmap.identification.fitting import FitRun, fit_runs, score
 from pendmap.identification.sensitivity import sensitivities, window_slopes
 from pendmap.model import Formula, Rig, load_model, save_model
@@ -26,7 +26,7 @@ from pendmap.records import read_experiment
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pendmap.discrepancy.trial import Trial
+    from pendmap.diagnosis.fitted_model import Trial
 
 Q, N = "power_law_drag.q", "power_law_drag.n"
 BASE = ("w0", "c_over_m", "Tr")

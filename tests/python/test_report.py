@@ -16,8 +16,8 @@ from matplotlib import rc_context
 
 from hidden import once
 from pendmap import InputError, figures, report
-from pendmap.discrepancy import FunctionScore
-from pendmap.discrepancy.summary import as_json
+from pendmap.diagnosis import FunctionScore
+from pendmap.diagnosis.summary import as_json
 from pendmap.figures import discrepancy, style
 from pendmap.figures.report import FIGURES
 from pendmap.report.document import (
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conftest import Run
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 VOID = {"meta", "img", "br"}
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import pendmap
 from pendmap import InputError
-from pendmap.discrepancy import candidates as search
-from pendmap.discrepancy.candidates import Candidate, candidates
+from pendmap.diagnosis import candidates as search
+from pendmap.diagnosis.candidates import Candidate, candidates
 from pendmap.model import Effect, effects
 from pendmap.model.units import Units
 

@@ -24,7 +24,7 @@ from pendmap.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
     from pendmap.model import Formula
 
 __all__ = ["command"]
@@ -102,7 +102,7 @@ def command(  # noqa: PLR0913 (an option each)
     """
     # The matrices are tall and narrow: threads for them cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from pendmap.discrepancy import diagnose
+    from pendmap.diagnosis import diagnose
     from pendmap.model import load_formulas
     from pendmap.records import files_of, read_experiment
 
@@ -143,7 +143,7 @@ def command(  # noqa: PLR0913 (an option each)
         line = "pendmap " + shlex.join(sys.argv[1:])
         written = write_all(_files(found, outputs, line), keep=True)
     if as_json:
-        from pendmap.discrepancy.summary import as_json as fields
+        from pendmap.diagnosis.summary import as_json as fields
 
         more = {"model": written.name(outputs[0]), "simd": instruction_set()}
         click.echo(json.dumps(plain(fields(found) | more), allow_nan=False))
@@ -165,7 +165,7 @@ def _named(where: str) -> Iterator[None]:
 
 
 def _check_candidates(own: Sequence[Formula]) -> None:
-    from pendmap.discrepancy.candidates import checked_own
+    from pendmap.diagnosis.candidates import checked_own
 
     checked_own(own)
 
@@ -186,7 +186,7 @@ def _own(suffix: str) -> Path:
 def _files(
     found: Discrepancy, outputs: tuple[Path, Path | None, Path | None, Path | None], line: str
 ) -> Iterator[tuple[Callable[[Path], Path], Path]]:
-    from pendmap.discrepancy import diagnosed_model
+    from pendmap.diagnosis import diagnosed_model
     from pendmap.model import save_model
 
     out, plot, report, rerun = outputs
@@ -206,7 +206,7 @@ def _files(
 
 
 def _say(found: Discrepancy) -> None:
-    from pendmap.discrepancy.summary import as_text, ranking_table
+    from pendmap.diagnosis.summary import as_text, ranking_table
 
     for line in as_text(found):
         click.echo(line)

@@ -41,6 +41,13 @@ __all__ = ["command"]
 @click.option("--jitter", type=NUMBER, default=0.0, help="Of the clock, s rms.  [default: 0]")
 @click.option("--dropouts", type=NUMBER, default=0.0, help="Share of samples lost.  [default: 0]")
 @click.option("--outliers", type=NUMBER, default=0.0, help="Share that is false.  [default: 0]")
+@click.option(
+    "--mess",
+    type=NUMBER,
+    default=0.0,
+    help="Weak disturbances beside the effects (texture of the bearing, drifting zero, slow noise),"
+    " in multiples of the noise.  [default: 0]",
+)
 @click.option("--free", type=int, help="Free decays.  [default: 1; forced: 0; hidden: 5]")
 @click.option("--forced", type=int, help="Runs under drive.  [default: 0; forced and hidden: 4]")
 @click.option(

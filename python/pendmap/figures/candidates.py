@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.discrepancy.race import GATE
+from pendmap.diagnosis.search import GATE
 from pendmap.figures import blocks, style
 from pendmap.figures.gap import AFTER, name_runs
 from pendmap.pictures.names import unit_of
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 __all__ = [
     "coefficient_handles",

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 __all__ = ["figure"]
 

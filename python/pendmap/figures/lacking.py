@@ -13,7 +13,7 @@ from pendmap.pictures.diagnosis import ACCELERATION, OVER_SAID
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 __all__ = ["draw_torque", "shown_over"]
 

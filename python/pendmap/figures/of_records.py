@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
     from pendmap.identification import Comparison, IdentificationReport
     from pendmap.records import Experiment
 
@@ -111,7 +111,7 @@ def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     found : Discrepancy
-        What ``pendmap.discrepancy.diagnose`` returned.
+        What ``pendmap.diagnosis.diagnose`` returned.
     path : str or path
         As of :func:`pendmap.figures.draw`.
 
@@ -138,7 +138,7 @@ def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     found : Discrepancy
-        What ``pendmap.discrepancy.diagnose`` returned.
+        What ``pendmap.diagnosis.diagnose`` returned.
     path : str or path
         ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
         beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
     from pendmap.report.document import Document
 
 __all__ = ["FIGURES", "SUFFIXES", "write"]

@@ -13,7 +13,7 @@ from pendmap.report.ranking import ranked
 from pendmap.report.wording import lead
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
 __all__ = ["diagnosis"]
 
@@ -27,7 +27,7 @@ def diagnosis(found: Discrepancy) -> Document:
     Parameters
     ----------
     found : Discrepancy
-        As of :func:`pendmap.discrepancy.diagnose`.
+        As of :func:`pendmap.diagnosis.diagnose`.
     """
     name = Path(found.evidence.experiment.path).resolve().name
     return Document(

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.further import Reasons, attempted
-from pendmap.discrepancy.given_out import given_out
-from pendmap.discrepancy.physical import unphysical
-from pendmap.discrepancy.strength import strength_of
+from pendmap.diagnosis.further import Reasons, attempted
+from pendmap.diagnosis.given_out import zeroed
+from pendmap.diagnosis.strength import strength_of
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Formula, Items, Name, Paragraph, Picture, Section, Table
 from pendmap.report.wording import (
@@ -26,7 +25,7 @@ from pendmap.report.wording import (
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pendmap.discrepancy import Discrepancy, NamedEffect
+    from pendmap.diagnosis import Discrepancy, NamedEffect
     from pendmap.identification import Estimate
     from pendmap.report.document import Block
 
@@ -45,7 +44,7 @@ def added(found: Discrepancy) -> Section:
             (
                 Paragraph("Nothing: no effect is claimed. The model given out is the baseline."),
                 _parameters(found),
-                *_unphysical(found),
+                *_zeroed(found),
             ),
         )
     blocks: list[Block] = []
@@ -78,7 +77,7 @@ def added(found: Discrepancy) -> Section:
         )
     )
     blocks += [Paragraph("How the other parameters moved:"), _parameters(found)]
-    return Section("What was added", (*blocks, *_unphysical(found)))
+    return Section("What was added", (*blocks, *_zeroed(found)))
 
 
 def _signed(term: str) -> str:
@@ -151,30 +150,9 @@ def _said(estimate: Estimate, wider: float) -> str:
     return stated(estimate.value, wider * (estimate.stderr or 0.0))
 
 
-def _unphysical(found: Discrepancy) -> Iterator[Block]:
-    for fit, which in ((found.base.trial.fit, "baseline"), (found.best.trial.fit, "model found")):
-        for name in unphysical(fit):
-            said = (
-                f" of the {which} is negative: that is unphysical, no pendulum has it. It makes up"
-                " for what is missing."
-            )
-            yield Paragraph((Name(name), said))
-    if unphysical(found.best.trial.fit) and found.usable is not None:
-        yield Paragraph(
-            "The model file has 0 there, and the rest found again, to a residual of "
-            f"{mrad(found.usable.trial.fit.rms)} rms:"
-        )
-        rows = (
-            (Name(name), unit_of(name, found.definition), f"{value:.5g}")
-            for name, value in given_out(found.usable).items()
-        )
-        yield Table(("parameter", "unit", "in the model file"), tuple(rows))
-    for name, since in found.below_zero.items():
-        said = (
-            f" is below 0 from {since:.3g} s in the laboratory on, by what drifts. That is "
-            "unphysical too: the drift stands for something else."
-        )
-        yield Paragraph((Name(name), said))
+def _zeroed(found: Discrepancy) -> Iterator[Block]:
+    for said in zeroed(found):
+        yield Paragraph(said)
 
 
 def run_by_run(found: Discrepancy) -> Section:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.discrepancy.summary import PLACES
-from pendmap.discrepancy.torque import STANDS_OUT
-from pendmap.discrepancy.verdict import CHANCE, FAINT, FORECAST
+from pendmap.diagnosis.summary import PLACES
+from pendmap.diagnosis.residual_torque import STANDS_OUT
+from pendmap.diagnosis.verdict import CHANCE, FAINT, FORECAST
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
 from pendmap.report.noise import worth
 from pendmap.report.wording import chance, compared, joined, mrad, number, stated, values
@@ -14,8 +14,8 @@ from pendmap.report.wording import chance, compared, joined, mrad, number, state
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pendmap.discrepancy import Discrepancy
-    from pendmap.discrepancy.horizon import Forecast
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.diagnosis.forecast import Forecast
     from pendmap.report.document import Block, Text
 
 __all__ = ["gap", "verdict", "where"]

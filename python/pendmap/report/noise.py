@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
 
     Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.advice import MARGIN
-from pendmap.discrepancy.limits import SURELY
+from pendmap.diagnosis.next_experiment.advice import MARGIN
+from pendmap.diagnosis.next_experiment.limits import SURELY
 from pendmap.identification.left_out import left_out
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Items, Name, Paragraph, Section, Strong, Table
@@ -16,10 +16,10 @@ from pendmap.words import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pendmap.discrepancy import Discrepancy
-    from pendmap.discrepancy.candidates import Candidate
-    from pendmap.discrepancy.limits import Limit
-    from pendmap.discrepancy.outlook import Outlook
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.next_experiment.limits import Limit
+    from pendmap.diagnosis.next_experiment.outlook import Outlook
     from pendmap.report.document import Block, Text
 
 __all__ = ["following", "set_aside"]
@@ -146,7 +146,7 @@ def set_aside(found: Discrepancy) -> Section:
                         joined(a.names, "with"),
                         counted(a.stage, "effect") if a.stage else "the baseline",
                         gained(a.gain),
-                        gained(a.held_gain),
+                        "" if a.held_gain is None else gained(a.held_gain),
                     )
                     for a in dropped
                 ),

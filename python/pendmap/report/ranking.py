@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.race import GATE
-from pendmap.discrepancy.summary import ranking_table
+from pendmap.diagnosis.search import GATE
+from pendmap.diagnosis.summary import ranking_table
 from pendmap.report.document import Name, Paragraph, Picture, Section, Table
 from pendmap.report.wording import gained, number, stated
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pendmap.discrepancy import Discrepancy
-    from pendmap.discrepancy.rivals import Rival, Standing
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.diagnosis.alternatives import Rival, Standing
     from pendmap.report.document import Block
 
 __all__ = ["ranked"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.discrepancy.candidates import own_name
+from pendmap.diagnosis.candidates import own_name
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Name, Strong, Table
 from pendmap.words import written
@@ -13,7 +13,7 @@ from pendmap.words import written
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from pendmap.discrepancy import Discrepancy, NamedEffect
+    from pendmap.diagnosis import Discrepancy, NamedEffect
 
 __all__ = [
     "chance",

@@ -19,7 +19,7 @@ from pendmap.viewer.decay import BAND, MILLI, MINUS, SIGMA
 from pendmap.viewer.series import Series
 
 if TYPE_CHECKING:
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
     from pendmap.identification.fitting import FitRun, TrajectoryFit
 
 __all__ = ["Beside", "beside", "log", "magnified", "views"]

@@ -21,7 +21,7 @@ from pendmap.viewer.panel import Panel
 if TYPE_CHECKING:
     import os
 
-    from pendmap.discrepancy import Discrepancy
+    from pendmap.diagnosis import Discrepancy
     from pendmap.viewer.beside import Beside
 
 __all__ = ["record_discrepancy"]
@@ -46,7 +46,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
     Parameters
     ----------
     found : Discrepancy
-        What :func:`pendmap.discrepancy.diagnose` returned.
+        What :func:`pendmap.diagnosis.diagnose` returned.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 

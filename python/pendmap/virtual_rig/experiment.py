@@ -13,11 +13,14 @@ from pendmap.virtual_rig.catalogue import draw, draws_size
 from pendmap.virtual_rig.drive import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
+from pendmap.virtual_rig.mess import Mess
 from pendmap.virtual_rig.presets import PRESETS, RunPlan
 from pendmap.virtual_rig.readings import ReadingEffect, read
 from pendmap.virtual_rig.sensor import Sensor
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from pendmap.virtual_rig.effect import Effect
@@ -33,7 +36,7 @@ WINDOW: Final = 1.0
 _AFTER_REST: Final = 3.0
 _MOST_SAMPLES: Final = 10_000_000
 """Samples of all runs together; their records take 250 megabytes."""
-_RIG, _RUNS, _EFFECTS, _SENSOR = range(4)
+_RIG, _RUNS, _EFFECTS, _SENSOR, _MESS = range(5)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,6 +63,8 @@ class Request:
         Noise of the sensor, degrees.
     rate, counts, correlation, dropouts, outliers, jitter
         As in :class:`Sensor`.
+    mess : float
+        Size of weak disturbances that no effect describes, in multiples of the noise, at most 100.
     plans : tuple of RunPlan
         The runs, instead of those that the preset draws; then neither their number nor their
         duration is asked for. Runs that come first are the same whatever follows them.
@@ -87,6 +92,7 @@ class Request:
     dropouts: float = 0.0
     outliers: float = 0.0
     jitter: float = 0.0
+    mess: float = 0.0
     plans: tuple[RunPlan, ...] = ()
 
     def __post_init__(self) -> None:
@@ -100,6 +106,8 @@ class Request:
             raise InputError(f"size is {self.size:g}: allowed is a finite number above 0")
         if self.duration is not None and not 1 <= self.duration <= 3600:  # noqa: PLR2004
             raise InputError(f"duration is {self.duration:g}: allowed is 1 to 3600 s")
+        if not 0 <= self.mess <= 100:  # noqa: PLR2004 (said in the docstring)
+            raise InputError(f"mess must be a number from 0 to 100, got {self.mess:g}")
         self._refuse_idle()
         self._refuse_plans()
         free, forced = self.runs
@@ -199,6 +207,7 @@ class Experiment:
     effects: list[Effect]
     sensor: Sensor
     runs: list[Run]
+    mess: Mess | None = None
 
     @property
     def gap(self) -> float:
@@ -234,12 +243,14 @@ def make(request: Request) -> Experiment:
     readings = [effect for effect in effects if isinstance(effect, ReadingEffect)]
     others = [effect for effect in effects if not isinstance(effect, ReadingEffect)]
     lab = np.array([plan.lab_time for plan in plans])
+    mess = _mess(request, sensor, parameters.w0, plans)
+    bearing = [] if mess is None else [mess.texture]
     drive = Drive.harmonic(
         np.array([plan.p for plan in plans]),
         np.array([plan.frequency for plan in plans]),
         np.array([plan.phase for plan in plans]),
     )
-    equation = Equation(parameters, drive, lab, others)
+    equation = Equation(parameters, drive, lab, others + bearing)
     paths = _integrate(equation, plans, readings)
     if preset.until_rest and request.duration is None and not request.plans:
         plans = [_until_rest(*pair) for pair in zip(plans, paths, strict=True)]
@@ -249,12 +260,15 @@ def make(request: Request) -> Experiment:
     ]
     strayed = [np.zeros_like(times) for times in instants]
     if others:
-        strayed = _strayed(Equation(parameters, drive, lab, []), paths, instants)
+        strayed = _strayed(Equation(parameters, drive, lab, bearing), paths, instants)
     runs = []
     for k, (plan, path) in enumerate(zip(plans, paths, strict=True)):
         reading = read(path, _true(instants[k], readings), readings)
-        angle, keep = sensor.write_down(reading, request.stream(_SENSOR, k, 0))
         gap = reading - path.angle(instants[k]) + strayed[k]
+        if mess is not None:
+            at = plan.lab_time + instants[k]
+            reading = reading + mess.reading(at, sensor, request.stream(_MESS, k, 1))
+        angle, keep = sensor.write_down(reading, request.stream(_SENSOR, k, 0))
         runs.append(
             Run(
                 plan=plan,
@@ -265,7 +279,17 @@ def make(request: Request) -> Experiment:
                 gap=math.sqrt(float(np.mean(gap**2))),
             )
         )
-    return Experiment(request, parameters, effects, sensor, runs)
+    return Experiment(request, parameters, effects, sensor, runs, mess)
+
+
+def _mess(
+    request: Request, sensor: Sensor, w0: float, plans: Sequence[RunPlan]
+) -> Mess | None:
+    if request.mess == 0:
+        return None
+    size = request.mess * math.hypot(sensor.noise, sensor.count / math.sqrt(12))
+    longest = max(plan.lab_time + plan.duration for plan in plans)
+    return Mess.made(request.stream(_MESS), size, w0, longest)
 
 
 def _sensor(request: Request, rng: np.random.Generator) -> Sensor:

@@ -23,7 +23,7 @@ impl Law for AsymmetricCoulomb {
             unit: "rad/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],
-            typical: [1e-4, 0.3],
+            typical: [-0.3, 0.3],
             meaning: "half the difference between the frictions forth and back, below theta_r",
         }],
         revealed_by: "the rig turned round: a bias torque keeps its sense, a friction turns with it",

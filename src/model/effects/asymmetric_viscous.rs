@@ -19,7 +19,7 @@ impl Law for AsymmetricViscous {
             unit: "1/s",
             power: Power::Of(1),
             range: [f64::NEG_INFINITY, f64::INFINITY],
-            typical: [1e-4, 0.3],
+            typical: [-0.3, 0.3],
             meaning: "half the difference between the coefficients forth and back",
         }],
         revealed_by: "decays from both sides; amplitudes against a bias torque",

@@ -19,7 +19,7 @@ impl Law for CoulombDrift {
             unit: "rad/s^3",
             power: Power::Of(3),
             range: [f64::NEG_INFINITY, f64::INFINITY],
-            typical: [1e-7, 1e-4],
+            typical: [-1e-4, 1e-4],
             meaning: "rate of change of theta_r; where it has used that up friction is negative",
         }],
         revealed_by: "the same run again, hours later",

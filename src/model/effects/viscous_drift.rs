@@ -19,7 +19,7 @@ impl Law for ViscousDrift {
             unit: "1/s^2",
             power: Power::Of(2),
             range: [f64::NEG_INFINITY, f64::INFINITY],
-            typical: [1e-7, 1e-4],
+            typical: [-1e-4, 1e-4],
             meaning: "rate of change of gamma",
         }],
         revealed_by: "the same run again, hours later",

@@ -1,0 +1,175 @@
+"""Which other effects explain the same, by the records at hand."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendmap.diagnosis.prune import rivals_of
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.state import State
+
+__all__ = ["Rival", "Standing", "standing_of"]
+
+CONTAINS: float = 0.99
+"""Cosine between what two effects do to the readings from which the one with more parameters has
+the other one as a special case."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rival:
+    """Another effect in the place of one that was accepted.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Effect and shape.
+    gain : float
+        Fall of the sum of squares with it, in independent readings.
+    behind : float
+        Gain of the accepted effect less its own: twice the difference of log-likelihoods.
+    separation : float
+        ``s = 1 - gain / gain of the accepted effect``.
+    likeness : float
+        Cosine of the angle between what both do to the readings.
+    refitted : bool
+        Whether the gain is that of a fit; else it is the score's.
+    contains : bool
+        Whether it has the accepted effect as a special case and gains no more than chance by it.
+    alike : bool
+        Whether the records do not tell it from the accepted effect: it is behind by less than the
+        threshold, or by the readings of a single run alone.
+    """
+
+    candidate: Candidate
+    gain: float
+    behind: float
+    separation: float
+    likeness: float
+    refitted: bool
+    contains: bool
+    alike: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Standing:
+    """An accepted effect among its rivals.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        The effect.
+    gain : float
+        Fall of the sum of squares with it, in independent readings.
+    closed : float
+        Share of the squared gap above the noise that it closes beside the others.
+    rivals : tuple of Rival
+        The nearest first.
+    """
+
+    candidate: Candidate
+    gain: float
+    closed: float
+    rivals: tuple[Rival, ...]
+
+    @property
+    def equivalent(self) -> list[str]:
+        """The names that these records do not tell apart, its own first.
+
+        Where there are several, effects that contain one of them are among them.
+        """
+        alike = [r for r in self.rivals if r.alike and not r.contains]
+        wider = [r for r in self.rivals if r.contains] if alike else []
+        return [self.candidate.name, *(r.candidate.name for r in (*alike, *wider))]
+
+    @property
+    def share(self) -> float:
+        """The share of its likelihood among all names, with equal odds for each beforehand."""
+        weights = [math.exp(-0.5 * max(r.behind, 0.0)) for r in self.rivals if not r.contains]
+        return 1.0 / (1.0 + sum(weights))
+
+
+def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
+    """Return an effect of the best model among those that might stand in its place.
+
+    Parameters
+    ----------
+    state : State
+        With the fits that were made.
+    best : Trial
+        The best model.
+    candidate : Candidate
+        One of its effects.
+    """
+    level = best.level
+    rest = state.rest(best, candidate)
+    if rest is None:
+        return Standing(candidate, math.inf, 1.0, ())  # without it there is no motion
+    gain = (rest.chi2 - best.chi2) / level
+    scores = state.scores(rest)
+    places = scores.best()
+    own = next((k for k in places if scores.scores[k].candidate.name == candidate.name), None)
+    if own is None:
+        return Standing(candidate, gain, state.closed(rest, best), ())
+    fits = dict(rivals_of(state, best, candidate, rest))
+    rivals = []
+    for k in places:
+        score, fit = scores.scores[k], fits.get(k)
+        if k == own or score.gain <= 0:
+            continue
+        reached = score.gain / level
+        if scores.same(own, k):
+            reached = gain
+        elif fit is not None:
+            try:
+                fit = state.settled(fit)
+            except InputError:
+                continue
+            reached = (rest.chi2 - fit.chi2) / level
+        likeness = scores.likeness(own, k)
+        more = score.candidate.count > candidate.count
+        behind = gain - reached
+        contains = more and likeness > CONTAINS and behind > -state.thresholds.alike
+        alike = behind < state.thresholds.alike
+        if fit is not None and not alike:
+            alike = _of_one_run(best, fit)
+        rivals.append(
+            Rival(
+                score.candidate,
+                reached,
+                behind,
+                1.0 - reached / gain if gain > 0 else 0.0,
+                likeness,
+                fit is not None,
+                contains,
+                alike,
+            )
+        )
+    rivals.sort(key=lambda r: r.behind)
+    return Standing(candidate, gain, state.closed(rest, best), tuple(rivals))
+
+
+def _of_one_run(best: Trial, other: Trial) -> bool:
+    """Whether a model is better than another by the readings of a single run alone."""
+    if len(best.runs) < 2:  # noqa: PLR2004 (a run alone says all)
+        return False
+    behind = _by_run(other) - _by_run(best)
+    return bool(behind.sum() - behind.max() < 0)
+
+
+def _by_run(trial: Trial) -> np.ndarray:
+    """Return the sum of squares of each run."""
+    sums = []
+    for run, white in zip(trial.runs, trial.fit.white, strict=True):
+        counted = np.isfinite(white)
+        if run.trusted is not None:
+            counted &= run.trusted
+        sums.append(float(np.sum(white[counted] ** 2)))
+    return np.array(sums)

@@ -1,0 +1,69 @@
+"""What a search has tried."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.state import State
+
+__all__ = ["Attempt", "attempt_of"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Attempt:
+    """Candidates that were fitted, and whether they were accepted.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The effects.
+    shape : dict of str to float
+        Of the first, without dimensions.
+    score : float
+        Gain that the score promises, in independent readings.
+    gain : float
+        Fall of the cost: of the sum of squares in independent readings with Schwarz's penalty.
+    held_gain : float or None
+        Least fall on a held-out set, in independent readings; none where it was not asked for.
+    accepted : bool
+        Whether the search went on from there.
+    stage : int
+        Number of effects of the model without them.
+    """
+
+    names: tuple[str, ...]
+    shape: dict[str, float]
+    score: float
+    gain: float
+    held_gain: float | None
+    accepted: bool
+    stage: int
+
+
+def attempt_of(  # noqa: PLR0913 (a model, another, and what is between them)
+    state: State,
+    rest: Trial,
+    trial: Trial,
+    places: Sequence[int],
+    *,
+    tried: bool,
+    accepted: bool,
+) -> Attempt:
+    """Return the attempt to add candidates to a model, those at some places of its scores."""
+    scores = state.scores(rest)
+    added = [scores.scores[k].candidate for k in places]
+    pairs = zip(state.sets(rest), state.sets(trial), strict=False) if tried else ()
+    return Attempt(
+        tuple(candidate.name for candidate in added),
+        trial.shape_of(trial.chosen[-len(added)]),
+        scores.together(places) / state.level,
+        state.cost(rest) - state.cost(trial),
+        min(((less - more) / state.level for less, more in pairs), default=None),
+        accepted,
+        len(rest.chosen),
+    )

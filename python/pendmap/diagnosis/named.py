@@ -1,0 +1,201 @@
+"""The effects that a diagnosis names: values, intervals, and the model that has them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap.diagnosis.candidates import own_name
+from pendmap.diagnosis.further import Reasons, attempted
+from pendmap.diagnosis.intervals import Z95, profiles
+from pendmap.diagnosis.sides import elsewhere
+from pendmap.identification.conversion import interval
+from pendmap.identification.model_file import provenance
+from pendmap.model import Effect
+from pendmap.records.summary import doubted
+
+if TYPE_CHECKING:
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.diagnose import Discrepancy
+    from pendmap.diagnosis.data import Evidence
+    from pendmap.diagnosis.state import Found
+    from pendmap.diagnosis.verdict import Judgement
+    from pendmap.model import Formula, Rig
+
+__all__ = ["NamedEffect", "diagnosed_model", "named_effects", "values_of"]
+
+
+@dataclasses.dataclass(frozen=True)
+class NamedEffect:
+    """An effect that a diagnosis names.
+
+    Parameters
+    ----------
+    name : str
+        As the library calls it.
+    parameters : mapping of str to float
+        In SI.
+    ci95 : mapping of str to (float, float)
+        Intervals of 95 % of what was fitted; a shape that was scanned has none.
+    probability : float
+        That this name is right: its share among its rivals, times the probability that one of
+        them is.
+    approximate : bool
+        Whether its form may be only nearly right.
+    formula : Formula, optional
+        Where it is the user's own.
+    elsewhere : mapping of str to float
+        Another place, on the other side of the rest, where it would do as well.
+    """
+
+    name: str
+    parameters: dict[str, float]
+    ci95: dict[str, tuple[float, float]]
+    probability: float
+    approximate: bool
+    formula: Formula | None = None
+    elsewhere: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    @property
+    def definition(self) -> dict[str, Any]:
+        """What the library, or the user's formula, says about it."""
+        return self.effect.definition
+
+    @property
+    def effect(self) -> Effect:
+        """As a model has it."""
+        return Effect(
+            self.name,
+            self.parameters,
+            self.ci95,
+            self.probability,
+            self.approximate,
+            self.formula,
+        )
+
+
+def named_effects(
+    evidence: Evidence, best: Found, judgement: Judgement, reasons: Reasons
+) -> tuple[NamedEffect, ...]:
+    """Return the effects of the best model.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records, for intervals from the profile of the likelihood.
+    best : Found
+        The model.
+    judgement : Judgement
+        Its standing. Of effects that the model does not have nothing is returned.
+    reasons : dict of str to str
+        Where it is kept why intervals are those of the covariance where a profile is wanted.
+    """
+    widening = math.sqrt(best.trial.widening)
+    none: dict[str, dict[str, tuple[float, float]]] = {}
+    profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)
+    others = elsewhere(evidence, best.trial)
+    named = []
+    for standing in judgement.standings:
+        candidate = standing.candidate
+        if candidate.name not in best.trial.names:
+            continue
+        parameters, errors = values_of(best, candidate)
+        mixed = best.trial.fit.mixed
+        ci95 = {
+            n: interval(parameters[n], half, mixed=f"{candidate.name}.{n}" in mixed)
+            for n, error in errors.items()
+            if math.isfinite(half := Z95 * widening * error)
+        }
+        ci95 |= profiled.get(candidate.name, {})
+        named.append(
+            NamedEffect(
+                candidate.name,
+                parameters,
+                ci95,
+                standing.share * judgement.complete,
+                judgement.approximate or doubted(evidence.experiment, *evidence.runs),
+                candidate.formula,
+                others.get(candidate.name, {}),
+            )
+        )
+    return tuple(named)
+
+
+def values_of(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:
+    """Return an effect's parameters, sizes positive and phases within half a turn, and errors."""
+    estimates = best.trial.fit.estimates
+    own = own_name(candidate.name)
+    if own is not None:
+        return {candidate.size: estimates[own].value}, {candidate.size: estimates[own].stderr or 0}
+    effect = next(e for e in best.trial.fit.model.effects if e.name == candidate.name)
+    errors = {
+        name: estimates[key].stderr or math.inf
+        for name in effect.parameters
+        if (key := f"{effect.name}.{name}") in estimates
+    }
+    values = dict(effect.parameters)
+    if candidate.phase is not None and values[candidate.size] < 0:
+        # A negative size is a positive one half a turn on.
+        values[candidate.size] = -values[candidate.size]
+        values[candidate.phase] += math.pi
+    if candidate.phase is not None:
+        values[candidate.phase] = math.remainder(values[candidate.phase], math.tau)
+    return values, errors
+
+
+def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
+    """Return the model of a diagnosis with the notes of its file.
+
+    Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
+    fitted, widened as those intervals are, ``[provenance]`` the records with their SHA-256, the
+    version, the command and the verdict, and which coefficients are held at 0.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        As of :func:`pendmap.diagnosis.diagnose`.
+    command : str
+        How it was called.
+    """
+    fit = found.best.trial.fit
+    model = fit.model
+    covariance = found.best.trial.widening * fit.covariance
+    named = {effect.name: effect.effect for effect in found.effects}
+    own = {own_name(name) for name in named} - {None}
+    kept = tuple(e for e in model.effects if e.name not in named)
+    runs = [found.evidence.runs[k] for k in dict.fromkeys(found.evidence.fitted_of)]
+    sha256 = found.evidence.experiment.sha256
+    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
+    notes: dict[str, Any] = {
+        "covariance": {
+            "names": [_called(name, named) for name in fit.names],
+            "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
+        },
+        "provenance": provenance(files, command)
+        | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
+    }
+    if found.best.trial.zeroed:
+        notes["provenance"]["set_to_zero"] = list(found.best.trial.zeroed)
+    return dataclasses.replace(
+        model,
+        **{name: 0.0 for name in own if name is not None},
+        effects=(*kept, *named.values()),
+        Omega=0.0
+        if model.p == 0 and not any(e.drives for e in (*kept, *named.values()))
+        else (model.Omega or 1.0),
+        notes=notes,
+    )
+
+
+def _called(name: str, named: dict[str, Effect]) -> str:
+    for effect in named.values():
+        if own_name(effect.name) == name:
+            return f"{effect.name}.{next(iter(effect.parameters))}"
+    return name
+
+
+def _held(found: Discrepancy) -> list[str]:
+    return list(dict.fromkeys(run.name for run in found.evidence.held))

@@ -1,0 +1,228 @@
+"""Experiments that the rig of some records could do next, as far as the records tell.
+
+From the records come the natural frequency, how long a run lasts, how often and how well the angle
+is read, when the last run ended, and which drive there is. From the model found comes how the
+pendulum would move. Nothing here looks for an effect: which of these experiments is worth doing is
+a question of their information (:mod:`pendmap.diagnosis.next_experiment.power`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.words import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from pendmap.diagnosis.data import Evidence
+
+__all__ = ["Planned", "Proposal", "Start", "menu_of"]
+
+RELEASES: Final = (0.5, 1.2, 2.0, 2.8)
+"""Angles of release, rad: small swings down to rest, and up to nearly inverted."""
+
+FLINGS: Final = (2.5, 3.5)
+"""Velocities at the bottom over ``w0``: with more than 2 the pendulum goes round. Much quicker, a
+record no longer shows where the hand has let go."""
+
+WAITS: Final = (600.0, 3600.0)
+"""Pauses in the laboratory, s, after which slow changes show."""
+
+LATER: Final = (1.2, 2.8)
+"""Releases after such a pause."""
+
+LENGTHS: Final = (0.5, 1.0, 2.0)
+"""Lengths of a run over those of the records."""
+
+LONGEST_S: Final = 240.0
+"""No run is proposed that lasts longer, unless the records did."""
+
+SHORTEST: Final = 5.0
+"""Swings that a run has at least."""
+
+REPEATS: Final = (2, 4)
+"""How often the same run is done."""
+
+PAUSE_S: Final = 60.0
+"""From the end of one run to the next."""
+
+DRIVEN: Final = (1.0, 1.5, 2.0)
+"""Drive frequencies over ``w0``: second resonance, between, first resonance."""
+
+SWINGING: Final = 1.0
+"""Angle at which a driven swing begins, rad."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Start:
+    """How a run begins, and what drives it.
+
+    Parameters
+    ----------
+    what : str
+        In words.
+    theta, velocity : float
+        Angle (rad) and velocity (rad/s) at the first sample.
+    wait_s : float
+        Pause in the laboratory before it, s, beyond the usual one.
+    lab_time_s : float
+        When it begins.
+    drive : mapping of str to float or None
+        As of :class:`pendmap.identification.runs.FitRun`; none of a free decay.
+    """
+
+    what: str
+    theta: float
+    velocity: float
+    wait_s: float
+    lab_time_s: float
+    drive: Mapping[str, float | None] | None = dataclasses.field(default=None, hash=False)
+
+    @property
+    def noun(self) -> str:
+        """What the run is."""
+        return "free decay" if self.drive is None else "forced run"
+
+
+@dataclasses.dataclass(frozen=True)
+class Planned:
+    """A run to be recorded: a start, and for how long."""
+
+    start: Start
+    seconds: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Proposal:
+    """An experiment: runs to be recorded beside the records that there are.
+
+    Parameters
+    ----------
+    runs : tuple of Planned
+        One or more of the same length.
+    """
+
+    runs: tuple[Planned, ...]
+
+    @property
+    def seconds(self) -> float:
+        """Recording time, s."""
+        return sum(run.seconds for run in self.runs)
+
+    @property
+    def wait_s(self) -> float:
+        """The pause before it, s."""
+        return max(run.start.wait_s for run in self.runs)
+
+    @property
+    def starts(self) -> tuple[Start, ...]:
+        """The different starts."""
+        return tuple(dict.fromkeys(run.start for run in self.runs))
+
+    @property
+    def what(self) -> str:
+        """In words."""
+        each = f"{self.runs[0].seconds:g} s"
+        first, *others = self.starts
+        if others:
+            ends = " and one ".join(start.what for start in (first, *others))
+            return f"one {first.noun} {ends}, {each} each"
+        if len(self.runs) > 1:
+            return f"{counted(len(self.runs), first.noun)} {first.what.rstrip(',')}, {each} each"
+        return f"one {first.noun} {first.what} for {each}"
+
+
+def menu_of(evidence: Evidence, w0: float) -> tuple[Proposal, ...]:
+    """Return the experiments that the rig could do next.
+
+    Free decays from small and wide angles and flung round, either way, of several lengths, repeated
+    and after pauses; with a harmonic drive among the records forced runs at other frequencies, half
+    as strong, swinging and turning.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    w0 : float
+        Natural frequency, rad/s.
+    """
+    usual = _usual_length(evidence)
+    most = max(usual, LONGEST_S)
+    least = SHORTEST * math.tau / w0
+    lengths = [x for f in LENGTHS if least <= (x := _round(f * usual)) <= most] or [_round(least)]
+    ended = max(run.lab_time_s + float(run.time[-1]) for run in evidence.fitted) + PAUSE_S
+    singles, pairs = _free(w0, ended)
+    singles += list(_forced(evidence, w0, ended))
+    found = [Proposal((Planned(start, x),)) for start in singles for x in lengths]
+    for x in lengths:
+        found += [Proposal((Planned(a, x), Planned(b, x))) for a, b in pairs]
+        found += [
+            Proposal(tuple(_in_turn(Planned(start, x), count)))
+            for start, count in itertools.product(singles, REPEATS)
+            if start.wait_s == 0
+        ]
+    return tuple(found)
+
+
+def _usual_length(evidence: Evidence) -> float:
+    free = [run for run in evidence.fitted if not run.forced] or list(evidence.fitted)
+    return float(np.median([np.ptp(run.time) for run in free]))
+
+
+def _round(value: float) -> float:
+    """Return a number of two digits, as one sets a clock or a protractor."""
+    return float(f"{value:.2g}")
+
+
+def _in_turn(run: Planned, count: int) -> Iterator[Planned]:
+    """Yield the same run several times. That each begins a little later changes little."""
+    for _ in range(count):
+        yield run
+
+
+def _free(w0: float, ended: float) -> tuple[list[Start], list[tuple[Start, Start]]]:
+    """Return free decays, and those that are done either way."""
+    singles = [Start(f"from {angle:g} rad", angle, 0.0, 0.0, ended) for angle in RELEASES]
+    other = Start(f"from -{RELEASES[-1]:g} rad", -RELEASES[-1], 0.0, 0.0, ended)
+    pairs = [(singles[-1], other)]
+    flung = []
+    for factor in FLINGS:
+        speed = _round(factor * w0)
+        flung.append(Start(f"flung through 0 at {speed:g} rad/s", 0.0, speed, 0.0, ended))
+    speed = -flung[0].velocity
+    back = Start(f"flung through 0 at {speed:g} rad/s", 0.0, speed, 0.0, ended)
+    pairs.append((flung[0], back))
+    later = [
+        Start(f"from {angle:g} rad, {_pause(wait)} after the last,", angle, 0.0, wait, ended + wait)
+        for angle, wait in itertools.product(LATER, WAITS)
+    ]
+    return singles + flung + later, pairs
+
+
+def _pause(seconds: float) -> str:
+    hours = seconds / 3600
+    return "an hour" if hours == 1 else f"{seconds / 60:g} minutes"
+
+
+def _forced(evidence: Evidence, w0: float, ended: float) -> Iterator[Start]:
+    """Yield runs under the drive that the records have, at its greatest amplitude and half that."""
+    drives = [run.drive for run in evidence.fitted if run.drive is not None]
+    strengths = [strength for drive in drives if (strength := drive.get("p"))]
+    if not strengths:
+        return
+    strongest = max(strengths)
+    # Whoever knows the phase of one run knows that of the next.
+    phi = None if any(drive.get("phi") is None for drive in drives) else 0.0
+    for p, factor in [*((strongest, f) for f in DRIVEN), (strongest / 2, DRIVEN[-1])]:
+        omega, size = _round(factor * w0), _round(p)
+        drive = {"p": size, "Omega": omega, "phi": phi}
+        how = f"with p = {size:g} at {omega:g} rad/s"
+        yield Start(f"{how} from {SWINGING:g} rad", SWINGING, 0.0, 0.0, ended, drive)
+        if p == strongest:
+            yield Start(f"{how}, turning with it,", 0.0, omega, 0.0, ended, drive)

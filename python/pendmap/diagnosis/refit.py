@@ -1,0 +1,206 @@
+"""Candidates fitted with a model's own parameters, and models without one of their effects."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.diagnosis.candidates import placed
+from pendmap.diagnosis.fitted_model import (
+    FEW_STEPS,
+    LITTLE,
+    Trial,
+    fitted,
+    with_candidates,
+)
+from pendmap.diagnosis.physical import within_physics
+from pendmap.diagnosis.sides import better_side
+from pendmap.diagnosis.valley import exponents
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.data import Evidence
+    from pendmap.diagnosis.scores import Scores
+    from pendmap.diagnosis.thresholds import Thresholds
+    from pendmap.model import Rig
+
+__all__ = ["Key", "best_of", "key_of", "refitted", "replaced", "without"]
+
+KICK: Final = 1e-3
+"""Part of the score's step from which a candidate's size starts: far from the fit the step of all
+parameters together leads astray, and a phase needs a size above 0."""
+
+FAINT: Final = 5.0
+"""Standard errors of a size within which the covariance says where the others go without it."""
+
+Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
+
+
+def key_of(chosen: Sequence[Candidate]) -> Key:
+    """Return what a set of candidates is known by."""
+    return frozenset((c.name, tuple(sorted(c.shape.items()))) for c in chosen)
+
+
+def best_of(*trials: Trial | None) -> Trial | None:
+    """Return the fit with the least sum of squares; none where all are lost."""
+    return min((t for t in trials if t is not None), key=lambda t: t.chi2, default=None)
+
+
+def refitted(  # noqa: PLR0913 (what is fitted, and what decides)
+    evidence: Evidence,
+    thresholds: Thresholds,
+    trial: Trial,
+    scores: Scores,
+    places: Sequence[int],
+    level: float,
+) -> Trial | None:
+    """Return a model with candidates fitted to the records within physics; none where it is lost.
+
+    The fit starts at the trial's motion with sizes of nearly 0, in the best shapes by their scores,
+    and where it gains far less than promised again at the sizes of the score.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    thresholds : Thresholds
+        ``shapes``, ``worth`` and ``short`` decide.
+    trial : Trial
+        The model without the candidates.
+    scores : Scores
+        At that model.
+    places : sequence of int
+        Which of the scores.
+    level : float
+        Sum of squares that counts as one independent reading.
+    """
+    own = [scores.scores[k] for k in places]
+    added = [score.candidate for score in own]
+    step = {name: value for score in own for name, value in score.start.items()}
+    sizes = {candidate.free[0] for candidate in added}
+
+    def fit(added: Sequence[Candidate], step: dict[str, float], *, short: bool) -> Trial | None:
+        try:
+            return with_candidates(evidence, trial, added, step, level=level, short=short)
+        except InputError:
+            return None  # the start leads out of the range of numbers
+
+    def kicked(step: dict[str, float]) -> dict[str, float]:
+        return {name: KICK * v if name in sizes else v for name, v in step.items()}
+
+    found = fit(added, kicked(step), short=False)
+    for k in _other_shapes(scores, places, thresholds):
+        other = scores.scores[k]
+        found = best_of(found, fit([other.candidate], kicked(other.start), short=False))
+    promised = thresholds.short * scores.together(places)
+    if found is None or trial.chi2 - found.chi2 < promised:
+        found = best_of(found, fit(added, step, short=False))
+    if found is None or found.chi2 > trial.chi2:
+        # More parameters fit no worse: the motion was lost on the way.
+        found = best_of(found, fit(added, step, short=True))
+    if found is None or found.chi2 > trial.chi2:
+        return None
+    return within_physics(evidence, better_side(evidence, found))
+
+
+def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds) -> list[int]:
+    """Return the next best shapes of a candidate alone; an exponent is found from any start."""
+    if len(places) > 1:
+        return []
+    one = scores.scores[places[0]]
+    if not one.candidate.adapted or exponents(one.candidate):
+        return []
+    shapes = [
+        k
+        for k, s in enumerate(scores.scores)
+        if s.candidate.name == one.candidate.name
+        and k != places[0]
+        and s.gain > thresholds.worth * one.gain
+    ]
+    return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: thresholds.shapes - 1]
+
+
+def without(
+    evidence: Evidence, trial: Trial, dropped: Candidate, level: float
+) -> Trial | None:
+    """Return a trial's model without one of its effects, fitted from the trial's motion."""
+    model, free, start = _without(trial, dropped)
+    chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+    try:
+        rest = fitted(
+            evidence,
+            model,
+            free,
+            chosen,
+            start=start,
+            windows=trial.fit.windows,
+            least_gain=LITTLE * level,
+        )
+    except InputError:
+        return None
+    return within_physics(evidence, rest)
+
+
+def replaced(  # noqa: PLR0913 (what is fitted, and what decides)
+    evidence: Evidence,
+    trial: Trial,
+    dropped: Candidate,
+    scores: Scores,
+    place: int,
+    level: float,
+) -> Trial | None:
+    """Return a trial's model with another effect in the place of one, from the trial's motion."""
+    model, free, start = _without(trial, dropped)
+    score = scores.scores[place]
+    other = score.candidate
+    try:
+        found = fitted(
+            evidence,
+            placed(model, [other]),
+            [*free, *other.free, *other.adapted],
+            (*(c for c in trial.chosen if c.name != dropped.name), other),
+            start=start | score.start,
+            windows=trial.fit.windows,
+            steps=FEW_STEPS,
+            least_gain=LITTLE * level,
+        )
+    except InputError:
+        return None
+    return within_physics(evidence, found)
+
+
+def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:
+    """Return a trial's model without an effect, what is free of it, and where the fit starts."""
+    gone = {*dropped.free, *dropped.adapted}
+    model = trial.fit.model
+    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
+    effects = tuple(e for e in model.effects if e.name != dropped.name)
+    model = dataclasses.replace(model, effects=effects, **own)
+    free = [name for name in (*trial.free, *trial.zeroed) if name not in gone]
+    start = dict.fromkeys(trial.zeroed, 0.0) | trial.start
+    if (faint := _faint(trial, dropped)) is not None:
+        # The others move by what the covariance says.
+        column = trial.fit.covariance[:, faint]
+        share = start[trial.fit.names[faint]] / column[faint]
+        moved = zip(trial.fit.names, column, strict=True)
+        start |= {n: start[n] - share * c for n, c in moved}
+    return model, free, {name: value for name, value in start.items() if name not in gone}
+
+
+def _faint(trial: Trial, dropped: Candidate) -> int | None:
+    """Return where the size of an effect stands that is little beside its standard error."""
+    size = dropped.free[0]
+    if size not in trial.fit.names or dropped.phase is not None:
+        return None
+    error = trial.fit.estimates[size].stderr
+    if not np.isfinite(trial.fit.covariance).all() or not error:
+        return None
+    if not math.isfinite(error) or abs(trial.start[size]) > FAINT * error:
+        return None
+    return trial.fit.names.index(size)

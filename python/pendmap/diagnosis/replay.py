@@ -1,0 +1,150 @@
+"""A fitted model run forward from a state, without any further data."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.diagnosis.candidates import own_name
+from pendmap.identification.fitting import fit_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.diagnosis.state import Found
+    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+    from pendmap.model import Rig
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Motion", "drives", "replayed", "settled"]
+
+OWN: Final = ("w0", "c_over_m", "Tr", "torque")
+"""Parameters that stand beside the model: damping may have been fitted negative, and a model has
+none."""
+
+SEARCHED: Final = 12
+"""Steps in which a state is found."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Motion:
+    """What makes a pendulum move as it was fitted.
+
+    Parameters
+    ----------
+    model : Rig
+        With its effects.
+    own : mapping of str to float
+        What counts instead of the model's own parameters.
+    """
+
+    model: Rig
+    own: Mapping[str, float]
+
+    @classmethod
+    def of(cls, found: Found) -> Motion:
+        """Return that of a model that was fitted."""
+        fit = found.trial.fit
+        return cls(fit.model, {name: fit[name] for name in OWN if name in fit.estimates})
+
+    def without(self, effect: str) -> Motion:
+        """Return the same pendulum without one of its effects."""
+        own = own_name(effect)
+        if own is not None:
+            return dataclasses.replace(self, own={**self.own, own: 0.0})
+        kept = tuple(e for e in self.model.effects if e.name != effect)
+        return dataclasses.replace(self, model=dataclasses.replace(self.model, effects=kept))
+
+
+def replayed(
+    motion: Motion, runs: Sequence[FitRun], states: Sequence[tuple[float, float]]
+) -> list[tuple[Floats, Floats]]:
+    """Return what the sensor would read of a model, and how the model moves.
+
+    Parameters
+    ----------
+    motion : Motion
+        The model.
+    runs : sequence of FitRun
+        Times, drives and laboratory time; readings are not looked at.
+    states : sequence of (float, float)
+        Angle (rad) and velocity (rad/s) of each at its first time.
+
+    Returns
+    -------
+    list of (ndarray of shape (n,), ndarray of shape (2, n))
+        For each run readings (rad), and angle and velocity (rad, rad/s).
+
+    Raises
+    ------
+    InputError
+        If a motion leaves the range of numbers.
+    """
+    blank = [dataclasses.replace(run, theta=np.zeros(run.time.shape), trusted=None) for run in runs]
+    fit = _from(motion, blank, states, steps=0)
+    pairs = zip(fit.residuals, fit.curves, strict=True)
+    return [(-residual, curve) for residual, curve in pairs]
+
+
+def settled(
+    motion: Motion, runs: Sequence[FitRun], states: Sequence[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return the states at the runs' first times from which a model comes nearest to readings.
+
+    Parameters
+    ----------
+    motion : Motion
+        The model; its parameters stay.
+    runs : sequence of FitRun
+        The readings.
+    states : sequence of (float, float)
+        Where the search begins.
+
+    Raises
+    ------
+    InputError
+        If a motion leaves the range of numbers.
+    """
+    fit = _from(motion, runs, states, steps=SEARCHED)
+    return [(theta, velocity) for *_, theta, velocity in fit.windows]
+
+
+def drives(found: Found, run: FitRun, place: int) -> Mapping[str, float | None] | None:
+    """Return the drive of a run held back, its phase as the model has it where no one knows it.
+
+    Parameters
+    ----------
+    found : Found
+        The model on what was held back.
+    run : FitRun
+        The run.
+    place : int
+        Which of those held back it is.
+    """
+    if run.drive is None or run.drive.get("phi") is not None:
+        return run.drive
+    known = found.held.fit.estimates
+    phase = next((known[n].value for n in (f"phi[{place}]", "phi") if n in known), 0.0)
+    return {**run.drive, "phi": phase}
+
+
+def _from(
+    motion: Motion, runs: Sequence[FitRun], states: Sequence[tuple[float, float]], *, steps: int
+) -> TrajectoryFit:
+    whole = [dataclasses.replace(run, longest_s=math.inf) for run in runs]
+    windows = [
+        (k, 0, run.time.size, *state)
+        for k, (run, state) in enumerate(zip(whole, states, strict=True))
+    ]
+    own = motion.own
+    return fit_runs(
+        whole, motion.model, tuple(own), start=own, windows=windows, profiled=(), hold=True,
+        steps=steps,
+    )  # fmt: skip

@@ -1,0 +1,264 @@
+"""Scores of all candidates at a fit, without fitting any: linear algebra on sensitivities.
+
+With the residuals ``r`` and the derivatives ``x`` of the readings by a candidate's size and phase,
+all over the standard errors and with what the fitted parameters and initial states can follow taken
+off, the sum of squares falls by
+
+``G = r' x (x' x)^-1 x' r``
+
+when the candidate is fitted (Rao's score test). The same matrix says how alike candidates are,
+which pairs belong together, and how weak an effect the records could show.
+
+References
+----------
+Rao (1948), Proceedings of the Cambridge Philosophical Society 44, 50.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.diagnosis.candidates import placed
+from pendmap.identification.sensitivity import (
+    STATE,
+    WindowSlopes,
+    freed_together,
+    lengths,
+    window_slopes,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.data import Evidence
+    from pendmap.diagnosis.fitted_model import Trial
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Score", "Scores", "scores_of"]
+
+PASS: Final = 16
+"""So many directions the integrator carries at once: effects beyond them cost another pass, and
+each pass evaluates all effects that the model has."""
+
+SAME: Final = 1e-6
+"""A cosine that falls short of 1 by less is that of two names for one thing."""
+
+UNSEEN: Final = 1e-4
+"""A candidate of which the fitted parameters follow all but this part (of the root of its
+information) does nothing of its own: rounding and the integrator's error are not far below."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """A candidate's score.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Effect and shape.
+    gain : float
+        ``G``: by which the sum of squares is expected to fall.
+    start : mapping of str to float
+        Size and phase where it is expected to be least, SI.
+    information : float
+        ``x' x`` of the size: a size ``a`` gains ``a^2`` times this; of an effect with a phase at
+        the phase where it is least. 0 where the records do not show the effect at all.
+    """
+
+    candidate: Candidate
+    gain: float
+    start: dict[str, float]
+    information: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Scores:
+    """Scores of all candidates in all shapes at one fit.
+
+    Parameters
+    ----------
+    scores : tuple of Score
+        One for each candidate and shape.
+    columns : tuple of list of int
+        The columns of each in what follows.
+    gram : ndarray of float, shape (k, k)
+        Products of what the candidates do to the readings, each of unit length; a row of zeros for
+        what the records do not show.
+    pull : ndarray of float, shape (k,)
+        Its products with the residuals.
+    """
+
+    scores: tuple[Score, ...]
+    columns: tuple[list[int], ...]
+    gram: Floats
+    pull: Floats
+
+    @classmethod
+    def of_none(cls) -> Scores:
+        """Return the scores of no candidate."""
+        return cls((), (), np.zeros((0, 0)), np.zeros(0))
+
+    def best(self) -> list[int]:
+        """Return the places of each effect's best shape, the greatest gain first."""
+        chosen: dict[str, int] = {}
+        for k, score in enumerate(self.scores):
+            name = score.candidate.name
+            if name not in chosen or score.gain > self.scores[chosen[name]].gain:
+                chosen[name] = k
+        return sorted(chosen.values(), key=lambda k: -self.scores[k].gain)
+
+    def together(self, places: Sequence[int]) -> float:
+        """Return the gain expected of several candidates at once."""
+        own = [c for k in places for c in self.columns[k]]
+        return _gain(self.gram[np.ix_(own, own)], self.pull[own])
+
+    def likeness(self, one: int, other: int) -> float:
+        """Return the cosine of the angle between what two candidates do to the readings.
+
+        The largest canonical correlation: 1 where the one can do all that the other does.
+        """
+        a, b = self.columns[one], self.columns[other]
+        left = _root_inverse(self.gram[np.ix_(a, a)])
+        right = _root_inverse(self.gram[np.ix_(b, b)])
+        return float(np.linalg.norm(left @ self.gram[np.ix_(a, b)] @ right, 2))
+
+    def same(self, one: int, other: int) -> bool:
+        """Whether two candidates are the same under two names: to fit both would say nothing."""
+        shaped = self.scores[one].candidate.shape or self.scores[other].candidate.shape
+        alike = len(self.columns[one]) == len(self.columns[other])
+        return not shaped and alike and self.likeness(one, other) > 1 - SAME
+
+    def best_pairs(self, places: Sequence[int], count: int) -> list[list[int]]:
+        """Return the pairs of candidates with the greatest joint gains, one of each effect."""
+        pairs = sorted(itertools.combinations(places, 2), key=self.together, reverse=True)
+        return [list(pair) for pair in pairs[:count]]
+
+
+def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]) -> Scores:
+    """Return the scores of candidates at a fit.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    trial : Trial
+        The fit.
+    pool : sequence of sequence of Candidate
+        By effect, each in its shapes; as many are derived together as one pass of the integrator
+        carries, one shape of an effect each.
+    """
+    fit = trial.fit
+    carried = len({name.partition("[")[0] for name in fit.names}) + STATE
+    every: list[Candidate] = []
+    names: list[str] = []
+    passes: list[list[WindowSlopes]] = []
+    for present in _passes(pool, max(PASS - carried, 1)):
+        free = [name for candidate in present for name in candidate.free]
+        found, slopes = window_slopes(fit, evidence.fitted, free, placed(fit.model, present))
+        wanted = [found.index(name) for name in free]
+        if not passes:
+            names = [name for name in found if name in fit.estimates]
+            wanted = [found.index(name) for name in names] + wanted
+        bare = passes[0] if passes else slopes
+        passes.append(
+            [
+                dataclasses.replace(w, columns=w.columns_as_in(one)[:, wanted])
+                for w, one in zip(slopes, bare, strict=True)
+            ]
+        )
+        every += present
+    if not every:
+        return Scores.of_none()
+    windows = [
+        dataclasses.replace(each[0], columns=np.hstack([w.columns for w in each]))
+        for each in zip(*passes, strict=True)
+    ]
+    together = freed_together((), windows)
+    base, residual = _orthonormal(together.columns[:, : len(names)]), together.residual
+    columns = together.columns[:, len(names) :]
+    residual = residual - base @ (base.T @ residual)
+    sizes = lengths(columns)
+    columns /= np.where(sizes > 0, sizes, 1.0)
+    # Twice is enough: what rounding left of the base the first time is gone.
+    for _ in range(2):
+        columns -= base @ (base.T @ columns)
+    gram, pull = columns.T @ columns, columns.T @ residual
+    unseen = np.sqrt(np.diag(gram)) < UNSEEN
+    gram[unseen], gram[:, unseen], pull[unseen] = 0.0, 0.0, 0.0
+    units = np.where(unseen, 1.0, np.sqrt(np.diag(gram)))
+    gram, pull, sizes = gram / np.outer(units, units), pull / units, sizes * units
+    scores, where, first = [], [], 0
+    for candidate in every:
+        own = list(range(first, first + len(candidate.free)))
+        first += len(own)
+        where.append(own)
+        faint = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
+        scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], faint))
+    return Scores(tuple(scores), tuple(where), gram, pull)
+
+
+def _passes(pool: Sequence[Sequence[Candidate]], room: int) -> list[list[Candidate]]:
+    """Divide candidates, one shape of an effect each, among passes of so many parameters."""
+    passes: list[list[Candidate]] = []
+    for batch in itertools.zip_longest(*pool):
+        left = 0
+        for candidate in batch:
+            if candidate is None:
+                continue
+            if left < len(candidate.free):
+                passes.append([])
+                left = room
+            passes[-1].append(candidate)
+            left -= len(candidate.free)
+    return passes
+
+
+def _scored(candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, faint: float) -> Score:
+    """Score a candidate; ``faint`` is the size at which one with a phase is derived."""
+    if not gram.any():
+        return Score(candidate, 0.0, {}, 0.0)
+    step = np.where(sizes > 0, _inverse(gram) @ pull / np.where(sizes > 0, sizes, 1.0), 0.0)
+    start = {candidate.free[0]: float(step[0])}
+    scale = sizes.copy()
+    if candidate.phase is not None:
+        # The derivative by the phase is the size times that of the same effect a quarter on.
+        quadrature = float(step[1]) * faint
+        start = {
+            candidate.free[0]: math.hypot(step[0], quadrature),
+            candidate.free[1]: math.atan2(quadrature, step[0]),
+        }
+        scale[1] /= faint
+    information = float(np.linalg.eigvalsh(gram * np.outer(scale, scale))[0])
+    return Score(candidate, _gain(gram, pull), start, max(information, 0.0))
+
+
+def _gain(gram: Floats, pull: Floats) -> float:
+    return float(pull @ _inverse(gram) @ pull)
+
+
+def _inverse(gram: Floats) -> Floats:
+    return np.asarray(np.linalg.pinv(gram, rcond=UNSEEN**2, hermitian=True), np.float64)
+
+
+def _root_inverse(gram: Floats) -> Floats:
+    values, vectors = np.linalg.eigh(gram)
+    sound = values > UNSEEN**2 * max(float(values[-1]), 1e-300)
+    return np.asarray(vectors[:, sound] / np.sqrt(values[sound]) @ vectors[:, sound].T, np.float64)
+
+
+def _orthonormal(columns: Floats) -> Floats:
+    sizes = np.linalg.norm(columns, axis=0)
+    kept = columns[:, sizes > 0]
+    if not kept.size:
+        return np.zeros((len(columns), 0))
+    u, s, _ = np.linalg.svd(kept / sizes[sizes > 0], full_matrices=False)
+    return np.asarray(u[:, s > 1e-7 * s[0]], np.float64)  # a direction that is none

@@ -1,0 +1,115 @@
+"""The search for the effects that a model lacks.
+
+1. The given model is fitted, and the physical core: viscous damping, Coulomb friction and quadratic
+   drag with the sensor's zero. The cheaper one is where the search starts.
+2. All effects of the library, in all their shapes, are scored there, alone and in pairs; before
+   anything is accepted also at the given model, where an effect stands in place of the drag.
+3. The best few are fitted jointly with all other parameters, within physics.
+4. A model costs its sum of squares, counted in independent readings of the residuals that the best
+   model leaves, and Schwarz's penalty. The cheapest is accepted if noise alone hardly gains as
+   much, if it closes its share of a gap that it does not close whole, and if it loses on no
+   held-out set.
+5. Steps 2 to 4 are repeated until nothing is accepted.
+6. Each accepted effect is dropped where it gains too little beside the others, and replaced by
+   whatever is cheaper in its place (:mod:`pendmap.diagnosis.prune`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pendmap.diagnosis.attempts import attempt_of
+from pendmap.diagnosis.baseline import follows
+from pendmap.diagnosis.prune import pruned
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.state import State
+
+__all__ = ["beginnings", "search"]
+
+
+def search(state: State, core: Trial | None, progress: Callable[[int], None]) -> Trial:
+    """Return the best model.
+
+    Parameters
+    ----------
+    state : State
+        The records, the given model and the candidates.
+    core : Trial, optional
+        The physical core fitted to the records; none where the given model has its effects.
+    progress : callable
+        Called with the number of accepted effects.
+    """
+    best = state.weigh(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
+    starts = beginnings(state, best)
+    best = pruned(state, starts[0])
+    starts = [s for s in starts if s.chosen != best.chosen and follows(state.evidence, s)]
+    while state.room(best) > 0:
+        step = _step(state, best, starts)
+        if step is None:
+            break
+        best, starts = pruned(state, state.weigh(state.settled(step))), []
+        progress(len(best.chosen))
+    return best
+
+
+def beginnings(state: State, core: Trial) -> list[Trial]:
+    """Return the given model and the core with what it needs of its effects, the cheapest first."""
+    starts = [state.base]
+    if core.chosen and state.most > 0:
+        starts.append(core)
+        state.accept(core)
+        for candidate in core.chosen:
+            rest = state.rest(core, candidate)
+            starts += [rest] if rest is not None and rest.chosen else []
+    return sorted(starts, key=state.cost)
+
+
+def _step(state: State, best: Trial, starts: Sequence[Trial]) -> Trial | None:
+    """Return the cheapest model with more, or other, effects that is accepted."""
+    found: list[tuple[Trial, Trial, list[int]]] = []
+    for rest in [best, *(s for s in starts if s is not best)]:
+        for places in _promising(state, rest):
+            try:
+                trial = state.refit(rest, places)
+            except InputError:
+                continue
+            if trial is not None:
+                found.append((trial, rest, places))
+    if not found:
+        return None
+    level = min((trial for trial, _, _ in found), key=lambda t: t.chi2).level
+    found.sort(key=lambda each: state.cost(each[0], level))
+    for trial, rest, places in found[: state.thresholds.singles]:
+        gains = state.room(trial) >= 0 and state.gains(best, trial)
+        good = gains and state.holds(best, trial)
+        state.attempts.append(attempt_of(state, rest, trial, places, tried=gains, accepted=good))
+        if good:
+            return trial
+    return None
+
+
+def _promising(state: State, rest: Trial) -> list[list[int]]:
+    """Return the candidates, and the pairs of them, with the greatest scores at a model."""
+    limits = state.thresholds
+    scores = state.scores(rest)
+    ranked = scores.best()
+    chosen: list[list[int]] = []
+    for k in ranked:
+        if not any(scores.same(j, k) for [j] in chosen) and scores.scores[k].gain > 0:
+            chosen.append([k])
+        if len(chosen) == limits.singles:
+            break
+    if state.room(rest) < 2 or len(ranked) < 2:  # noqa: PLR2004 (a pair)
+        return chosen
+    alone = max(scores.scores[k].gain for k in ranked)
+    pairs = [
+        pair
+        for pair in scores.best_pairs(ranked, limits.pairs)
+        if scores.together(pair) - alone > limits.alike * state.level
+    ]
+    return [*chosen, *pairs]

@@ -1,0 +1,292 @@
+"""What a search knows: fits, scores and hold-out results, each computed once."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.diagnosis.baseline import taken_by
+from pendmap.diagnosis.candidates import ZERO, candidates, commonness
+from pendmap.diagnosis.fitted_model import fitted, settled
+from pendmap.diagnosis.held import Held, predictive, tried
+from pendmap.diagnosis.model_error import model_errors, weighted
+from pendmap.diagnosis.physical import within_physics
+from pendmap.diagnosis.refit import Key, best_of, key_of, refitted, replaced, without
+from pendmap.diagnosis.scores import Scores, scores_of
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from pendmap.diagnosis.attempts import Attempt
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.data import Evidence
+    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.thresholds import Thresholds
+    from pendmap.model import Formula
+
+__all__ = ["Found", "State"]
+
+SAME: Final = 0.2
+"""Part of a standard error by which an error of the model may change and readings keep their
+weights."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """A fitted model and how it does on what was held back."""
+
+    trial: Trial
+    held: Held
+
+
+class State:
+    """Fits of a diagnosis, computed when they are asked for.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    base : Trial
+        The given model.
+    thresholds : Thresholds
+        The numbers that decide.
+    most : int
+        Greatest number of added effects; the sensor's zero does not count.
+    without : collection of str
+        Effects that are no candidates.
+    own : collection of Formula
+        Candidates of the user's own.
+    """
+
+    def __init__(  # noqa: PLR0913 (what is searched, and among what)
+        self,
+        evidence: Evidence,
+        base: Trial,
+        thresholds: Thresholds,
+        most: int,
+        without: Collection[str],
+        *,
+        own: Collection[Formula] = (),
+    ) -> None:
+        self.records = self.evidence = evidence
+        self.thresholds, self.most = thresholds, most
+        self.left_out, self.own = without, own
+        self.errors = (0.0,) * len(evidence.fitted)
+        self.attempts: list[Attempt] = []
+        self._begin(base)
+
+    def _begin(self, base: Trial) -> None:
+        self.base = self._best = base
+        self._fits: dict[Key, Trial] = {key_of(()): base}
+        self._rests: dict[tuple[Key, str], Trial | None] = {}
+        self._refits: dict[tuple[Key, Key], Trial | None] = {}
+        self._scores: dict[Key, Scores] = {}
+        self._held: dict[int, tuple[Trial, Held | None, tuple[float, ...]]] = {}
+
+    def weigh(self, best: Trial) -> Trial:
+        """Give readings the error that a model leaves, and return the model fitted with it.
+
+        Fits, scores and hold-out results with other weights are forgotten. Nothing changes where
+        the errors are nearly what they were.
+        """
+        errors = model_errors(self.records, best)
+        pairs = zip(errors, self.errors, self.records.fitted, strict=True)
+        if all(abs(new - old) < SAME * np.hypot(old, np.mean(r.sigma)) for new, old, r in pairs):
+            return best
+        self.errors = errors
+        self.evidence = weighted(self.records, errors)
+        self._begin(self._again(self.base))
+        return self.base if not best.chosen else self.keep(self._again(best)) or best
+
+    def _again(self, trial: Trial) -> Trial:
+        """Return a model fitted with the weights that readings have now."""
+        found = fitted(
+            self.evidence,
+            trial.fit.model,
+            [*trial.free, *trial.zeroed],
+            trial.chosen,
+            start=dict.fromkeys(trial.zeroed, 0.0) | trial.start,
+            windows=trial.fit.windows,
+        )
+        return found if not trial.chosen else within_physics(self.evidence, found) or found
+
+    @property
+    def level(self) -> float:
+        """Sum of squares of one independent reading, by the residuals of the best model."""
+        return self._best.level
+
+    def accept(self, trial: Trial) -> None:
+        """Take an accepted model for the best one, if it fits better than those before it."""
+        if trial.chi2 < self._best.chi2:
+            self._best = trial
+
+    def keep(self, trial: Trial | None) -> Trial | None:
+        """Remember a fit; return the best one of the same effects."""
+        if trial is None:
+            return None
+        key = key_of(trial.chosen)
+        known = self._fits.get(key)
+        best = trial if known is None or trial.chi2 < known.chi2 else known
+        self._fits[key] = best
+        return best
+
+    def settled(self, trial: Trial) -> Trial:
+        """Return a fit with all the steps that it wants, within physics."""
+        if trial.fit.converged:
+            return trial
+        try:
+            full = within_physics(self.evidence, settled(self.evidence, trial, self.level))
+        except InputError:
+            return trial
+        return self.keep(full if full is not None else trial) or trial
+
+    def scores(self, trial: Trial) -> Scores:
+        """Return the scores of all candidates at a fit."""
+        key = key_of(trial.chosen)
+        if key not in self._scores:
+            self._scores[key] = scores_of(self.evidence, trial, self._pool(trial))
+        return self._scores[key]
+
+    def _pool(self, trial: Trial) -> list[list[Candidate]]:
+        """Return the candidates that a model does not have, each in all its shapes."""
+        return candidates(
+            taken_by(trial), driven=self.evidence.forced, without=self.left_out, own=self.own
+        )
+
+    def refit(self, trial: Trial, places: Sequence[int]) -> Trial | None:
+        """Return a trial's model with candidates, those at some places of its scores."""
+        scores = self.scores(trial)
+        key = key_of(trial.chosen), key_of([scores.scores[k].candidate for k in places])
+        if key not in self._refits:
+            found = refitted(
+                self.evidence, self.thresholds, trial, scores, places, self.level
+            )
+            self._refits[key] = self.keep(found)
+        return self._refits[key]
+
+    def rest(self, trial: Trial, dropped: Candidate) -> Trial | None:
+        """Return a trial's model without one of its effects; none where the motion is lost."""
+        way = key_of(trial.chosen), dropped.name
+        if way not in self._rests:
+            rest = without(self.evidence, trial, dropped, self.level)
+            chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+            self._rests[way] = self.keep(rest) or self._fits.get(key_of(chosen))
+        return self._rests[way]
+
+    def simplest(self, best: Trial) -> Trial:
+        """Return the simplest, then commonest, fit that the records do not tell from the best.
+
+        The given model stands where none is as good as the best accepted one.
+        """
+        reach = self._best.chi2 + self.thresholds.alike * self.level
+
+        def order(trial: Trial) -> tuple[float, ...]:
+            common = sum(commonness(name) for name in trial.names)
+            return trial.adapted, common, trial.chi2
+
+        alike = [t for t in self._fits.values() if t.chi2 < reach and self.room(t) >= 0]
+        for trial in sorted((best, *alike), key=order):
+            if trial is best or self.holds(best, trial, self.thresholds.alike):
+                return trial
+        return best
+
+    def instead(self, trial: Trial, dropped: Candidate, rest: Trial, place: int) -> Trial | None:
+        """Return a trial's model with a candidate of the rest's scores in an effect's place."""
+        found = replaced(
+            self.evidence, trial, dropped, self.scores(rest), place, self.level
+        )
+        if found is None or found.chi2 > rest.chi2:
+            found = best_of(found, self.refit(rest, [place]))
+        return self.keep(found)
+
+    def held(self, trial: Trial) -> Held | None:
+        """Return how a model does on what was held back; none where its motion is lost there."""
+        return self._tried(trial)[1]
+
+    def sets(self, trial: Trial) -> tuple[float, ...]:
+        """Return what each held-out set adds to a model's sum of squares."""
+        return self._tried(trial)[2]
+
+    def _tried(self, trial: Trial) -> tuple[Trial, Held | None, tuple[float, ...]]:
+        if id(trial) not in self._held:
+            try:
+                held = tried(self.evidence, trial)
+                sets = predictive(self.evidence, trial, held, self.level)
+            except InputError:
+                held, sets = None, (math.inf,)
+            self._held[id(trial)] = trial, held, sets
+        return self._held[id(trial)]
+
+    def found(self, trial: Trial) -> Found:
+        """Return a model with its hold-out results.
+
+        Raises
+        ------
+        InputError
+            If its motion is lost on what was held back.
+        """
+        held = self.held(trial)
+        return Found(trial, held if held is not None else tried(self.evidence, trial))
+
+    def room(self, trial: Trial) -> int:
+        """Return how many effects may be added to a trial's."""
+        return self.most - len(self.counted(trial))
+
+    @staticmethod
+    def counted(trial: Trial) -> set[str]:
+        """Return the names of the added effects that count."""
+        return set(trial.names) - {ZERO}
+
+    def cost(self, trial: Trial, level: float | None = None) -> float:
+        """Return the sum of squares in independent readings with Schwarz's penalty."""
+        level = level or self.level
+        readings = max(trial.fit.samples / level, self._best.chi2 / level, 3.0)
+        return trial.chi2 / level + trial.adapted * math.log(min(readings, trial.fit.samples))
+
+    def chance(self, rest: Trial, full: Trial) -> float:
+        """Return the probability that noise alone gains as much as the further effects of a model.
+
+        Fisher's F of the fall of the sum of squares over the greater one of the noise and of what
+        the larger model leaves, times the number of candidates in all their shapes.
+        """
+        from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
+
+        more = full.adapted - rest.adapted
+        gain = rest.chi2 - full.chi2
+        if more <= 0:
+            return 0.0 if gain > 0 else 1.0
+        readings = max(full.chi2 / full.level, 2.0)
+        chance = max(
+            full.remainder.chance_of(gain, more, full.level if full.level < 1 else 0.0),
+            float(fdtrc(more, readings, max(gain, 0.0) / more / full.level)),
+        )
+        return min(chance * sum(map(len, self._pool(rest))), 1.0)
+
+    def gains(self, rest: Trial, full: Trial) -> bool:
+        """Whether further effects gain more than chance, and close what they must."""
+        if self.chance(rest, full) >= self.thresholds.chance:
+            return False
+        if full.remainder.chance >= self.thresholds.rest:
+            return True
+        return self.closed(rest, full) >= self.thresholds.closes
+
+    @staticmethod
+    def closed(rest: Trial, full: Trial) -> float:
+        """Return the share of the squared gap above the noise that further effects close."""
+        noise = min(full.remainder.level, full.chi2 / max(full.fit.degrees, 1))
+        gap = rest.chi2 - noise * rest.fit.degrees
+        return (rest.chi2 - full.chi2) / gap if gap > 0 else 1.0
+
+    def holds(self, rest: Trial, full: Trial, loss: float | None = None) -> bool:
+        """Whether a model loses on no held-out set against another one.
+
+        A loss of less than ``loss`` independent readings, by default that of the thresholds, is
+        none.
+        """
+        pairs = zip(self.sets(rest), self.sets(full), strict=False)
+        most = (self.thresholds.loss if loss is None else loss) * max(full.level, self.level)
+        return all(more - less <= most for less, more in pairs)

@@ -1,0 +1,141 @@
+"""Exponents brought near their best before they are fitted with all else.
+
+A size and its exponent make a valley of the sum of squares that is narrow and bends: a fit of both
+creeps along it. Its floor is followed here: at each exponent all else is fitted, and from how the
+readings change with it, what the others cannot follow taken off, comes the next one (variable
+projection: Golub & Pereyra 1973, SIAM Journal on Numerical Analysis 10, 413).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.errors import InputError
+from pendmap.identification.sensitivity import sensitivities
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+    from pendmap.model import Rig
+
+__all__ = ["exponents", "nearer"]
+
+STAGES: Final = 8
+"""Exponents that are tried at most."""
+
+REACH: Final = 0.2
+"""The longest step of an exponent: less than from one of the scan to the next."""
+
+FARTHEST: Final = 3.0
+"""The most that the logarithm of a size changes at once."""
+
+SHORTER: Final = 0.25
+"""Of the reach, after an exponent at which the fit was worse."""
+
+SHORTEST: Final = 0.01
+"""The least reach."""
+
+PROMISED: Final = 0.01
+"""Of the sum of squares: what promises less is near enough."""
+
+HOPE: Final = 3.0
+"""So many times as much as a step promises is the most that is hoped for."""
+
+
+def exponents(candidate: Candidate) -> dict[str, str]:
+    """Return the exponents of an effect's shape by the sizes whose units depend on them."""
+    return {
+        f"{candidate.name}.{entry['name']}": f"{candidate.name}.{entry['power_of_w0_less']}"
+        for entry in candidate.definition["parameters"]
+        if f"{candidate.name}.{entry['power_of_w0_less']}" in candidate.adapted
+    }
+
+
+def nearer(  # noqa: PLR0913 (what to fit, and how)
+    fit: TrajectoryFit,
+    runs: Sequence[FitRun],
+    size: str,
+    exponent: str,
+    again: Callable[[Rig, Mapping[str, float], TrajectoryFit], TrajectoryFit],
+    *,
+    target: float = math.inf,
+) -> TrajectoryFit:
+    """Return a fit in which an exponent, which is not fitted, is near its best.
+
+    Parameters
+    ----------
+    fit : TrajectoryFit
+        Of all else.
+    runs : sequence of FitRun
+        Its records.
+    size, exponent : str
+        The size whose unit depends on the exponent, and this.
+    again : callable
+        Fits a model from a start on, with the windows of a fit; an InputError where it is lost.
+    target : float
+        The sum of squares that is to be reached; what promises far less is given up.
+    """
+    reach = REACH
+    for _ in range(STAGES):
+        step, gain, follow = _step(fit, runs, exponent)
+        if gain < PROMISED or reach < SHORTEST or fit[size] == 0:
+            break
+        if fit.chi2 - HOPE * gain > target:
+            break
+        step = math.copysign(min(abs(step), reach), step)
+        start = {name: e.value - step * follow[name] for name, e in fit.estimates.items()}
+        # A size goes with its exponent as a power does; what is nearly 0 has no derivative by it.
+        power = max(-FARTHEST, min(-step * follow[size] / fit[size], FARTHEST))
+        start[size] = fit[size] * math.exp(power)
+        try:
+            found = again(_with(fit.model, exponent, step), start, fit)
+        except InputError:
+            reach = SHORTER * abs(step)
+            continue
+        if found.chi2 < fit.chi2:
+            fit = found
+        else:
+            reach = SHORTER * abs(step)
+    return fit
+
+
+def _step(
+    fit: TrajectoryFit, runs: Sequence[FitRun], exponent: str
+) -> tuple[float, float, dict[str, float]]:
+    """Return an exponent's step, what it gains, and by how much all else makes up for it."""
+    seen = sensitivities(fit, runs, [exponent], fit.model)
+    place = seen.names.index(exponent)
+    own, others = seen.columns[:, place], np.delete(seen.columns, place, axis=1)
+    sizes = np.linalg.norm(others, axis=0)
+    sizes[sizes == 0] = 1.0
+    follow = np.linalg.lstsq(others / sizes, own)[0] / sizes
+    rest = own - others @ follow
+    information, pull = float(rest @ rest), float(rest @ seen.residual)
+    names = [name for name in seen.names if name != exponent]
+    if information <= 0:
+        return 0.0, 0.0, {}
+    return pull / information, pull**2 / information, dict(zip(names, follow, strict=True))
+
+
+def _with(model: Rig, exponent: str, step: float) -> Rig:
+    """Return a model whose exponent is a step on, within its range."""
+    name, _, parameter = exponent.rpartition(".")
+    effects: list[Any] = []
+    for effect in model.effects:
+        if effect.name != name:
+            effects.append(effect)
+            continue
+        (entry,) = (e for e in effect.definition["parameters"] if e["name"] == parameter)
+        low, high = entry["range"]
+        value = min(max(effect.parameters[parameter] + step, low), high)
+        effects.append(
+            dataclasses.replace(effect, parameters={**effect.parameters, parameter: value})
+        )
+    return dataclasses.replace(model, effects=tuple(effects))

@@ -1,0 +1,163 @@
+"""The five verdicts, and what they rest on."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from pendmap.diagnosis.calibration import complete
+from pendmap.diagnosis.form import Form, form_of
+from pendmap.diagnosis.alternatives import Standing, standing_of
+
+if TYPE_CHECKING:
+    from pendmap.diagnosis.runs import RunByRun
+    from pendmap.diagnosis.state import Found, State
+
+__all__ = ["Judgement", "judge"]
+
+Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
+
+SEVERAL: Final = 1.0
+"""Standard errors by which the greatest of several runs counts as less than all together."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Judgement:
+    """What a search amounts to.
+
+    Parameters
+    ----------
+    verdict : str
+        ``none``: the baseline describes the records; ``named``: effects explain all; ``ambiguous``:
+        a class of effects does, which these records do not tell apart; ``partial``: effects close
+        most of the gap and something is left; ``unknown``: something is missing that no candidate
+        explains.
+    standings : tuple of Standing
+        The effects that were found, among their rivals.
+    left : float
+        The slow part of what is left, over its standard error.
+    ratio, ratio_allowed : float
+        Sum of squares over degrees of freedom, and up to where chance and the doubt about the noise
+        allow it: ``1 + 4 sqrt(2 / N + 4 r^2)``.
+    ratio_held : float
+        Sum of squares over degrees of freedom on what was held back.
+    closed : float
+        Share of the gap that the effects close, the lesser one of what was fitted and held back.
+    uneven : float
+        How differently the runs would have the parameters, over the standard error of that
+        (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
+    spread : float
+        How much sizes differ from run to run beyond noise, over their size: the greatest of the
+        effects that close the gap.
+    chance : float
+        That noise alone would show such a torque over angle, velocity, amplitude, drive phase or
+        time as is left.
+    form : Form
+        What is left, looked for in every direction.
+    complete : float
+        Probability that the effects found are all that is missing, each by its name or in its
+        class (:mod:`pendmap.diagnosis.calibration`); 1 where none was found.
+    """
+
+    verdict: Verdict
+    standings: tuple[Standing, ...]
+    left: float
+    ratio: float
+    ratio_allowed: float
+    ratio_held: float
+    closed: float
+    uneven: float
+    spread: float
+    chance: float
+    form: Form
+    complete: float
+    approximate: bool
+
+
+def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement:
+    """Return the verdict on a search.
+
+    Parameters
+    ----------
+    state : State
+        After the search.
+    best : Found
+        The best model.
+    runs : RunByRun
+        Its parameters run by run.
+    chance : float
+        Probability that noise alone shows such a torque over angle, velocity, ... as is left.
+    """
+    limits, trial = state.thresholds, best.trial
+    degrees = max(trial.fit.degrees, 1)
+    # The doubt about the noise as it is seen without a model, run by run.
+    allowed = 1 + 4 * math.sqrt(2 / degrees + 4 * state.evidence.doubt**2)
+    ratio = trial.chi2 / degrees
+    # The greatest of several runs is greater by chance.
+    left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
+    form = form_of(
+        state.scores(trial),
+        trial.remainder.chance_of,
+        torque=chance,
+        slow=trial.remainder.chance,
+        runs=runs.chance,
+    )
+    held = best.held.chi2 / max(best.held.degrees, 1)
+    missed = bool(trial.chosen) and held > limits.forecast * max(ratio, allowed)
+    rest = missed or form.chance < limits.rest
+    closed = _closed(state, best)
+    standings = tuple(
+        sorted(
+            (standing_of(state, trial, candidate) for candidate in trial.chosen),
+            key=lambda s: -s.gain,
+        )
+    )
+    spread = runs.spread(standings[0].candidate.free[0]) if standings else 0.0
+    sure = complete(form.chance, [s.gain for s in standings]) if standings else 1.0
+    verdict: Verdict
+    if not standings:
+        verdict = "unknown" if rest else "none"
+    elif rest:
+        verdict = "partial" if closed >= limits.main and spread <= limits.spread else "unknown"
+    elif any(len(standing.equivalent) > 1 for standing in standings):
+        verdict = "ambiguous"
+    else:
+        verdict = "named"
+    return Judgement(
+        verdict,
+        standings,
+        left,
+        ratio,
+        allowed,
+        held,
+        closed,
+        runs.uneven,
+        spread,
+        chance,
+        form,
+        sure,
+        verdict == "partial" or sure < limits.sure,
+    )
+
+
+def _closed(state: State, best: Found) -> float:
+    """Return the share of the gap closed, the lesser one of what was fitted and held back.
+
+    The gap is the sum of squares above that of noise, as the best model's spectrum shows it.
+    """
+    trial, base = best.trial, state.found(state.base)
+    noise = min(trial.remainder.level, trial.chi2 / max(trial.fit.degrees, 1))
+    shares = []
+    for before, after, degrees in (
+        (base.trial.chi2, trial.chi2, trial.fit.degrees),
+        (base.held.chi2, best.held.chi2, best.held.degrees),
+    ):
+        scatter = noise * math.sqrt(2 * degrees)
+        gap = before - noise * degrees
+        # Noise alone scatters by this much: a gap below it cannot be divided.
+        if gap > scatter:
+            shares.append(1 - max(after - noise * degrees, 0.0) / gap)
+    return float(np.clip(min(shares, default=1.0), -1.0, 1.0))

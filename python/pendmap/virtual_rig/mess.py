@@ -1,0 +1,145 @@
+"""Weak disturbances that no effect describes: what every rig has beside its main effect.
+
+A texture of the bearing (a torque and a friction that are random series in the angle), a slow drift
+of the sensor's zero, and noise that hangs together over a part of a second to some seconds. Each has
+a random share of the size, a multiple of the sensor's noise.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.virtual_rig.effect import Effect
+from pendmap.virtual_rig.readings import fading
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    from pendmap.virtual_rig.effect import Motion
+    from pendmap.virtual_rig.sensor import Sensor
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["Mess", "Texture"]
+
+ORDERS: Final = (2, 40)
+"""Orders per turn of a texture, the least and the greatest."""
+
+TERMS: Final = 8
+"""Terms of a texture, and of a drift."""
+
+TORQUE: Final = 0.1
+"""Torque of a texture, in units of w0^2, that moves readings by about 1 rad."""
+
+FRICTION: Final = 0.005
+"""The same of its friction."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Texture(Effect):
+    """Races that are not round: torque and friction vary with the angle.
+
+    ``+torque sum c_k sin(n_k th + psi_k) - friction |sum d_k sin(n_k th + phi_k)| sign v``
+    """
+
+    name = "bearing_texture"
+    group = "torque"
+    formula = "+torque f(th) - friction |g(th)| sign v, f and g random series in th"
+    drawn = False
+
+    torque: float
+    friction_size: float
+    series: tuple[Floats, ...]
+
+    def __post_init__(self) -> None:
+        """Take the numbers as they are: nobody types them."""
+
+    @classmethod
+    def made(cls, rng: Generator, torque: float, friction: float) -> Texture:
+        """Draw a texture whose series have the root mean square 1."""
+        series: list[Floats] = []
+        for _ in range(2):
+            orders = rng.choice(np.arange(ORDERS[0], ORDERS[1] + 1), TERMS, replace=False)
+            weights = rng.standard_normal(TERMS) / orders
+            weights *= math.sqrt(2) / np.linalg.norm(weights)
+            series.append(np.stack([orders, weights, rng.uniform(-math.pi, math.pi, TERMS)]))
+        return cls(torque, friction, tuple(series))
+
+    def _series(self, which: int, theta: Floats) -> Floats:
+        orders, weights, phases = self.series[which]
+        return np.asarray(np.sin(theta[..., None] * orders + phases) @ weights, np.float64)
+
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        """Return the torque of the texture."""
+        return self.torque * self._series(0, motion.theta)
+
+    def friction(self, motion: Motion, direction: Floats) -> Floats:
+        """Return the friction of the texture."""
+        return self.friction_size * self._series(1, motion.theta) ** 2
+
+
+@dataclasses.dataclass(frozen=True)
+class Mess:
+    """Disturbances of one experiment.
+
+    Parameters
+    ----------
+    texture : Texture
+        Of the bearing.
+    drift : array, shape (3, k)
+        Amplitudes (rad), angular frequencies (rad/s) and phases of the drift of the sensor's zero.
+    noise, time : float
+        Root mean square (rad) and correlation time (s) of the noise that hangs together.
+    """
+
+    texture: Texture
+    drift: Floats
+    noise: float
+    time: float
+
+    @classmethod
+    def made(cls, rng: Generator, size: float, w0: float, longest: float) -> Mess:
+        """Draw disturbances.
+
+        Parameters
+        ----------
+        rng : Generator
+            Draws.
+        size : float
+            Root mean square of what they do to the readings, about, rad.
+        w0 : float
+            Natural frequency, rad/s.
+        longest : float
+            Time in the laboratory when the last run ends, s.
+        """
+        shares = size * np.sqrt(rng.dirichlet(np.ones(4)))
+        slow = 2 * math.pi / np.exp(rng.uniform(math.log(60), math.log(60 + longest), TERMS))
+        weights = rng.standard_normal(TERMS) / slow
+        weights *= math.sqrt(2) * shares[2] / np.linalg.norm(weights)
+        texture = Texture.made(rng, shares[0] * TORQUE * w0**2, shares[1] * FRICTION * w0**2)
+        drift = np.stack([weights, slow, rng.uniform(-math.pi, math.pi, TERMS)])
+        return cls(texture, drift, float(shares[3]), float(np.exp(rng.uniform(-3.0, 1.0))))
+
+    def reading(self, lab: Floats, sensor: Sensor, rng: Generator) -> Floats:
+        """Return what drift and noise add to readings at times in the laboratory, rad."""
+        weights, slow, phases = self.drift
+        drift = np.sin(lab[:, None] * slow + phases) @ weights
+        rho = math.exp(-1 / (sensor.rate * self.time))
+        white = rng.standard_normal(lab.size)
+        white[1:] *= math.sqrt(1 - rho**2)
+        return np.asarray(drift + self.noise * fading(white, rho), np.float64)
+
+    def describe(self) -> dict[str, Any]:
+        """Return what is written into the truth."""
+        return {
+            "torque_rms": self.texture.torque,
+            "friction_rms": self.texture.friction_size,
+            "drift_rms_rad": float(np.linalg.norm(self.drift[0]) / math.sqrt(2)),
+            "noise_rad": self.noise,
+            "correlation_time_s": self.time,
+        }
