@@ -57,10 +57,15 @@ def tried(evidence: Evidence, trial: Trial) -> Held:
     known = {name: value for name, value in trial.start.items() if "[" not in name}
     own = tuple(name for name in trial.free if name in known)
     if not evidence.inside:
+        free = trial.free
+        if not any(run.forced for run in evidence.held):
+            # What only a drive shows has no part in free decays.
+            drives = {e.name for e in model.effects if e.drives}
+            free = tuple(name for name in free if name.partition(".")[0] not in drives)
         fit = fit_runs(
             evidence.held,
             model,
-            trial.free,
+            free,
             start=known,
             profiled=(),
             hold=True,

@@ -45,9 +45,10 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
         Called with the number of accepted effects.
     """
     best = state.weigh(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
-    starts = beginnings(state, best)
-    best = pruned(state, starts[0])
-    starts = [s for s in starts if s.chosen != best.chosen and follows(state.evidence, s)]
+    best = pruned(state, beginnings(state, best)[0])
+    # What takes the place of the core's effects starts without them.
+    rests = [state.rest(best, candidate) for candidate in best.chosen]
+    starts = [rest for rest in rests if rest is not None and follows(state.evidence, rest)]
     while state.room(best) > 0:
         step = _step(state, best, starts)
         if step is None:
