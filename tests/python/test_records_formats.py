@@ -212,8 +212,8 @@ def test_every_second_row_may_be_of_another_sensor(
     assert found(run)["angle-missing"].mended
 
 
-def test_one_column_is_said_to_be_one(tmp_path: Path) -> None:
-    with pytest.raises(pendmap.InputError, match="one column of numbers"):
+def test_an_angle_alone_has_no_times(tmp_path: Path) -> None:
+    with pytest.raises(pendmap.InputError, match="no column of times"):
         read(tmp_path, text((clean()[1],), "theta_rad"))
 
 

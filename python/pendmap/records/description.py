@@ -18,9 +18,20 @@ if TYPE_CHECKING:
 
     from pendmap.records.experiment import Kind
 
-__all__ = ["ALONE", "NAME", "Column", "Description", "Reader", "RunPlan", "read_description"]
+__all__ = [
+    "ALONE",
+    "NAME",
+    "RATE",
+    "Column",
+    "Description",
+    "Reader",
+    "RunPlan",
+    "read_description",
+]
 
 NAME: Final = "experiment.toml"
+
+RATE: Final = "rate_hz"
 
 _RIG: Final = ("gravity", "length_m", "w0", "encoder_counts")
 _TOP: Final = ("rig", "columns", "reader", "run")
@@ -90,10 +101,11 @@ class RunPlan:
 
 @dataclasses.dataclass(frozen=True)
 class Description:
-    """All of the file."""
+    """All of the file; ``rate_hz`` is the clock of records without times, samples a second."""
 
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     columns: Mapping[str, Column] = dataclasses.field(default_factory=dict)
+    rate_hz: float | None = None
     reader: Reader = Reader()
     runs: tuple[RunPlan, ...] = ()
 
@@ -129,9 +141,12 @@ def _description(content: dict[str, Any]) -> Description:
     for count, table in enumerate(runs, 1):
         where = f"[[run]] {count}"
         plans.append(_run(_table(table, where), where))
+    columns = _table(content.get("columns", {}), "[columns]")
+    _keys(columns, (*CHANNELS, RATE), "[columns]")
     return Description(
         _rig(_table(content.get("rig", {}), "[rig]")),
-        _columns(_table(content.get("columns", {}), "[columns]")),
+        {name: _column(name, value) for name, value in columns.items() if name != RATE},
+        _positive(f"[columns]: {RATE}", columns[RATE]) if RATE in columns else None,
         _reader(_table(content.get("reader", {}), "[reader]")),
         tuple(plans),
     )
@@ -187,11 +202,6 @@ def _text(name: str, value: object) -> str:
     if not isinstance(value, str) or not value:
         raise InputError(f"{name} is {checks.shown(value)}: allowed is a text")
     return value
-
-
-def _columns(table: dict[str, Any]) -> dict[str, Column]:
-    _keys(table, tuple(CHANNELS), "[columns]")
-    return {channel: _column(channel, value) for channel, value in table.items()}
 
 
 def _column(channel: str, value: object) -> Column:

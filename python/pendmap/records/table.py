@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import io
 from typing import TYPE_CHECKING, Final
@@ -61,9 +62,7 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     else:
         text, findings = decoded(data, where)
         table = parsed(text, reader, where)
-        table = Table(
-            table.names, table.values, table.rows, (*findings, *table.findings), table.headed
-        )
+        table = dataclasses.replace(table, findings=(*findings, *table.findings))
     table.values[np.abs(table.values) > HUGEST] = np.nan
     return table, digest
 
@@ -79,9 +78,8 @@ def _parquet(data: bytes, where: str) -> Table:
         raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
     values = np.column_stack(columns)
     values[~np.isfinite(values)] = np.nan
-    if values.shape[1] < 2:
-        raise InputError(f"{where}: has one column: allowed are a time and an angle")
-    return Table(names, values, np.arange(1, values.shape[0] + 1))
+    order = np.arange(values.shape[0])
+    return Table(names, values, order + 1, order=order)
 
 
 def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
