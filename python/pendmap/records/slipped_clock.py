@@ -4,8 +4,8 @@ A controller that misses a reading now and then and counts the stamps itself wri
 what the pendulum does an interval later. The reading jumps by the velocity times the interval. An
 encoder that misses counts jumps by their size, however quick the motion is.
 
-Around each sample a polynomial is fitted to the readings, with ``d v`` added to all that follow. That
-shows ``d`` also near a turning point, where the reading does not jump but the velocity does.
+Around each sample a polynomial is fitted to the readings, with ``d v`` added to all that follow.
+That shows ``d`` also near a turning point, where the reading does not jump but the velocity does.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ __all__ = ["Slips", "slips_of"]
 DEGREE: Final = 7
 
 PHASE: Final = 2.0
-"""Radians of phase to either side that such a polynomial follows: the next term is 6e-3 of the swing at its
-quickest."""
+"""Radians of phase to either side that such a polynomial follows: the next term is 6e-3 of the
+swing at its quickest."""
 
 SHORTEST: Final = 8
 """Samples to either side at least: fewer do not tell the velocity on both sides."""
