@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.records.edges import logs_edges, spread
 from pendmap.records.intervals import intervals_of
 from pendmap.words import counted, moment
 
@@ -137,6 +138,11 @@ def _coarse(work: Work) -> None:
     """Spread stamps evenly where several samples share each of them."""
     steps = np.diff(work.time)
     same = np.mean(steps == 0) if steps.size else 0.0
+    if 0 < same < 1 and np.all(steps >= 0) and logs_edges(work.theta):
+        work.time = spread(work.time)
+        text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
+        work.say("time-coarse", text, mended=True)
+        return
     if same < COARSE or same == 1 or np.any(steps < 0):
         return
     rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)

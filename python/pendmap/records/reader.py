@@ -12,6 +12,7 @@ from pendmap.errors import InputError
 from pendmap.records import (
     angle,
     clock,
+    edges,
     motion,
     noise_check,
     resampled,
@@ -216,12 +217,17 @@ def _runs(
         work.findings = [found for found in work.findings if found.what not in clock.SPACING]
         work.refuse_short()
         return [_run(work, name, channels, digest)], []
-    resampled.check(work)
+    edges.check(work)
+    if work.edges:
+        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
+    else:
+        resampled.check(work)
     samples.check(work)
     moves = motion.moves(work)
     if moves and work.made_of is None:
         scale.check(work)
     samples.say_steps(work)
+    edges.say(work)
     if moves:
         motion.check(work)
         trigger.check_drive(work)
@@ -265,7 +271,7 @@ def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
         segments=tuple(work.segments),
         channels=_columns(channels),
         unused=channels.unused,
-        count_rad=work.count,
+        count_rad=0.0 if work.edges else work.count,
         sha256=digest,
     )
 
