@@ -28,10 +28,10 @@ def command(
 ) -> None:
     """Say what a record holds and what is odd about it, before anything is fitted.
 
-    A FILE (CSV or other text, Parquet) has a time and an angle; a FOLDER has an experiment.toml,
-    or its files are free runs.
-    Channels, rate, noise without a model, releases and rest, gaps, outliers, missed counts,
-    units: what is certain is mended as it is read, and said. The files stay as they are.
+    A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
+    experiment.toml, or each of its files is a free run. Channels, rate, noise without a model,
+    releases and rest, gaps, outliers, missed counts, units: what is certain is mended as it is
+    read, and said. The files stay as they are.
     """
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import as_json as fields

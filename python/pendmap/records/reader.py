@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = ["files_of", "read_experiment"]
 
-TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq")
+TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
 """Suffixes of the files that are records in a folder without a description."""
 
 LEAST_RATE: Final = 1e-3
@@ -79,11 +79,11 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
 def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = None) -> Experiment:
     """Read a record or a folder of records, and say what is odd about them.
 
-    A file (CSV, other text, Parquet) with a time and an angle is an experiment of one free decay. A
-    folder is one with an ``experiment.toml``; without it each of its files is a free decay. Each
-    free release of a file is a run of its own, named ``decay 1/3``. Nothing is written. What is
-    certain is mended (turns that a sensor wraps are unwrapped, milliseconds become seconds, ...),
-    and that is said; all else is only said.
+    A file (CSV, other text, Parquet, Excel) with a time and an angle is an experiment of one free
+    decay. A folder is one with an ``experiment.toml``; without it each of its files is a free
+    decay. Each free release of a file is a run of its own, named ``decay 1/3``. Nothing is written.
+    What is certain is mended (turns that a sensor wraps are unwrapped, milliseconds become seconds,
+    ...), and that is said; all else is only said.
     ``Run.trusted`` marks the samples that are for fitting.
 
     Parameters

@@ -1,4 +1,4 @@
-"""A file, read: CSV and other text, or Parquet."""
+"""A file, read: CSV and other text, Excel, or Parquet."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.files import read_whole
+from pendmap.records.excel import ENGINES, read_workbook
 from pendmap.records.text import MOST_COLUMNS, Table, decoded, parsed
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ HUGEST: Final = 1e18
 """Largest number that can be a reading: nanoseconds since 1970 are 2e18, all else is less."""
 
 _KNOWN: Final = {
-    b"PK\x03\x04": "a ZIP or Excel file: allowed is CSV, saved from it",
-    b"\xd0\xcf\x11\xe0": "an old Excel file: allowed is CSV, saved from it",
     b"\x1f\x8b": "compressed: allowed is the file unpacked",
     b"\x89HDF": "an HDF5 file: allowed are CSV and Parquet",
     b"CDF\x01": "a NetCDF file: allowed are CSV and Parquet",
@@ -57,7 +56,9 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     for mark, what in _KNOWN.items():
         if data.startswith(mark):
             raise InputError(f"{where}: is {what}")
-    if data.startswith(b"PAR1") or path.suffix.lower() in {".parquet", ".pq"}:
+    if data[:4] in ENGINES:
+        table = read_workbook(data, reader, where)
+    elif data.startswith(b"PAR1") or path.suffix.lower() in {".parquet", ".pq"}:
         table = _parquet(data, where)
     else:
         text, findings = decoded(data, where)
