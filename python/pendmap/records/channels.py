@@ -220,5 +220,5 @@ def _pivot(table: Table, plan: RunPlan, where: str) -> tuple[dict[str, Floats] |
     for way in ("vertical", "horizontal"):
         if way in plan.pivot:
             place = _place(plan.pivot[way], table, f"{where}: pivot: {way}")
-            found[way] = np.asarray(table.values[:, place] * factor)
+            found[way] = np.asarray(table.values[:, place] * factor * plan.pivot_scale)
     return found, unit

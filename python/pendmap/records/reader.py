@@ -15,6 +15,7 @@ from pendmap.records import (
     edges,
     motion,
     noise_check,
+    pivot,
     resampled,
     resolution,
     samples,
@@ -233,6 +234,7 @@ def _runs(
         trigger.check_drive(work)
         signs.check(work)
         resolution.check(work)
+    pivot.smooth(work)
     work.refuse_short()
     works, shared = work.apart()
     runs = []
@@ -265,7 +267,7 @@ def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
         gyroscope=gyroscope,
         drive=plan.drive,
         pivot=work.pivot(),
-        pivot_unit=channels.pivot_unit,
+        pivot_unit=work.pivot_unit,
         findings=tuple(dataclasses.replace(f, where=f.where or name) for f in work.findings),
         peaks_only=work.peaks_only,
         segments=tuple(work.segments),

@@ -42,7 +42,8 @@ class Work:
     ``place_missing`` which keys would; ``integrated`` whether the angle was made of the velocity.
     ``releases`` are the stretches for fitting of a free record, first place and the one after the
     last; ``edge`` and ``phase`` what [columns] says of the trigger;
-    ``edges`` whether each reading is an edge of an encoder.
+    ``edges`` whether each reading is an edge of an encoder; ``pivot_unit`` what
+    the pivot's channels are.
     """
 
     where: str
@@ -66,6 +67,7 @@ class Work:
     edge: str | None = None
     phase: float | None = None
     edges: bool = False
+    pivot_unit: str | None = None
 
     @property
     def made_of(self) -> Accelerometer | None:
@@ -102,6 +104,7 @@ class Work:
             place_missing=channels.place_missing,
             edge=channels.edge,
             phase=channels.phase,
+            pivot_unit=channels.pivot_unit,
         )
 
     def say(
