@@ -76,7 +76,8 @@ def _window(values: Floats, step: float, order: int, interval: float) -> int:
     """Return how many readings a cubic is fitted to: 5 where none is needed."""
     from scipy.signal import savgol_coeffs, savgol_filter
 
-    rest = np.abs(local_fit(np.arange(values.size) * interval, values).residual)
+    time = interval * np.arange(values.size, dtype=np.float64)
+    rest = np.abs(local_fit(time, values).residual)
     felt = rest[rest > 1e-9 * np.ptp(values)]
     noise = max(step / math.sqrt(12), float(np.median(felt)) if felt.size else 0.0)
     most = max(min(int(LONGEST / interval), values.size // 4), 5)
