@@ -114,7 +114,7 @@ TEXTS = {
     "one row": bad(lambda s: "\n".join(s.splitlines()[:2]), "has 1 sample with"),
     "two rows": bad(lambda s: "\n".join(s.splitlines()[:3]), "2 samples"),
     "four rows": bad(lambda s: "\n".join(s.splitlines()[:5]), "4 samples"),
-    "one column": bad(lambda s: "\n".join(r.split(",")[0] for r in s.splitlines()), "one column of numbers"),
+    "one column": bad(lambda s: "\n".join(r.split(",")[0] for r in s.splitlines()), "no column of angles"),
     "random bytes": bad(lambda _: RNG.bytes(5000), ""),
     "a picture": bad(lambda _: b"\x89PNG\r\n\x1a\n" + RNG.bytes(3000), ""),
     "a workbook": bad(lambda _: b"PK\x03\x04" + RNG.bytes(3000), "Excel"),

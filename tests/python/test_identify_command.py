@@ -102,7 +102,7 @@ def test_some_methods_and_an_effect(decay_file: Path, pendmap_command: Run) -> N
     [
         (("identify", "absent.csv"), "absent.csv: No such file"),
         (("identify", "empty.csv"), "empty.csv"),
-        (("identify", "."), "has no experiment.toml"),
+        (("identify", "vacant"), "has no experiment.toml"),
         (("identify", "decay.csv", "--method", "best"), "allowed are trajectory"),
         (("identify", "decay.csv", "--effect", "quadratic"), "perhaps quadratic_drag"),
         (("identify", "decay.csv", "--effect", "drive_phase"), "acts on the drive: allowed is"),
@@ -125,6 +125,7 @@ def test_refused_on_one_line(
     words: tuple[str, ...],
     complaint: str,
 ) -> None:
+    (tmp_path / "vacant").mkdir()
     (tmp_path / "empty.csv").write_text("", encoding="utf-8")
     (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
     (tmp_path / "model.toml").write_text("[pendulum]\nw0 = 6.2\n", encoding="utf-8")

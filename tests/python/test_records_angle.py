@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,8 +34,8 @@ def test_small_degrees_are_known_by_their_periods(tmp_path: Path) -> None:
 def test_a_scale_is_estimated_from_the_periods(tmp_path: Path) -> None:
     time, theta = clean()
     said = found(read(tmp_path, text((time, 1.8 * theta))))["angle-scale"].text
-    factor = float(said.split("about ")[1].split()[0])
-    assert factor == pytest.approx(1 / 1.8, rel=0.1)
+    factor = float(said.split("angle is ")[1].split()[0])
+    assert factor == pytest.approx(1 / 1.8, rel=0.01)
 
 
 @pytest.mark.parametrize("low", [0.0, -math.pi])
@@ -217,3 +218,26 @@ def test_one_end_of_a_sensor_is_said_once(tmp_path: Path, limit: float) -> None:
     time, theta = clean(start=3.0, duration=12.0)
     run = read(tmp_path, text((time, np.minimum(theta, limit))))
     assert found(run)["clipped"].text.startswith(f"the sensor ends at {limit:.4g} rad: ")
+
+
+@pytest.mark.parametrize("gain", [0.75, 1.5])
+@pytest.mark.parametrize("gyroscope", [True, False])
+def test_a_gain_that_the_period_disproves_is_said_with_its_error(
+    tmp_path: Path, gain: float, *, gyroscope: bool
+) -> None:
+    time, theta, speed = motion(start=1.4, duration=60.0)
+    noise = np.random.default_rng(1).standard_normal((3, time.size))
+    if gyroscope:
+        columns = (time, 0.01 * noise[0], gain * speed + 0.01 * noise[1], 0.01 * noise[2])
+        head = [f'"{name}"' for name in ("Time (s)", *(f"Gyroscope {k} (rad/s)" for k in "xyz"))]
+        content = text(columns, ",".join(head)).replace(",", "\t")
+    else:
+        content = text((time, gain * theta + 1e-3 * noise[0]))
+    said = found(read(tmp_path, content))["angle-scale"].text
+    factor, error = re.search(r"angle is (\S+) \+- (\S+) times", said).groups()  # type: ignore[union-attr]
+    assert abs(float(factor) - 1 / gain) < 3 * float(error)
+    assert float(error) < 0.01
+    channel = "velocity" if gyroscope else "angle"
+    described = f'[columns]\n{channel} = {{ scale = {factor} }}\n[[run]]\nfile = "run.csv"\n'
+    (run,) = experiment(tmp_path, described, run=content).runs
+    assert "angle-scale" not in found(run)

@@ -176,3 +176,27 @@ def test_stamps_that_differ_by_rounding_are_one(tmp_path: Path, seed: int) -> No
     run = read(tmp_path, text((stamps[order], np.r_[theta, theta[again]][order]), form="%.17g"))
     np.testing.assert_allclose(run.time, time, atol=1e-9)
     np.testing.assert_allclose(run.theta, theta, atol=1e-9)
+
+
+@pytest.mark.parametrize("stamp", ["last", "zero"])
+@pytest.mark.parametrize("tick", [0.01, 0.1])
+def test_a_clock_that_stops_costs_what_follows(tmp_path: Path, stamp: str, tick: float) -> None:
+    time, theta = clean(duration=40.0)
+    stamps = np.floor(time / tick + 1e-6) * tick
+    stamps[2203:] = stamps[2202] if stamp == "last" else 0.0
+    run = read(tmp_path, text((stamps, theta)))
+    assert found(run)["time-stops"].mended
+    assert abs(run.time.size - 2203) < 10
+    assert run.trusted.all()
+    assert run.rate_hz == pytest.approx(100, rel=1e-3)
+    assert "time-duplicate" not in found(run)
+
+
+def test_a_clock_that_stops_for_a_while_leaves_a_gap(tmp_path: Path) -> None:
+    time, theta = clean(duration=40.0)
+    stamps = time.copy()
+    stamps[1200:1500] = stamps[1199]
+    run = read(tmp_path, text((stamps, theta)))
+    assert "12.99" not in found(run)["time-stops"].text
+    assert "11.99" in found(run)["time-stops"].text
+    np.testing.assert_allclose(run.time, np.delete(time, slice(1200, 1500)), atol=1e-6)

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 import math
-from typing import TYPE_CHECKING
+import zipfile
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import pendmap
+from pendmap.records import excel
 from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, noisy, read, text
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from pendmap import Run
@@ -212,8 +216,8 @@ def test_every_second_row_may_be_of_another_sensor(
     assert found(run)["angle-missing"].mended
 
 
-def test_one_column_is_said_to_be_one(tmp_path: Path) -> None:
-    with pytest.raises(pendmap.InputError, match="one column of numbers"):
+def test_an_angle_alone_has_no_times(tmp_path: Path) -> None:
+    with pytest.raises(pendmap.InputError, match="no column of times"):
         read(tmp_path, text((clean()[1],), "theta_rad"))
 
 
@@ -242,3 +246,65 @@ def test_a_pivot_without_unit_and_a_drive_that_is_not_there_are_said(tmp_path: P
 def test_a_description_is_refused_in_true_words(tmp_path: Path, line: str, says: str) -> None:
     with pytest.raises(pendmap.InputError, match=says):
         experiment(tmp_path, f'[[run]]\nfile = "run.csv"\n{line}\n', run=text(clean()))
+
+
+@pytest.fixture
+def workbook(tmp_path: Path) -> Callable[[str], Path]:
+    """A file that begins as a workbook does."""
+
+    def made(kind: str) -> Path:
+        path = tmp_path / f"book.{kind}"
+        if kind == "xlsx":
+            with zipfile.ZipFile(path, "w") as packed:
+                packed.writestr("xl/workbook.xml", "<workbook/>")
+        else:
+            path.write_bytes(b"\xd0\xcf\x11\xe0" + bytes(600))
+        return path
+
+    return made
+
+
+@pytest.mark.parametrize(("kind", "engine"), [("xlsx", "openpyxl"), ("xls", "xlrd")])
+def test_a_workbook_without_its_reader_is_one_line(
+    workbook: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, kind: str, engine: str
+) -> None:
+    def absent(*_: object, **__: object) -> None:
+        raise ImportError(engine)
+
+    monkeypatch.setattr(pd, "read_excel", absent)
+    with pytest.raises(pendmap.InputError, match=rf"with {engine}: pip install pendmap\[excel\]"):
+        pendmap.read_experiment(workbook(kind))
+
+
+@pytest.mark.parametrize("kind", ["xlsx", "xls"])
+@pytest.mark.parametrize("clock", ["s", "date"])
+def test_a_workbook_is_read_as_its_text_would_be(
+    workbook: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, kind: str, clock: str
+) -> None:
+    time, theta = clean()
+    begin = dt.datetime(2024, 3, 31, 1, 59, 50)  # noqa: DTZ001 (as a workbook has it)
+    stamps = [begin + dt.timedelta(seconds=t) for t in time] if clock == "date" else time
+    rows: list[list[Any]] = [["Pendulum of Monday", None, None], [None, None, None]]
+    rows += [["Time", None, "Angle (deg)"]]
+    rows += [[t, None, a] for t, a in zip(stamps, np.degrees(theta), strict=True)]
+    sheets = {"notes": pd.DataFrame([["a", 1.0]]), "data": pd.DataFrame(rows)}
+
+    def sheet(*_: object, **given: object) -> dict[str, pd.DataFrame]:
+        assert given["engine"] == {"xlsx": "openpyxl", "xls": "xlrd"}[kind]
+        return sheets
+
+    monkeypatch.setattr(pd, "read_excel", sheet)
+    (run,) = pendmap.read_experiment(workbook(kind)).runs
+    np.testing.assert_allclose(run.time - run.time[0], time, atol=2e-6)
+    np.testing.assert_allclose(run.theta, theta, atol=1e-12)
+    assert "'data' is read" in found(run)["sheet-chosen"].text
+
+
+def test_a_workbook_that_unpacks_to_too_much_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(excel, "MOST_BYTES", 1000)
+    with zipfile.ZipFile(tmp_path / "book.xlsx", "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("xl/workbook.xml", bytes(10_000))
+    with pytest.raises(pendmap.InputError, match="unpacks to"):
+        pendmap.read_experiment(tmp_path / "book.xlsx")

@@ -12,7 +12,7 @@ import click
 from pendmap.checks import MOST_SEED, MOST_THREADS, instruction_set
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import simd_option
+from pendmap.cli.options import rate_option, simd_option
 from pendmap.cli.show import Written, plain, progress_bar, write_all, write_table
 from pendmap.cli.types import NUMBER, OutputFile, Whole
 
@@ -38,6 +38,7 @@ __all__ = ["command"]
 @click.option("--seed", type=Whole(0, MOST_SEED), default=0, help="Draws them.  [default: 0]")
 @click.option("--threads", type=Whole(1, MOST_THREADS), help="Threads.  [default: one a processor]")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files.")
+@rate_option
 @simd_option
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(  # noqa: PLR0913 (an option each)
@@ -49,6 +50,7 @@ def command(  # noqa: PLR0913 (an option each)
     spread: float,
     seed: int,
     threads: int | None,
+    rate_hz: float | None,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -73,7 +75,7 @@ def command(  # noqa: PLR0913 (an option each)
     rig = rig_from(model)
     ensemble = Ensemble(members, spread, seed)
     with progress_bar("compare", shown=sys.stderr.isatty() and not quiet) as progress:
-        experiment = read_experiment(path)
+        experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = Written()
     if plot is not None:

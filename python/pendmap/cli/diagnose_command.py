@@ -16,7 +16,7 @@ import click
 from pendmap.checks import instruction_set
 from pendmap.cli.inputs import keep_inputs, report_files
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import check_view, simd_option
+from pendmap.cli.options import check_view, rate_option, simd_option
 from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
 from pendmap.cli.types import OutputFile, ReportFile, Whole
 from pendmap.errors import InputError
@@ -75,6 +75,7 @@ NAME = "diagnose"
     is_flag=True,
     help="One JSON object on stdout; alone, no file but the model.",
 )
+@rate_option
 @simd_option
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def command(  # noqa: PLR0913 (an option each)
@@ -89,6 +90,7 @@ def command(  # noqa: PLR0913 (an option each)
     report: Path | None,
     rerun: Path | None,
     view: bool,
+    rate_hz: float | None,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -129,7 +131,7 @@ def command(  # noqa: PLR0913 (an option each)
     model = None if model_path is None else rig_from(model_path)
     shown = sys.stderr.isatty() and not quiet
     with progress_bar("read", shown=shown):
-        experiment = read_experiment(path)
+        experiment = read_experiment(path, rate_hz=rate_hz)
     with progress_bar("diagnose", shown=shown) as progress:
         found = diagnose(
             experiment,

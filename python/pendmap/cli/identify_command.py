@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.checks import instruction_set
-from pendmap.cli.options import Outputs, output_options, simd_option
+from pendmap.cli.options import Outputs, output_options, rate_option, simd_option
 from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ SUFFIX = ".toml"
     metavar="NAME",
     help="Fit this effect of the library too; may be repeated.",
 )
+@rate_option
 @simd_option
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 @output_options((SUFFIX,), "Model")
@@ -46,6 +47,7 @@ def command(
     path: Path,
     methods: tuple[str, ...],
     effects: tuple[str, ...],
+    rate_hz: float | None,
     **given: Any,  # noqa: ANN401
 ) -> None:
     """Identify natural frequency, viscous damping and Coulomb friction from free decays.
@@ -61,7 +63,7 @@ def command(
 
     outputs = Outputs.take(given, "identify", SUFFIX, files_of(path))
     with progress_bar("read", shown=outputs.shows_progress):
-        experiment = read_experiment(path)
+        experiment = read_experiment(path, rate_hz=rate_hz)
     with progress_bar("identify", shown=outputs.shows_progress) as progress:
         report = identify_experiment(
             experiment, methods=methods or None, effects=effects, progress=progress

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from pendmap.cli.inputs import keep_inputs
+from pendmap.cli.options import rate_option
 from pendmap.cli.show import Written, plain, progress_bar, write_all
 from pendmap.cli.types import OutputFile
 
@@ -19,14 +20,18 @@ __all__ = ["command"]
 @click.command("look")
 @click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
 @click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@rate_option
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
-def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> None:
+def command(
+    *, path: Path, plot: Path | None, rate_hz: float | None, as_json: bool, quiet: bool
+) -> None:
     """Say what a record holds and what is odd about it, before anything is fitted.
 
-    A FILE (CSV or other text, Parquet) has a time and an angle; a FOLDER has an experiment.toml.
-    Channels, rate, noise without a model, releases and rest, gaps, outliers, missed counts,
-    units: what is certain is mended as it is read, and said. The files stay as they are.
+    A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
+    experiment.toml, or each of its files is a free run. Channels, rate, noise without a model,
+    releases and rest, gaps, outliers, missed counts, units: what is certain is mended as it is
+    read, and said. The files stay as they are.
     """
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import as_json as fields
@@ -34,7 +39,7 @@ def command(*, path: Path, plot: Path | None, as_json: bool, quiet: bool) -> Non
 
     keep_inputs(files_of(path), {"--plot": [plot]})
     with progress_bar("read", shown=sys.stderr.isatty() and not quiet):
-        experiment = read_experiment(path)
+        experiment = read_experiment(path, rate_hz=rate_hz)
     written = Written()
     if plot is not None:
         from pendmap import figures

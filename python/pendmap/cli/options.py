@@ -27,6 +27,7 @@ __all__ = [
     "check_view",
     "output_options",
     "progress_options",
+    "rate_option",
     "search_options",
     "simd_option",
 ]
@@ -65,6 +66,18 @@ def progress_options(function: Command) -> Command:
     )
     quiet = click.option("--quiet", is_flag=True, help="No progress, no summary.")
     return threads(simd_option(quiet(function)))
+
+
+def rate_option(function: Command) -> Command:
+    """Add the rate of records without a column of times."""
+    add = click.option(
+        "--rate",
+        "rate_hz",
+        type=NUMBER,
+        metavar="HZ",
+        help="Readings a second, for files without a column of times.",
+    )
+    return add(function)
 
 
 def search_options(function: Command) -> Command:

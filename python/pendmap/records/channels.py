@@ -14,7 +14,9 @@ from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.accelerometer import Accelerometer, accelerometer_of
 from pendmap.records.experiment import Finding
+from pendmap.records.guessed import ANGLES, guess, pictured
 from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain
+from pendmap.records.unused import ask, head_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,9 +29,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 __all__ = ["Channels", "channels_of"]
-
-ANGLES: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
-"""Channels that tell of the angle, one way or another."""
 
 _MOST_NAMED: Final = 8
 """Columns that a message lists."""
@@ -59,6 +58,8 @@ class Channels:
         ... else the keys of [columns] that would say it.
     edge, phase : str and float, or None
         Which edge of the trigger counts, and the drive's phase there, rad; as [columns] has them.
+    unused : tuple of str
+        What heads the columns that none of this comes from.
     """
 
     values: Mapping[str, Floats]
@@ -71,9 +72,12 @@ class Channels:
     place_missing: str = ""
     edge: str | None = None
     phase: float | None = None
+    unused: tuple[str, ...] = ()
 
 
-def channels_of(table: Table, description: Description, plan: RunPlan, where: str) -> Channels:
+def channels_of(  # noqa: C901 (a step each)
+    table: Table, description: Description, plan: RunPlan, where: str
+) -> Channels:
     """Choose the columns: those that [columns] names, the default names, then names like them.
 
     Raises
@@ -95,15 +99,25 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         # [columns] may say that theta_rad holds turning points: then it holds no angles.
         if channel != "angle" or place != places.get("peaks"):
             places[channel] = place
-    findings = _guess(table, places)
-    _check(places, table, where)
+    rate = description.rate_hz
+    findings = pictured(table, places, asked)
+    findings += guess(table, places, timed=rate is None)
     values, units = {}, {}
+    if rate and "time" not in places:
+        values["time"], units["time"] = table.order / rate, f"{rate:g} readings a second"
+    elif rate:
+        text = f"{head_of(table, places['time'])!r} has the times: rate_hz {rate:g} is not used"
+        findings.append(Finding("rate-unused", text))
+    _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
         given = asked.get(channel)
         values[channel] = _in_si(channel, table, place, given, description, where)
-        units[channel] = table.names[place] or f"column {place + 1}"
+        units[channel] = head_of(table, place)
     declared = {c for c, column in asked.items() if column.unit or column.scale}
     pivot, unit = _pivot(table, plan, where)
+    carried = [_place((plan.pivot or {})[way], table, where) for way in pivot or ()]
+    unused, questions = ask(table, {*places.values(), *carried}, places, plan)
+    findings += questions
     if plan.pivot and "unit" not in plan.pivot:
         text = 'the pivot has no unit: taken for an acceleration, unit = "m/s2"'
         findings.append(Finding("pivot-unit", text))
@@ -126,6 +140,7 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         place_missing=missing,
         edge=edges.edge if edges else None,
         phase=edges.phase if edges else None,
+        unused=unused,
     )
 
 
@@ -150,84 +165,12 @@ def _listed(table: Table) -> str:
     return ", ".join(map(repr, names[:_MOST_NAMED])) + more
 
 
-def _guess(table: Table, places: dict[str, int]) -> list[Finding]:
-    """Find what is missing by names like the usual ones, or without names by position."""
-    if not table.headed:
-        return _by_position(table, places)
-    guessed = _by_name(table, places)
-    if "time" in places and any(channel in places for channel in ANGLES):
-        guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
-    # A picture's coordinates beside an angle are what the angle was made from.
-    pair = all(name in places or name in guessed for name in ("pixel_x", "pixel_y"))
-    if "angle" in places or "angle" in guessed or not pair:
-        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
-    places.update(guessed)
-    if not guessed:
-        return []
-    said = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    return [Finding("columns-guessed", f"by their names {said}")]
-
-
-def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
-    """Return columns for the channels that have none, by names like the usual ones."""
-    guessed: dict[str, int] = {}
-    split = [name_and_unit(head) for head in table.names]
-    for channel, kind in CHANNELS.items():
-        if channel in places:
-            continue
-        taken = {*places.values(), *guessed.values()}
-        fitting = [
-            k
-            for k, (name, unit) in enumerate(split)
-            if k not in taken
-            and (unit is None or kind.has(unit))
-            and any(re.fullmatch(pattern, plain(name)) for pattern in kind.names)
-        ]
-        if fitting:
-            guessed[channel] = _best(channel, fitting, table)
-    return guessed
-
-
-def _best(channel: str, fitting: list[int], table: Table) -> int:
-    """Return the axis of a sensor that moves most; of all else the first column."""
-    if channel not in {"velocity", "acceleration"} or len(fitting) == 1:
-        return fitting[0]
-    spread = [np.nan_to_num(np.nanstd(_safe(table.values[:, k]))) for k in fitting]
-    return fitting[int(np.argmax(spread))]
-
-
-def _safe(values: Floats) -> Floats:
-    return np.where(np.isfinite(values), values, 0.0)
-
-
-def _by_position(table: Table, places: dict[str, int]) -> list[Finding]:
-    free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    said = []
-    for channel in ("time", "angle"):
-        if channel in places or not free:
-            continue
-        k = next((k for k in free if _rises(table.values[:, k])), None)
-        if channel == "angle" or k is None:
-            if any(other in places for other in ANGLES):
-                continue
-            k = free[0]
-        places[channel] = k
-        free.remove(k)
-        said.append(f"column {k + 1} is {'the time in s' if channel == 'time' else 'the angle'}")
-    return [Finding("columns-guessed", f"no line of names: {', '.join(said)}")] if said else []
-
-
-def _rises(values: Floats) -> bool:
-    steps = np.diff(values[np.isfinite(values)])
-    return bool(steps.size and np.mean(steps > 0) > 0.9)
-
-
-def _check(places: dict[str, int], table: Table, where: str) -> None:
+def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
     advice = "experiment.toml names others in [columns]"
-    if "time" not in places:
+    if "time" not in places and not timed:
         raise InputError(
-            f"{where}: no column of times: allowed is t_s or one like it; there are"
-            f" {_listed(table)}; {advice}"
+            f"{where}: no column of times: there must be one like t_s, or a rate: --rate 1000 or"
+            f" rate_hz = 1000 in [columns] of experiment.toml (Hz); got columns {_listed(table)}"
         )
     if not any(channel in places for channel in ANGLES):
         raise InputError(
@@ -277,5 +220,5 @@ def _pivot(table: Table, plan: RunPlan, where: str) -> tuple[dict[str, Floats] |
     for way in ("vertical", "horizontal"):
         if way in plan.pivot:
             place = _place(plan.pivot[way], table, f"{where}: pivot: {way}")
-            found[way] = np.asarray(table.values[:, place] * factor)
+            found[way] = np.asarray(table.values[:, place] * factor * plan.pivot_scale)
     return found, unit

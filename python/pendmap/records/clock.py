@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.records.edges import logs_edges, spread
 from pendmap.records.intervals import intervals_of
 from pendmap.words import counted, moment
 
@@ -31,6 +32,9 @@ JITTER: Final = 0.02
 MOST_OUT: Final = 0.3
 """Share of the stamps out of order beyond which what is left is no record."""
 
+STOPPED: Final = 50
+"""Readings with one stamp, besides ten times what is usual, from which the clock stands still."""
+
 COARSE: Final = 0.2
 """Share of repeated stamps from which the clock is coarser than the sampling."""
 
@@ -52,6 +56,7 @@ def mend(work: Work) -> None:
     _finite(work)
     if work.time.size < 2:
         work.refuse_short()
+    _stopped(work)
     _wrapped(work)
     _restarted(work)
     _coarse(work)
@@ -87,6 +92,27 @@ def _finite(work: Work) -> None:
         text = f"{counted(missing.size, 'row')} without a time left out"
         work.say("time-missing", text, mended=True, at=missing)
         work.keep(np.isfinite(work.time))
+
+
+def _stopped(work: Work) -> None:
+    """Leave out readings that go on while the clock stands still."""
+    edges = np.flatnonzero(np.diff(work.time, prepend=np.nan, append=np.nan) != 0)
+    each = np.diff(edges)
+    usual = int(np.median(each))
+    stops = np.flatnonzero(each > max(STOPPED, RESET * usual))
+    if not stops.size or stops.size == each.size:
+        return
+    # What falls back to a time that was before has not even the first of its stamps.
+    own = work.time[edges[stops]] >= work.time[np.maximum(edges[stops] - 1, 0)]
+    begin, end = edges[stops] + usual * own, edges[stops + 1]
+    out = np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])
+    times = ", ".join(moment(work.time[k]) for k in begin[:3]) + (", ..." if begin.size > 3 else "")
+    text = (
+        f"the clock stops at {times} s while the readings go on: {counted(out.size, 'reading')}"
+        " without a time of their own left out"
+    )
+    work.say("time-stops", text, mended=True, at=begin)
+    work.keep(np.delete(np.arange(work.time.size), out))
 
 
 def _wrapped(work: Work) -> None:
@@ -137,6 +163,11 @@ def _coarse(work: Work) -> None:
     """Spread stamps evenly where several samples share each of them."""
     steps = np.diff(work.time)
     same = np.mean(steps == 0) if steps.size else 0.0
+    if 0 < same < 1 and np.all(steps >= 0) and logs_edges(work.theta):
+        work.time = spread(work.time)
+        text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
+        work.say("time-coarse", text, mended=True)
+        return
     if same < COARSE or same == 1 or np.any(steps < 0):
         return
     rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)

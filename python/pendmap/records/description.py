@@ -18,9 +18,20 @@ if TYPE_CHECKING:
 
     from pendmap.records.experiment import Kind
 
-__all__ = ["ALONE", "NAME", "Column", "Description", "Reader", "RunPlan", "read_description"]
+__all__ = [
+    "ALONE",
+    "NAME",
+    "RATE",
+    "Column",
+    "Description",
+    "Reader",
+    "RunPlan",
+    "read_description",
+]
 
 NAME: Final = "experiment.toml"
+
+RATE: Final = "rate_hz"
 
 _RIG: Final = ("gravity", "length_m", "w0", "encoder_counts")
 _TOP: Final = ("rig", "columns", "reader", "run")
@@ -34,7 +45,7 @@ _RUN: Final = (
     *("hold_out", "drive", "pivot"),
 )
 _DRIVE: Final = ("p", "Omega", "phi")
-_PIVOT: Final = ("vertical", "horizontal", "unit")
+_PIVOT: Final = ("vertical", "horizontal", "unit", "scale", "sign")
 _DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
 _MEASURED: Final = (
     *("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
@@ -76,7 +87,7 @@ class Reader:
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """One ``[[run]]``."""
+    """One ``[[run]]``; ``pivot_scale`` is the pivot's unit per unit of its columns, signed."""
 
     file: str
     kind: Kind = "free"
@@ -86,14 +97,16 @@ class RunPlan:
     hold_out: bool = False
     drive: Mapping[str, float | None] | None = None
     pivot: Mapping[str, str] | None = None
+    pivot_scale: float = 1.0
 
 
 @dataclasses.dataclass(frozen=True)
 class Description:
-    """All of the file."""
+    """All of the file; ``rate_hz`` is the clock of records without times, samples a second."""
 
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     columns: Mapping[str, Column] = dataclasses.field(default_factory=dict)
+    rate_hz: float | None = None
     reader: Reader = Reader()
     runs: tuple[RunPlan, ...] = ()
 
@@ -129,9 +142,12 @@ def _description(content: dict[str, Any]) -> Description:
     for count, table in enumerate(runs, 1):
         where = f"[[run]] {count}"
         plans.append(_run(_table(table, where), where))
+    columns = _table(content.get("columns", {}), "[columns]")
+    _keys(columns, (*CHANNELS, RATE), "[columns]")
     return Description(
         _rig(_table(content.get("rig", {}), "[rig]")),
-        _columns(_table(content.get("columns", {}), "[columns]")),
+        {name: _column(name, value) for name, value in columns.items() if name != RATE},
+        _positive(f"[columns]: {RATE}", columns[RATE]) if RATE in columns else None,
         _reader(_table(content.get("reader", {}), "[reader]")),
         tuple(plans),
     )
@@ -189,11 +205,6 @@ def _text(name: str, value: object) -> str:
     return value
 
 
-def _columns(table: dict[str, Any]) -> dict[str, Column]:
-    _keys(table, tuple(CHANNELS), "[columns]")
-    return {channel: _column(channel, value) for channel, value in table.items()}
-
-
 def _column(channel: str, value: object) -> Column:
     where = f"[columns]: {channel}"
     if isinstance(value, str):
@@ -246,7 +257,7 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
     if "file" not in table:
         raise InputError(f'{where}: file is missing: allowed is like file = "run_00.csv"')
     drive = _drive(table["drive"], where) if "drive" in table else None
-    pivot = _pivot(table["pivot"], where) if "pivot" in table else None
+    pivot, factor = _pivot(table["pivot"], where) if "pivot" in table else (None, 1.0)
     kind = table.get("kind", "forced" if drive or pivot else "free")
     if kind not in ("free", "forced"):  # whatever it is, a list too
         raise InputError(f'{where}: kind is {checks.shown(kind)}: allowed is "free" or "forced"')
@@ -269,6 +280,7 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
         hold_out=checks.flag(f"{where}: hold_out", table.get("hold_out", False)),
         drive=drive,
         pivot=pivot,
+        pivot_scale=factor,
     )
 
 
@@ -291,14 +303,23 @@ def _drive(value: object, where: str) -> dict[str, float | None]:
     return {"phi": None} | numbers
 
 
-def _pivot(value: object, where: str) -> dict[str, str]:
+def _pivot(value: object, where: str) -> tuple[dict[str, str], float]:
+    """Return what names columns and unit, and the factor of the columns."""
     table = _table(value, f"{where}: pivot", _PIVOT_LIKE)
     _keys(table, _PIVOT, f"{where}: pivot")
     if not {"vertical", "horizontal"} & set(table):
         raise InputError(f"{where}: pivot names no column: allowed is like {_PIVOT_LIKE}")
-    named = {key: _text(f"{where}: pivot: {key}", text) for key, text in table.items()}
+    scale = _positive(f"{where}: pivot: scale", table.get("scale", 1.0))
+    sign = _number(f"{where}: pivot: sign", table.get("sign", 1))
+    if abs(sign) != 1:
+        raise InputError(f"{where}: pivot: sign must be 1 or -1, got {sign:g}")
+    named = {
+        key: _text(f"{where}: pivot: {key}", text)
+        for key, text in table.items()
+        if key not in {"scale", "sign"}
+    }
     if named.get("unit", "m/s2") not in PIVOT_UNITS:
         shown = checks.shown(named["unit"])
         known = ", ".join(PIVOT_UNITS)
         raise InputError(f"{where}: pivot: unit is {shown}: allowed are {known}")
-    return named
+    return named, sign * scale

@@ -121,6 +121,8 @@ class Run:
         Its stretches in order.
     channels : mapping of str to str
         Which channel comes from which column.
+    unused : tuple of str
+        The columns that no channel comes from.
     count_rad : float
         Smallest step of the readings, rad; 0 where none can be seen.
     sha256 : str
@@ -146,6 +148,7 @@ class Run:
     peaks_only: bool = False
     segments: tuple[Segment, ...] = ()
     channels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    unused: tuple[str, ...] = ()
     count_rad: float = 0.0
     sha256: str = ""
 

@@ -18,6 +18,7 @@ from pendmap.records.false_ends import false_ends
 from pendmap.records.following import DEGREES
 from pendmap.records.local_fit import POINTS, local_fit
 from pendmap.records.robust import broad_scale, normal_scale
+from pendmap.records.slipped_clock import slips_of
 from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
@@ -113,7 +114,8 @@ def find(work: Work) -> None:
     false |= ~corner & false_ends(work.time, theta, ~(bad | false), SPIKE, work.count)
     _bridge(work.time, theta, false)
     _outliers(work, theta, false, jumps)
-    _moved(work, sorted(jumps, key=lambda jump: jump.at))
+    jumps = _of_time(work, theta, sorted(jumps, key=lambda jump: jump.at))
+    _moved(work, jumps)
 
 
 def _bridge(time: Floats, theta: Floats, false: NDArray[np.bool_]) -> None:
@@ -248,6 +250,27 @@ def _outliers(work: Work, theta: Floats, false: NDArray[np.bool_], jumps: list[_
     work.trusted[at] = False
     text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} rad: not for fitting"
     work.say("outliers", text, at=at)
+
+
+def _of_time(work: Work, smooth: Floats, jumps: list[_Jump]) -> list[_Jump]:
+    """Mend the clock where jumps are its slips; return those that are not."""
+    if not jumps:
+        return []
+    moved = np.zeros(smooth.size)
+    for jump in jumps:
+        moved[jump.at :] += jump.size
+    found = slips_of(work.time, smooth + moved)
+    if found is None:
+        return jumps
+    many = counted(found.places.size, "slip")
+    text = (
+        f"{many} of time: the readings jump by their velocity times {1e3 * found.slip:.4g} +-"
+        f" {1e3 * found.stderr:.1g} ms, an interval, and not by counts: the times after each are"
+        " moved by whole intervals"
+    )
+    work.say("time-slips", text, mended=True, at=found.places)
+    work.time = found.time
+    return [j for j in jumps if np.min(np.abs(found.places - j.at)) > SIDE]
 
 
 def _moved(work: Work, jumps: list[_Jump]) -> None:

@@ -18,7 +18,9 @@ def check(work: Work) -> None:
     """Say so where noise grows with speed."""
     if work.integrated:
         return  # a late reading of a rate errs with the acceleration
-    floor = noise_of(work.time, work.theta, trusted=work.trusted, count=work.count)
+    floor = noise_of(
+        work.time, work.theta, trusted=work.trusted, count=0.0 if work.edges else work.count
+    )
     if floor.law is not None:
         interval = float(np.median(np.diff(work.time)))
         part = f"{100 * floor.law.tau / interval:.0f} % of the interval"

@@ -5,14 +5,17 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.records import (
     angle,
     clock,
+    edges,
     motion,
     noise_check,
+    pivot,
     resampled,
     resolution,
     samples,
@@ -28,6 +31,7 @@ from pendmap.records.experiment import Experiment, Finding, Run
 from pendmap.records.gyroscope import gyroscope_of
 from pendmap.records.table import read_table
 from pendmap.records.work import Work
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     import os
@@ -36,6 +40,13 @@ if TYPE_CHECKING:
     from pendmap.records.text import Table
 
 __all__ = ["files_of", "read_experiment"]
+
+TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
+"""Suffixes of the files that are records in a folder without a description."""
+
+LEAST_RATE: Final = 1e-3
+MOST_RATE: Final = 1e9
+"""Hz that a record may have: one reading in a quarter of an hour to one in a nanosecond."""
 
 
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
@@ -49,7 +60,8 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     Returns
     -------
     list of Path
-        The file, or ``experiment.toml`` and those that it names; they need not exist.
+        The file, or ``experiment.toml`` and those that it names, which need not exist; without
+        one all that may be records.
 
     Raises
     ------
@@ -60,24 +72,28 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     if not place.is_dir():
         return [place]
     if not (place / NAME).is_file():
-        return []
+        return _tables(place)
     plans = read_description(place / NAME).runs
     return [place / NAME, *(place / file for file in dict.fromkeys(plan.file for plan in plans))]
 
 
-def read_experiment(path: str | os.PathLike[str]) -> Experiment:
+def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = None) -> Experiment:
     """Read a record or a folder of records, and say what is odd about them.
 
-    A file (CSV, other text, Parquet) with a time and an angle is an experiment of one free decay. A
-    folder is one with an ``experiment.toml``. Each free release of a file is a run of its own,
-    named ``decay 1/3``. Nothing is written. What is certain is mended (turns that a sensor wraps
-    are unwrapped, milliseconds become seconds, ...), and that is said; all else is only said.
+    A file (CSV, other text, Parquet, Excel) with a time and an angle is an experiment of one free
+    decay. A folder is one with an ``experiment.toml``; without it each of its files is a free
+    decay. Each free release of a file is a run of its own, named ``decay 1/3``. Nothing is written.
+    What is certain is mended (turns that a sensor wraps are unwrapped, milliseconds become seconds,
+    ...), and that is said; all else is only said.
     ``Run.trusted`` marks the samples that are for fitting.
 
     Parameters
     ----------
     path : str or path
         The file or folder.
+    rate_hz : float, optional
+        Readings a second, Hz, for files without a column of times: ``t = k / rate_hz``. It goes
+        before ``rate_hz`` of [columns].
 
     Returns
     -------
@@ -97,14 +113,17 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
     >>> experiment.runs[0].theta  # doctest: +SKIP
     """
     place = Path(path)
+    alone = ALONE if rate_hz is None else dataclasses.replace(ALONE, rate_hz=_rate(rate_hz))
     if not place.is_dir():
-        found, findings = _runs(place, RunPlan(place.name), ALONE, {}, place.stem)
+        found, findings = _runs(place, RunPlan(place.name), alone, {}, place.stem)
         checked, together = checked_together(found)
         digest = {place.name: found[0].sha256}
         return Experiment(place, checked, {}, (*findings, *together), digest)
     if not (place / NAME).is_file():
-        raise InputError(f"{place}: has no {NAME}: allowed is one that lists the runs, or a file")
+        return _plain(place, alone)
     description = read_description(place / NAME)
+    if rate_hz is not None:
+        description = dataclasses.replace(description, rate_hz=alone.rate_hz)
     tables: dict[str, tuple[Table, str]] = {}
     names = _names([plan.file for plan in description.runs])
     runs: list[Run] = []
@@ -118,6 +137,46 @@ def read_experiment(path: str | os.PathLike[str]) -> Experiment:
     digests = {run.file: run.sha256 for run in runs}
     checked, together = checked_together(runs)
     return Experiment(place, checked, description.known, (*shared, *together), digests)
+
+
+def _rate(value: float) -> float:
+    rate = checks.number("rate_hz", value)
+    if not LEAST_RATE <= rate <= MOST_RATE:
+        raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
+    return rate
+
+
+def _tables(folder: Path) -> list[Path]:
+    """Return the files of a folder that may be records, in the order of their names."""
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in TABLES)
+    return [file for file in files if file.is_file() and not file.name.startswith((".", "~"))]
+
+
+def _plain(folder: Path, description: Description) -> Experiment:
+    """Read a folder without a description: each of its files is one free run."""
+    files = _tables(folder)
+    runs: list[Run] = []
+    text = f"no {NAME}: each file is taken for one free run, in the order of the names"
+    findings, refused = [Finding("no-description", text)], []
+    for file, name in zip(files, _names([file.name for file in files]), strict=True):
+        try:
+            found, shared = _runs(file, RunPlan(file.name), description, {}, name)
+        except InputError as error:
+            refused.append(str(error))
+            findings.append(Finding("file-left-out", f"left out: {error}"))
+            continue
+        runs += found
+        findings += shared
+    if not runs:
+        first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
+        count = counted(len(refused), "file")
+        raise InputError(
+            f"{folder}: has no {NAME}: there must be one, or files that are records, got"
+            f" {count}{first}"
+        )
+    checked, together = checked_together(runs)
+    digests = {run.file: run.sha256 for run in runs}
+    return Experiment(folder, checked, {}, (*findings, *together), digests)
 
 
 def _names(files: list[str]) -> list[str]:
@@ -159,17 +218,23 @@ def _runs(
         work.findings = [found for found in work.findings if found.what not in clock.SPACING]
         work.refuse_short()
         return [_run(work, name, channels, digest)], []
-    resampled.check(work)
+    edges.check(work)
+    if work.edges:
+        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
+    else:
+        resampled.check(work)
     samples.check(work)
     moves = motion.moves(work)
     if moves and work.made_of is None:
         scale.check(work)
     samples.say_steps(work)
+    edges.say(work)
     if moves:
         motion.check(work)
         trigger.check_drive(work)
         signs.check(work)
         resolution.check(work)
+    pivot.smooth(work)
     work.refuse_short()
     works, shared = work.apart()
     runs = []
@@ -202,12 +267,13 @@ def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
         gyroscope=gyroscope,
         drive=plan.drive,
         pivot=work.pivot(),
-        pivot_unit=channels.pivot_unit,
+        pivot_unit=work.pivot_unit,
         findings=tuple(dataclasses.replace(f, where=f.where or name) for f in work.findings),
         peaks_only=work.peaks_only,
         segments=tuple(work.segments),
         channels=_columns(channels),
-        count_rad=work.count,
+        unused=channels.unused,
+        count_rad=0.0 if work.edges else work.count,
         sha256=digest,
     )
 

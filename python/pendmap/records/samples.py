@@ -54,7 +54,7 @@ def check(work: Work) -> None:
         find_spikes(work, rate, "rad/s", [(0, rate.size)])
         work.theta = angle_of_rate(work.time, rate, work.trusted)
         return
-    work.seen = step_of(work.theta)
+    work.seen = work.seen if work.edges else step_of(work.theta)
     work.count = _count(work)
     _clipped(work, "rad")
     _frozen(work)
@@ -72,8 +72,8 @@ def _count(work: Work) -> float:
 
 def say_steps(work: Work) -> None:
     """Say what steps the readings come in, once their unit is certain."""
-    if work.integrated:
-        return  # an integral has none
+    if work.integrated or work.edges:
+        return  # an integral has none; of edges they are said already
     counts, seen = work.known.get("encoder_counts"), work.seen
     work.count = _count(work)
     if counts is None:

@@ -49,6 +49,9 @@ FEWEST: Final = 6
 LARGEST: Final = 3.0
 """Swings, rad, up to which the period grows smoothly: near the top it does without bounds."""
 
+LEAST: Final = 1e-3
+"""Share by which a factor errs at least: a swing shrinks within the period that it is seen for."""
+
 Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""
 
@@ -208,13 +211,16 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
         return
     share, error = _share(found, grown)
     if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
-        factor = _factor(found)
+        factor, spread = _factor(found)
         flat = share < 0.1
         degrees = " (degrees?)" if flat else ""
+        channel = "velocity" if work.integrated else "angle"
+        taken = "" if flat else f"; a scale as much larger for the {channel} in [columns] mends it"
         text = (
             f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
-            f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is about"
-            f" {factor:.2g} times the reading{degrees}, or another force acts"
+            f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is"
+            f" {factor:.4g} +- {spread:.1g} times the reading{degrees}, or another force"
+            f" acts{taken}"
         )
         work.say("angle-unit" if flat else "angle-scale", text)
 
@@ -257,16 +263,23 @@ def gain_of(work: Work) -> tuple[float, float] | None:
     return 1 / math.sqrt(most), 1 / math.sqrt(least) if least > 0 else math.inf
 
 
-def _factor(found: Periods) -> float:
-    """Return what the readings are to be multiplied by for the periods of a pendulum."""
+def _factor(found: Periods) -> tuple[float, float]:
+    """Return what the readings are to be multiplied by for a pendulum's periods, and its error."""
     best, least = 1.0, math.inf
     for factor in np.geomspace(0.01, 3.0 / float(np.max(found.amplitude)), 300).tolist():
-        grown = _growth(factor * found.amplitude)
-        away = found.period / grown
+        away = found.period / _growth(factor * found.amplitude)
         spread = normal_scale(away - np.median(away)) / float(np.median(away))
         if spread < least:
             best, least = factor, spread
-    return best
+    # The grid is 2 % wide: lines about what it says find the rest.
+    error = 0.02 * best
+    for _ in range(4):
+        grown = _growth(best * found.amplitude)
+        slope = (_growth(1.001 * best * found.amplitude) - grown) / (0.001 * best)
+        answer, spreads = _robust_line(np.column_stack([grown, slope]), found.period)
+        step = float(np.clip(answer[1] / answer[0], -0.02 * best, 0.02 * best))
+        best, error = best + step, float(spreads[1] / answer[0])
+    return best, math.hypot(error, LEAST * best)
 
 
 def _growth(amplitude: Floats) -> Floats:

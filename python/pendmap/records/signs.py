@@ -144,6 +144,7 @@ def _drive(work: Work) -> None:
         if value > CERTAIN * error:
             said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
             text = f"{said} acts with the other sign than the angle shows: turned by 180 degrees?"
+            text += "" if name == "drive" else " sign = -1 in pivot turns it"
             work.say("sign-turned", text)
 
 

@@ -33,7 +33,7 @@ __all__ = [
 UNITS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
 """Findings that a unit or a scale is wrong: unless that is mended, so is all that is fitted."""
 
-DOUBTS: Final = UNITS | {"few-used", "rigs-differ"}
+DOUBTS: Final = UNITS | {"few-used", "motor-column", "rigs-differ"}
 """Findings that are told before any number: with them a model may not be that of the records."""
 
 SCALE: Final = "angle-scale"
@@ -49,6 +49,7 @@ def as_json(experiment: Experiment) -> dict[str, Any]:
     """
     runs = [_run(run) for run in experiment.runs]
     whole: dict[str, Any] = {"path": str(experiment.path), "known": dict(experiment.known)}
+    whole["unused"] = list(dict.fromkeys(name for run in runs for name in run["unused"]))
     if len(runs) == 1:
         (only,) = runs
         whole |= {key: only[key] for key in ("channels", "rate_hz", "noise", "segments")}
@@ -76,6 +77,7 @@ def _run(run: Run) -> dict[str, Any]:
         "hold_out": run.hold_out,
         "drive": None if run.drive is None else dict(run.drive),
         "channels": dict(run.channels),
+        "unused": list(run.unused),
         "samples": int(run.time.size),
         "trusted": int(run.trusted.sum()),
         "from_s": float(run.time[0]),

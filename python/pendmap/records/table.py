@@ -1,7 +1,8 @@
-"""A file, read: CSV and other text, or Parquet."""
+"""A file, read: CSV and other text, Excel, or Parquet."""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import io
 from typing import TYPE_CHECKING, Final
@@ -10,6 +11,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.files import read_whole
+from pendmap.records.excel import ENGINES, read_workbook
 from pendmap.records.text import MOST_COLUMNS, Table, decoded, parsed
 
 if TYPE_CHECKING:
@@ -28,8 +30,6 @@ HUGEST: Final = 1e18
 """Largest number that can be a reading: nanoseconds since 1970 are 2e18, all else is less."""
 
 _KNOWN: Final = {
-    b"PK\x03\x04": "a ZIP or Excel file: allowed is CSV, saved from it",
-    b"\xd0\xcf\x11\xe0": "an old Excel file: allowed is CSV, saved from it",
     b"\x1f\x8b": "compressed: allowed is the file unpacked",
     b"\x89HDF": "an HDF5 file: allowed are CSV and Parquet",
     b"CDF\x01": "a NetCDF file: allowed are CSV and Parquet",
@@ -56,14 +56,14 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     for mark, what in _KNOWN.items():
         if data.startswith(mark):
             raise InputError(f"{where}: is {what}")
-    if data.startswith(b"PAR1") or path.suffix.lower() in {".parquet", ".pq"}:
+    if data[:4] in ENGINES:
+        table = read_workbook(data, reader, where)
+    elif data.startswith(b"PAR1") or path.suffix.lower() in {".parquet", ".pq"}:
         table = _parquet(data, where)
     else:
         text, findings = decoded(data, where)
         table = parsed(text, reader, where)
-        table = Table(
-            table.names, table.values, table.rows, (*findings, *table.findings), table.headed
-        )
+        table = dataclasses.replace(table, findings=(*findings, *table.findings))
     table.values[np.abs(table.values) > HUGEST] = np.nan
     return table, digest
 
@@ -79,9 +79,8 @@ def _parquet(data: bytes, where: str) -> Table:
         raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
     values = np.column_stack(columns)
     values[~np.isfinite(values)] = np.nan
-    if values.shape[1] < 2:
-        raise InputError(f"{where}: has one column: allowed are a time and an angle")
-    return Table(names, values, np.arange(1, values.shape[0] + 1))
+    order = np.arange(values.shape[0])
+    return Table(names, values, order + 1, order=order)
 
 
 def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:

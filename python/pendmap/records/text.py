@@ -74,6 +74,8 @@ class Table:
         What was odd about the text.
     headed : bool
         Whether there is a header.
+    order : ndarray of int, shape (rows,)
+        Lines that are not empty and no row leave a place out.
     """
 
     names: tuple[str, ...]
@@ -81,6 +83,7 @@ class Table:
     rows: NDArray[np.intp]
     findings: tuple[Finding, ...] = ()
     headed: bool = True
+    order: NDArray[np.intp] = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
 
 def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
@@ -120,7 +123,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     Raises
     ------
     InputError
-        If there are no rows of two numbers or more.
+        If there are no rows of numbers.
     """
     import pandas as pd
 
@@ -171,7 +174,8 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     except (ValueError, pd.errors.ParserError) as error:
         raise InputError(f"{where}: cannot be read: {' '.join(str(error).split())}") from None
     values = np.column_stack([_numbers(frame[k], decimal) for k in range(width)])
-    return Table(names, values, np.asarray(rows), tuple(findings), headed)
+    order = np.flatnonzero(fits) - first
+    return Table(names, values, np.asarray(rows), tuple(findings), headed, order)
 
 
 def _numbers(column: object, decimal: str) -> NDArray[np.float64]:
@@ -218,22 +222,27 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
     places = [k * step + int(step * (0.618 * k % 1)) for k in range(len(lines) // step)]
     sample = [lines[k][1] for k in places]
     found = _common(sample, reader, 2) or _common(sample, reader, 1)
+    if found == (",", ".", 2) and reader.decimal is None and _fractions(sample):
+        return ";", ",", 1
     if found is not None:
         fitting = sum(_fits(line, *found) for line in sample)
         if fitting >= ENOUGH * len(sample) or fitting >= len(sample) - _HEADS:
             return found
-    if sum(_alone(line, reader) for line in sample) > ENOUGH * len(sample):
-        raise InputError(f"{where}: has one column of numbers: allowed are a time and an angle")
+    for decimal in (".", ","):
+        alone = (reader.delimiter or (";" if decimal == "," else ","), decimal, 1)
+        if sum(_fits(line, *alone) for line in sample) > ENOUGH * len(sample):
+            return alone
     advice = "; what it is separated by may stand in [reader] of experiment.toml" if found else ""
     raise InputError(
-        f"{where}: has no rows of numbers in two columns or more: allowed is CSV with a time"
-        f" and an angle{advice}"
+        f"{where}: has no rows of numbers: allowed is CSV with a time and an angle{advice}"
     )
 
 
-def _alone(line: str, reader: Reader) -> bool:
-    text = line.strip().strip('"')
-    return _NUMBER.fullmatch(text.replace(reader.decimal or ",", ".", 1)) is not None
+def _fractions(sample: list[str]) -> bool:
+    """Whether what stands behind the commas are decimals: whole numbers have no 0 in front."""
+    parts = [line.split(",") for line in sample if _fits(line, ",", ".", 2)]
+    digits = all(re.fullmatch(r"\s*[+-]?\d+", a) and re.fullmatch(r"\d+\s*", b) for a, b in parts)
+    return digits and any(b.startswith("0") and len(b.strip()) > 1 for _, b in parts)
 
 
 def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, int] | None:
@@ -281,7 +290,7 @@ def _decimals(number: str) -> int:
 def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ...], bool]:
     """Return the names above the numbers, a line of units under them included."""
     heads = [_split(line.lstrip("#% "), delimiter) for line in lines[-3:]]
-    heads = [[part.strip('"') for part in head] for head in heads if len(head) > 1]
+    heads = [[part.strip('"') for part in head] for head in heads if len(head) > 1 or width == 1]
     if heads and delimiter == "," and len(heads[-1]) != width and len(heads[-1]) * 2 == width:
         return tuple(heads[-1]), True  # decimal commas between commas: refused by the caller
     heads = [head for head in heads if len(head) == width and any(head)]

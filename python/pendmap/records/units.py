@@ -27,6 +27,7 @@ PIVOT_UNITS: Final = {
     "g": ("m/s2", 9.80665),
     "m/s": ("m/s", 1.0),
     "m": ("m", 1.0),
+    "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
 }
 """Units of a recorded pivot: what they are in SI, and how much of it."""

@@ -41,7 +41,9 @@ class Work:
     ``pivot:horizontal``. ``accelerometer`` says where an acceleration was measured, or
     ``place_missing`` which keys would; ``integrated`` whether the angle was made of the velocity.
     ``releases`` are the stretches for fitting of a free record, first place and the one after the
-    last; ``edge`` and ``phase`` what [columns] says of the trigger.
+    last; ``edge`` and ``phase`` what [columns] says of the trigger;
+    ``edges`` whether each reading is an edge of an encoder; ``pivot_unit`` what
+    the pivot's channels are.
     """
 
     where: str
@@ -64,6 +66,8 @@ class Work:
     releases: list[tuple[int, int]] = dataclasses.field(default_factory=list)
     edge: str | None = None
     phase: float | None = None
+    edges: bool = False
+    pivot_unit: str | None = None
 
     @property
     def made_of(self) -> Accelerometer | None:
@@ -100,6 +104,7 @@ class Work:
             place_missing=channels.place_missing,
             edge=channels.edge,
             phase=channels.phase,
+            pivot_unit=channels.pivot_unit,
         )
 
     def say(
