@@ -17,7 +17,7 @@ from pendmap.model.units import VELOCITY
 from pendmap.planes import CHAOS_PERIODS, chaos, entries, undecided
 from pendmap.regimes import kind_of
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model
 from pendmap.varied import title, varied, without_damping
 from pendmap.words import counted
 
@@ -137,7 +137,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = [
         *_summary(dataset),
         *without_damping(model, axis),
-        *of_motion(model.effects, "attractors are"),
+        *of_model(model, "attractors are"),
     ]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset

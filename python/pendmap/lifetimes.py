@@ -10,6 +10,8 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core, checks, survival
+from pendmap.draws import drawn, part
+from pendmap.draws.lifetimes import lifetime_over
 from pendmap.errors import InputError
 from pendmap.grid import starts as checked
 from pendmap.lifetimes_said import summary
@@ -18,7 +20,7 @@ from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.saddle import growth_on_saddle
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,6 +55,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol: float = 1e-6,
     threads: int | None = None,
     seed: int = 0,
+    draws: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
     """Mean lifetime of transient chaos: the exponential tail of the times until capture.
@@ -89,6 +92,10 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Number of threads; by default one a processor. The result does not depend on it.
     seed : int
         Draws the starts.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: the
+        interval of the mean lifetime (:func:`pendmap.draws.lifetimes.lifetime_over`). ``seed``
+        draws them.
     progress : callable, optional
         Called now and then with what is done and in all.
 
@@ -130,6 +137,8 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         theta = draw.uniform(-math.pi, math.pi, starts)
         velocity = draw.uniform(-reach, reach, starts)
     angles, speeds = checked(theta, velocity)
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
     began = time.perf_counter()
     found = basins_of(
         model,
@@ -193,9 +202,25 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*summary(dataset, found), *of_motion(model.effects, "these lifetimes are")]
+    lines = [*summary(dataset, found), *of_model(model, "these lifetimes are")]
     dataset.attrs["summary"] = "\n".join(lines)
-    return dataset
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Callable[[int, int], object] | None) -> xr.Dataset:
+        return lifetime(
+            one,
+            angles,
+            speeds,
+            from_period=from_period,
+            max_periods=max_periods,
+            tol=tol,
+            threads=threads,
+            seed=seed,
+            progress=report,
+        )
+
+    return lifetime_over(dataset, several, again, whole)
 
 
 def _chaotic(found: xr.Dataset) -> float:

@@ -9,6 +9,8 @@ import xarray as xr
 
 from pendmap import _core, checks
 from pendmap.basin_dataset import cells, complete, uncertain_starts
+from pendmap.draws import drawn, part
+from pendmap.draws.basins import basins_over
 from pendmap.errors import InputError
 from pendmap.grid import Grid, coordinate, starts
 from pendmap.model import without_dimensions
@@ -39,6 +41,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     threads: int | None = None,
     seed: int = 0,
     check: bool = True,
+    draws: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Basins of attraction: which attractor each initial condition ends on.
@@ -77,6 +80,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     check : bool
         Whether to measure what takes further starts: labels of a sample with half the step and
         mirrored, and the share of starts whose label changes nearby.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each mapped too: how probable
+        each end is in each cell, and what of the doubt is the parameters'
+        (:mod:`pendmap.draws.basins`). ``seed`` draws them.
     progress : callable, optional
         Called now and then with the number of cells done and in all.
 
@@ -94,7 +101,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         ``boundary_basin_entropy`` and ``uncertainty_exponent`` say how the basins are interwoven:
         see :func:`pendmap.basin_entropy` and :func:`pendmap.uncertainty_exponent`; the counts
         behind the exponent, from 10,000 cells on, are ``uncertain`` of ``uncertainty_tried``
-        starts over ``distance``.
+        starts over ``distance``. With ``draws`` also what
+        :func:`pendmap.draws.basins.basins_over` adds.
 
     Notes
     -----
@@ -125,6 +133,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     )
     checks.call("progress", progress)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
     began = time.perf_counter()
     low, high, count = grid.velocity.as_tuple
     slow, fast = units.bare(low, VELOCITY), units.bare(high, VELOCITY)
@@ -149,7 +159,16 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         ),
     )
     dataset = dataset.assign(uncertain_starts(raw))
-    return complete(dataset, raw, model, choices, seconds)
+    dataset = complete(dataset, raw, model, choices, seconds)
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Progress | None) -> xr.Dataset:
+        bounds = {"max_periods": max_periods, "layer_periods": layer_periods}
+        shared = {"tol": tol, "threads": threads, "seed": seed, "check": False}
+        return basins(one, grid, **bounds, **shared, progress=report)  # type: ignore[arg-type]
+
+    return basins_over(dataset, several, again, whole)
 
 
 def basins_of(  # noqa: PLR0913 (as for basins)

@@ -7,32 +7,40 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap.model.covariance import misses
 from pendmap.model.pendulum import effects_of, is_driven
 from pendmap.model.units import TIME, Units
 from pendmap.words import counted, with_error, written
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     import xarray as xr
 
-    from pendmap.model import Effect, Pendulum
+    from pendmap.model import Pendulum, Rig
 
-__all__ = ["of_motion", "summarise", "unlimited_rotation"]
+__all__ = ["of_model", "summarise", "unlimited_rotation"]
 
 _NEARLY_CHANCE = 0.15
 _STILL = 1e-12
 
 
-def of_motion(effects: Sequence[Effect], what: str) -> list[str]:
-    """Say that ``what`` is shown is the motion, where effects change its reading."""
-    names = [effect.name for effect in effects if effect.reads]
-    if not names:
-        return []
-    verb = "acts" if len(names) == 1 else "act"
-    return [
-        f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
-    ]
+def of_model(model: Pendulum | Rig, what: str) -> list[str]:
+    """Say what a model is worth: that it misses its record, and what acts on its reading alone.
+
+    Where effects change the sensor's reading ``what`` is shown is the motion.
+    """
+    ratio = misses(model.notes)
+    lines = []
+    if math.isfinite(ratio):
+        lines.append(f"This model misses its record by {ratio:.3g} times the noise.")
+    names = [effect.name for effect in model.effects if effect.reads]
+    if names:
+        verb = "acts" if len(names) == 1 else "act"
+        lines.append(
+            f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
+        )
+    return lines
 
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
@@ -68,7 +76,7 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
         lines += unlimited
         if not unlimited and a["undecided"] > 0:
             lines += _sustained_rotation(pendulum)
-    lines += of_motion(pendulum.effects, "this map is")
+    lines += of_model(pendulum, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
         f"{counted(a['steps_per_period'], 'step')} a period, "
