@@ -13,6 +13,7 @@ from pendmap import _core, checks, survival
 from pendmap.draws import drawn, part
 from pendmap.draws.lifetimes import lifetime_over
 from pendmap.errors import InputError
+from pendmap.grid import FASTEST
 from pendmap.grid import starts as checked
 from pendmap.lifetimes_said import summary
 from pendmap.maps import basins_of
@@ -20,7 +21,7 @@ from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.saddle import growth_on_saddle
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_model
+from pendmap.summary import of_model, window_said
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
 __all__ = ["lifetime"]
 
 _STARTS: Final = 40_000
-_FASTEST: Final = 3.0
-"""The window of starts, as of ``basins``."""
-
 _MOST_STARTS: Final = 10_000_000
 _SURE: Final = 3.0
 """Standard errors by which the exponent must exceed the rate of escape."""
@@ -131,11 +129,13 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed = checks.whole("seed", seed, 0, checks.MOST_SEED)
     if (theta is None) != (velocity is None):
         raise InputError("theta and velocity: allowed is both or none of them")
+    window = ""
     if theta is None or velocity is None:
         draw = np.random.default_rng(seed)
-        reach = units.given(_FASTEST, VELOCITY)
+        reach = units.given(FASTEST, VELOCITY)
         theta = draw.uniform(-math.pi, math.pi, starts)
         velocity = draw.uniform(-reach, reach, starts)
+        window = window_said((-math.pi, math.pi), (-reach, reach), units)
     angles, speeds = checked(theta, velocity)
     several = None if draws is None else drawn(model, draws, seed)
     whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
@@ -202,7 +202,10 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*summary(dataset, found), *of_model(model, "these lifetimes are")]
+    lines = summary(dataset, found)
+    if window:
+        lines.append(f"Starts are drawn in {window}.")
+    lines += [*of_model(model, "these lifetimes are")]
     dataset.attrs["summary"] = "\n".join(lines)
     if several is None:
         return dataset

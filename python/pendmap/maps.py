@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], object]
 
-__all__ = ["basins", "basins_of"]
+__all__ = ["DEFAULT_CELLS", "basins", "basins_of"]
 
-_DEFAULT = 1000
+DEFAULT_CELLS = 1000
 """Cells on each side of a map where nothing is said."""
 
 
 def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     pendulum: Pendulum | Rig,
-    grid: Grid | None = None,
+    grid: Grid | int | None = None,
     *,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -59,9 +59,9 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         The model. With a rig velocities are in rad/s, times in s and exponents in 1/s; only ``tol``
         and the errors are of numbers without dimensions. Effects of the group ``reading`` change
         nothing: a map is of the motion, not of what a sensor shows of it.
-    grid : Grid, optional
-        The initial conditions at ``tau = 0``; by default 1000 x 1000 cells of
-        [-pi, pi] x [-3, 3], with a rig of [-pi, pi] x [-3 w0, 3 w0].
+    grid : Grid or int, optional
+        The initial conditions at ``tau = 0``, or how many cells each side of the default window
+        has: [-pi, pi] x [-3, 3], with a rig [-pi, pi] x [-3 w0, 3 w0]. By default 1000.
     tol : float
         The 95th percentile, over a sample of the starts, of the difference that halving the step
         makes after 5 periods; 1e-13 to 1e-2.
@@ -127,10 +127,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
-    grid = Grid.square(_DEFAULT, units.given(1.0, VELOCITY)) if grid is None else grid
-    checks.of_type(
-        "grid", grid, Grid, "Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
-    )
+    grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
     checks.call("progress", progress)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
     several = None if draws is None else drawn(model, draws, seed)

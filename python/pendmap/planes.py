@@ -20,7 +20,7 @@ from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, VELOCITY
 from pendmap.regimes import kind_of, regimes
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_model
+from pendmap.summary import box_said, of_model
 from pendmap.varied import title, varied, without_damping
 from pendmap.words import counted
 
@@ -94,7 +94,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges : mapping of str to (float, float, int)
         Two parameters with first value, last value (both included) and how many: columns, then
         rows. Any of ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without
-        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI; or
+        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI,
+        ``frequency_hz`` (``p`` is kept) and ``stroke_mm`` (``Omega`` is kept); or
         ``EFFECT.PARAMETER`` of an effect that the model has.
     starts : int
         Initial conditions of each cell.
@@ -425,8 +426,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
         lines.append(f"Cells with undecided starts: {listed}{more}.")
     lines.append(
-        f"{counted(a['starts'], 'start')} a cell; {counted(a['searched_again'], 'cell')} searched "
-        f"again for what a neighbour has; error after 5 periods {a['reached_error']:.2g}; "
+        f"{counted(a['starts'], 'start')} a cell, {box_said(a)}; "
+        f"{counted(a['searched_again'], 'cell')} searched again for what a neighbour has; error "
+        f"after 5 periods {a['reached_error']:.2g}; "
         f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
     )
     return lines

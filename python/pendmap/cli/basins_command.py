@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_DEFAULT = 1000
-
 
 @click.command("basins")
 @model_options
@@ -65,12 +63,12 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
     from pendmap import _core
     from pendmap.grid import Axis, Grid
-    from pendmap.maps import basins
+    from pendmap.maps import DEFAULT_CELLS, basins
     from pendmap.model import without_dimensions
     from pendmap.pictures.layers import BYTES_OF_CELL
     from pendmap.summary import unlimited_rotation
 
-    usual = Grid.square(count or _DEFAULT, model.units.w0)
+    usual = Grid.of(count, DEFAULT_CELLS, model.units.w0)
     grid = Grid(
         Axis(*theta) if theta else usual.theta, Axis(*velocity) if velocity else usual.velocity
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
@@ -60,6 +61,10 @@ def figure(
         dpi=dpi,
     )
     axes = sheet.axes[0]
+    if "draws" in dataset.attrs:
+        at = [dataset[f"drawn_{name}"].values.ravel() for name in ("theta", "velocity")]
+        points = plane.copies(dataset, np.stack(at, axis=1)[np.isfinite(at[0])], *theta)
+        axes.plot(points[:, 0], points[:, 1], ".", color=style.QUIET, markersize=3, zorder=3)
     for one in orbits:
         _orbit(axes, one, dataset, theta)
     style.phase_plane(axes, theta, velocity, units)
