@@ -15,6 +15,7 @@ from pendmap.model.units import VELOCITY, Units
 from pendmap.pictures import layers as layering
 from pendmap.pictures import orbits as drawn
 from pendmap.pictures import plane
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,11 +50,13 @@ def figure(
     if len(orbits) > len(named):
         texts.append(f"and {len(orbits) - len(named)} more")
         handles.append(Line2D([], [], linestyle="none"))
+    count = int(dataset.attrs.get("draws", 0))
+    over = f";   grey dots: {counted(count, 'draw')}" if count else ""
     sheet = Sheet(
         [Panel()],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
         title=drawn.title(dataset),
-        subtitle=layering.parameters(dataset.attrs),
+        subtitle=layering.parameters(dataset.attrs) + over,
         handles=handles,
         texts=texts,
         labels=(style.widest(*velocity), style.widest(*theta, angle=True)),
@@ -61,7 +64,7 @@ def figure(
         dpi=dpi,
     )
     axes = sheet.axes[0]
-    if "draws" in dataset.attrs:
+    if count:
         at = [dataset[f"drawn_{name}"].values.ravel() for name in ("theta", "velocity")]
         points = plane.copies(dataset, np.stack(at, axis=1)[np.isfinite(at[0])], *theta)
         axes.plot(points[:, 0], points[:, 1], ".", color=style.QUIET, markersize=3, zorder=3)
