@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap import _core, checks
-from pendmap.grid import Axis, Grid
+from pendmap.grid import FASTEST, Axis, Grid
 from pendmap.model.units import VELOCITY
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class CellSearch:
         """Return the box, in these units."""
         if self.box is not None:
             return self.box
-        reach = units.given(3.0, VELOCITY)
+        reach = units.given(FASTEST, VELOCITY)
         return Grid(Axis(-math.pi, math.pi, _SPREAD), Axis(-reach, reach, _SPREAD))
 
     def initial(self, units: Units) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,6 +11,7 @@ from pendmap.errors import InputError
 
 __all__ = [
     "MOST_CELLS",
+    "MOST_DRAWS",
     "MOST_PERIODS",
     "MOST_SAMPLES",
     "MOST_SEED",
@@ -25,6 +26,7 @@ __all__ = [
 ]
 
 MOST_CELLS: Final = 100_000
+MOST_DRAWS: Final = 10_000
 MOST_PERIODS: Final = 2**31 - 1
 MOST_SAMPLES: Final = 10_000
 MOST_SEED: Final = 2**63 - 1

@@ -13,11 +13,13 @@ import xarray as xr
 from pendmap import _core, asymptotic, checks, critical_refinement
 from pendmap import grid as grids
 from pendmap.critical_plane import PLANES, in_picture
+from pendmap.draws import drawn, part
+from pendmap.draws.curves import tongues_over
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model
 from pendmap.varied import title_without
 from pendmap.words import counted
 
@@ -65,6 +67,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     inverted: bool = True,
     refine: bool = False,
     threads: int | None = None,
+    draws: int | None = None,
+    seed: int = 0,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
     """Return the critical curves of rest, exact, with folds and asymptotic curves.
@@ -106,6 +110,11 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         for, so that a figure shows them as they are.
     threads : int, optional
         Number of threads; by default one a processor. The result does not depend on it.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: the band in
+        which each critical amplitude lies (:func:`pendmap.draws.curves.tongues_over`).
+    seed : int
+        Draws them.
     progress : callable, optional
         Called now and then with what is done and in all.
 
@@ -144,38 +153,14 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     refine, inverted = checks.flag("refine", refine), checks.flag("inverted", inverted)
     _check_free(pendulum)
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
     began = time.perf_counter()
 
-    free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
-
-    def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
-        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, workers, progress)
-        return [_NO_REST] * at.size if found is None else found
-
-    def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
-        found = solve(at, pendulum, upright=False, folds=folds)
-        undamped = solve(at, free, upright=False) if free and not found[0]["moved"] else found
-        above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
-        return list(zip(found, undamped, above, strict=True))
-
-    def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
-        # The end of what is looked for bounds the last strip.
-        return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in rows]
-
-    asked = frequencies
-    looked = np.ones(asked.size, dtype=bool)
-    try:
-        rows = all_at(asked, folds=True)
-        if refine and asked.size > 1:
-            views = [in_picture(asked, p_max, one) for one in PLANES]
-            frequencies, rows = critical_refinement.denser(asked, rows, all_at, curves, views)
-        found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
-        if refine and asked.size > 1:
-            again = partial(solve, one=pendulum, upright=False, folds=True)
-            known = np.isin(frequencies, asked)
-            looked = _folds_to_their_ends(frequencies, found, known, again)
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    solved = _solved(
+        pendulum, frequencies, p_max, workers, progress, inverted=inverted, refine=refine
+    )
+    asked, frequencies, looked, (found, undamped, upright) = frequencies, *solved
     moved = bool(found[0]["moved"])
     if moved:
         undamped = [_NO_REST] * len(found)
@@ -213,9 +198,61 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(dataset), *of_motion(model.effects, "curves are")]
+    lines = [*_summary(dataset), *of_model(model, "curves are")]
     dataset.attrs["summary"] = "\n".join(lines)
-    return dataset
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Callable[[int, int], object] | None) -> xr.Dataset:
+        return tongues(one, frequencies, p_max, inverted=inverted, threads=threads, progress=report)
+
+    return tongues_over(dataset, several, again, whole)
+
+
+def _solved(  # noqa: PLR0913 (as for tongues)
+    pendulum: Pendulum,
+    asked: Floats,
+    p_max: float,
+    workers: int,
+    progress: Callable[[int, int], object] | None,
+    *,
+    inverted: bool,
+    refine: bool,
+) -> tuple[Floats, NDArray[np.bool_], tuple[list[_Row], list[_Row], list[_Row]]]:
+    """Return frequencies, at which of them folds were looked for, and what was found there.
+
+    That is of hanging rest, of it without damping, and of inverted rest.
+    """
+    free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
+
+    def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
+        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, workers, progress)
+        return [_NO_REST] * at.size if found is None else found
+
+    def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
+        found = solve(at, pendulum, upright=False, folds=folds)
+        undamped = solve(at, free, upright=False) if free and not found[0]["moved"] else found
+        above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
+        return list(zip(found, undamped, above, strict=True))
+
+    def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
+        # The end of what is looked for bounds the last strip.
+        return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in rows]
+
+    looked = np.ones(asked.size, dtype=bool)
+    try:
+        frequencies, rows = asked, all_at(asked, folds=True)
+        if refine and asked.size > 1:
+            views = [in_picture(asked, p_max, one) for one in PLANES]
+            frequencies, rows = critical_refinement.denser(asked, rows, all_at, curves, views)
+        found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
+        if refine and asked.size > 1:
+            again = partial(solve, one=pendulum, upright=False, folds=True)
+            known = np.isin(frequencies, asked)
+            looked = _folds_to_their_ends(frequencies, found, known, again)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    return frequencies, looked, (found, undamped, upright)
 
 
 def _check_free(pendulum: Pendulum) -> None:

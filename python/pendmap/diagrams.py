@@ -17,7 +17,7 @@ from pendmap.model.units import VELOCITY
 from pendmap.planes import CHAOS_PERIODS, chaos, entries, undecided
 from pendmap.regimes import kind_of
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import box_said, of_model
 from pendmap.varied import title, varied, without_damping
 from pendmap.words import counted
 
@@ -137,7 +137,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = [
         *_summary(dataset),
         *without_damping(model, axis),
-        *of_motion(model.effects, "attractors are"),
+        *of_model(model, "attractors are"),
     ]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
@@ -215,8 +215,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if where.any():
         lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")
     lines.append(
-        f"{counted(a['starts'], 'start')} a value; {counted(a['points'], 'point')}; error after 5 "
-        f"periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "
+        f"{counted(a['starts'], 'start')} a value, {box_said(a)}; {counted(a['points'], 'point')}; "
+        f"error after 5 periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "
         f"{counted(a['threads'], 'thread')}."
     )
     return lines

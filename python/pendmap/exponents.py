@@ -16,7 +16,7 @@ from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.orbit_table import table
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -186,7 +186,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*summary(dataset), *of_motion(model.effects, "this exponent is")]
+    lines = [*summary(dataset), *of_model(model, "this exponent is")]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+import numbers
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Axis", "Grid", "coordinate", "frequencies", "starts"]
+__all__ = ["FASTEST", "Axis", "Grid", "coordinate", "frequencies", "starts"]
+
+FASTEST: Final = 3.0
+"""The greatest velocity of the default window, over ``w0`` with a rig."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,8 +99,32 @@ class Grid:
         Velocities reach from ``-3 w0`` to ``3 w0``: with the ``w0`` of a :class:`pendmap.Rig` the
         window is the same as without dimensions.
         """
-        fastest = 3.0 * checks.number("w0", w0)
+        fastest = FASTEST * checks.number("w0", w0)
         return cls(Axis(-math.pi, math.pi, count), Axis(-fastest, fastest, count))
+
+    @classmethod
+    def of(cls, given: object, count: int, w0: float) -> Grid:
+        """Return a grid as given, or the default window with so many cells on each side.
+
+        Parameters
+        ----------
+        given : Grid, int or None
+            A number is that of the cells on each side.
+        count : int
+            Cells on each side where nothing is given.
+        w0 : float
+            As of :meth:`square`.
+
+        Raises
+        ------
+        InputError
+            If it is something else.
+        """
+        if given is None or (isinstance(given, numbers.Integral) and not isinstance(given, bool)):
+            return cls.square(count if given is None else int(given), w0)
+        example = "100, Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
+        checks.of_type("grid", given, cls, example)
+        return given  # type: ignore[return-value]
 
     @property
     def cells(self) -> int:

@@ -14,7 +14,7 @@ from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.separatrices import loop, separatrix
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -150,7 +150,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(pendulum, at, first, sense), *of_motion(model.effects, "the threshold is")]
+    lines = [*_summary(pendulum, at, first, sense), *of_model(model, "the threshold is")]
     dataset.attrs["summary"] = "\n".join(lines)
     return dataset
 

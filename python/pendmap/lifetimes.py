@@ -10,7 +10,10 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core, checks, survival
+from pendmap.draws import drawn, part
+from pendmap.draws.lifetimes import lifetime_over
 from pendmap.errors import InputError
+from pendmap.grid import FASTEST
 from pendmap.grid import starts as checked
 from pendmap.lifetimes_said import summary
 from pendmap.maps import basins_of
@@ -18,7 +21,7 @@ from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
 from pendmap.saddle import growth_on_saddle
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model, window_said
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,9 +35,6 @@ if TYPE_CHECKING:
 __all__ = ["lifetime"]
 
 _STARTS: Final = 40_000
-_FASTEST: Final = 3.0
-"""The window of starts, as of ``basins``."""
-
 _MOST_STARTS: Final = 10_000_000
 _SURE: Final = 3.0
 """Standard errors by which the exponent must exceed the rate of escape."""
@@ -53,6 +53,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol: float = 1e-6,
     threads: int | None = None,
     seed: int = 0,
+    draws: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
     """Mean lifetime of transient chaos: the exponential tail of the times until capture.
@@ -89,6 +90,10 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Number of threads; by default one a processor. The result does not depend on it.
     seed : int
         Draws the starts.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: the
+        interval of the mean lifetime (:func:`pendmap.draws.lifetimes.lifetime_over`). ``seed``
+        draws them.
     progress : callable, optional
         Called now and then with what is done and in all.
 
@@ -124,12 +129,16 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed = checks.whole("seed", seed, 0, checks.MOST_SEED)
     if (theta is None) != (velocity is None):
         raise InputError("theta and velocity: allowed is both or none of them")
+    window = ""
     if theta is None or velocity is None:
         draw = np.random.default_rng(seed)
-        reach = units.given(_FASTEST, VELOCITY)
+        reach = units.given(FASTEST, VELOCITY)
         theta = draw.uniform(-math.pi, math.pi, starts)
         velocity = draw.uniform(-reach, reach, starts)
+        window = window_said((-math.pi, math.pi), (-reach, reach), units)
     angles, speeds = checked(theta, velocity)
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
     began = time.perf_counter()
     found = basins_of(
         model,
@@ -193,9 +202,28 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         "pendmap_version": _core.__version__,
         "format_version": FORMAT_VERSION,
     }
-    lines = [*summary(dataset, found), *of_motion(model.effects, "these lifetimes are")]
+    lines = summary(dataset, found)
+    if window:
+        lines.append(f"Starts are drawn in {window}.")
+    lines += [*of_model(model, "these lifetimes are")]
     dataset.attrs["summary"] = "\n".join(lines)
-    return dataset
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Callable[[int, int], object] | None) -> xr.Dataset:
+        return lifetime(
+            one,
+            angles,
+            speeds,
+            from_period=from_period,
+            max_periods=max_periods,
+            tol=tol,
+            threads=threads,
+            seed=seed,
+            progress=report,
+        )
+
+    return lifetime_over(dataset, several, again, whole)
 
 
 def _chaotic(found: xr.Dataset) -> float:

@@ -9,6 +9,8 @@ import xarray as xr
 
 from pendmap import _core, checks
 from pendmap.basin_dataset import cells, complete, uncertain_starts
+from pendmap.draws import drawn, part
+from pendmap.draws.basins import basins_over
 from pendmap.errors import InputError
 from pendmap.grid import Grid, coordinate, starts
 from pendmap.model import without_dimensions
@@ -23,15 +25,15 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], object]
 
-__all__ = ["basins", "basins_of"]
+__all__ = ["DEFAULT_CELLS", "basins", "basins_of"]
 
-_DEFAULT = 1000
+DEFAULT_CELLS = 1000
 """Cells on each side of a map where nothing is said."""
 
 
 def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     pendulum: Pendulum | Rig,
-    grid: Grid | None = None,
+    grid: Grid | int | None = None,
     *,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -39,6 +41,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     threads: int | None = None,
     seed: int = 0,
     check: bool = True,
+    draws: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Basins of attraction: which attractor each initial condition ends on.
@@ -56,9 +59,9 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         The model. With a rig velocities are in rad/s, times in s and exponents in 1/s; only ``tol``
         and the errors are of numbers without dimensions. Effects of the group ``reading`` change
         nothing: a map is of the motion, not of what a sensor shows of it.
-    grid : Grid, optional
-        The initial conditions at ``tau = 0``; by default 1000 x 1000 cells of
-        [-pi, pi] x [-3, 3], with a rig of [-pi, pi] x [-3 w0, 3 w0].
+    grid : Grid or int, optional
+        The initial conditions at ``tau = 0``, or how many cells each side of the default window
+        has: [-pi, pi] x [-3, 3], with a rig [-pi, pi] x [-3 w0, 3 w0]. By default 1000.
     tol : float
         The 95th percentile, over a sample of the starts, of the difference that halving the step
         makes after 5 periods; 1e-13 to 1e-2.
@@ -77,6 +80,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     check : bool
         Whether to measure what takes further starts: labels of a sample with half the step and
         mirrored, and the share of starts whose label changes nearby.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each mapped too: how probable
+        each end is in each cell, and what of the doubt is the parameters'
+        (:mod:`pendmap.draws.basins`). ``seed`` draws them.
     progress : callable, optional
         Called now and then with the number of cells done and in all.
 
@@ -94,7 +101,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         ``boundary_basin_entropy`` and ``uncertainty_exponent`` say how the basins are interwoven:
         see :func:`pendmap.basin_entropy` and :func:`pendmap.uncertainty_exponent`; the counts
         behind the exponent, from 10,000 cells on, are ``uncertain`` of ``uncertainty_tried``
-        starts over ``distance``.
+        starts over ``distance``. With ``draws`` also what
+        :func:`pendmap.draws.basins.basins_over` adds.
 
     Notes
     -----
@@ -119,12 +127,11 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
-    grid = Grid.square(_DEFAULT, units.given(1.0, VELOCITY)) if grid is None else grid
-    checks.of_type(
-        "grid", grid, Grid, "Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
-    )
+    grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
     checks.call("progress", progress)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
     began = time.perf_counter()
     low, high, count = grid.velocity.as_tuple
     slow, fast = units.bare(low, VELOCITY), units.bare(high, VELOCITY)
@@ -149,7 +156,16 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         ),
     )
     dataset = dataset.assign(uncertain_starts(raw))
-    return complete(dataset, raw, model, choices, seconds)
+    dataset = complete(dataset, raw, model, choices, seconds)
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Progress | None) -> xr.Dataset:
+        bounds = {"max_periods": max_periods, "layer_periods": layer_periods}
+        shared = {"tol": tol, "threads": threads, "seed": seed, "check": False}
+        return basins(one, grid, **bounds, **shared, progress=report)  # type: ignore[arg-type]
+
+    return basins_over(dataset, several, again, whole)
 
 
 def basins_of(  # noqa: PLR0913 (as for basins)

@@ -10,13 +10,15 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core, checks
+from pendmap.draws import drawn, part
+from pendmap.draws.orbits import orbits_over
 from pendmap.errors import InputError
 from pendmap.grid import Axis, Grid
 from pendmap.model import without_dimensions
 from pendmap.model.units import VELOCITY, Units
 from pendmap.orbit_table import table
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model
 from pendmap.words import counted
 
 if TYPE_CHECKING:
@@ -69,6 +71,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     grid: Grid | None = None,
     *,
     threads: int | None = None,
+    draws: int | None = None,
+    seed: int = 0,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
     """All periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
@@ -98,6 +102,12 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
     threads : int, optional
         Number of threads; by default one a processor. The result does not depend on it.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: how far
+        orbits move, and in how many draws they are there and stable
+        (:func:`pendmap.draws.orbits.orbits_over`).
+    seed : int
+        Draws them.
     progress : callable, optional
         Called now and then with what is done and in all.
 
@@ -126,6 +136,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     grid = window(model, n, w) if grid is None else grid
     checks.of_type("grid", grid, Grid, "Grid.square(200)")
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
     began = time.perf_counter()
     low, high, count = grid.velocity.as_tuple
     box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
@@ -164,9 +176,16 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         "format_version": FORMAT_VERSION,
     }
     lines = [*_summary(dataset, pendulum, friction=raw["friction"])]
-    lines += of_motion(model.effects, "orbits are")
+    lines += of_model(model, "orbits are")
     dataset.attrs["summary"] = "\n".join(lines)
-    return dataset
+    if several is None:
+        return dataset
+    return orbits_over(
+        dataset,
+        several,
+        lambda one, report: orbit(one, n, w, grid, threads=threads, progress=report),
+        whole,
+    )
 
 
 def _paths(pendulum: Pendulum, found: list[dict[str, Any]], units: Units) -> dict[str, Any]:

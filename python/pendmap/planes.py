@@ -13,12 +13,14 @@ from scipy.ndimage import find_objects, label
 from pendmap import _core, checks
 from pendmap.cell_search import STARTS, CellSearch
 from pendmap.critical_curves import MOST_P, tongues
+from pendmap.draws import drawn, part
+from pendmap.draws.planes import regimes_over
 from pendmap.errors import InputError
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, VELOCITY
 from pendmap.regimes import kind_of, regimes
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import box_said, of_model
 from pendmap.varied import title, varied, without_damping
 from pendmap.words import counted
 
@@ -66,6 +68,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     threads: int | None = None,
     seed: int = 0,
     curves: bool = False,
+    draws: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """The set of attractors over a plane of two parameters.
@@ -91,7 +94,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges : mapping of str to (float, float, int)
         Two parameters with first value, last value (both included) and how many: columns, then
         rows. Any of ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without
-        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI; or
+        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI,
+        ``frequency_hz`` (``p`` is kept) and ``stroke_mm`` (``Omega`` is kept); or
         ``EFFECT.PARAMETER`` of an effect that the model has.
     starts : int
         Initial conditions of each cell.
@@ -110,6 +114,10 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     curves : bool
         Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
         ``omega`` (or ``Omega``): figures draw them over the map.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: how
+        probable each regime is in each cell (:func:`pendmap.draws.planes.regimes_over`). ``seed``
+        draws them.
     progress : callable, optional
         Called now and then with the number of cells done and in all.
 
@@ -145,10 +153,12 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     checks.call("progress", progress)
     search = CellSearch(starts, box, tol, max_periods, threads, seed)
     theta, velocity = search.initial(units)
-    drawn = None
+    several = None if draws is None else drawn(model, draws, search.seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
+    over = None
     if checks.flag("curves", curves):
         first, progress = _halves(progress)
-        drawn = _curves(model, columns, rows, first)
+        over = _curves(model, columns, rows, first)
     began = time.perf_counter()
     try:
         raw = _core.parameter_map(
@@ -165,8 +175,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     except ValueError as error:
         raise InputError(str(error)) from None
     dataset = _dataset(raw, (columns, rows), units)
-    if drawn is not None:
-        dataset = dataset.assign(drawn)
+    if over is not None:
+        dataset = dataset.assign(over)
     dataset.attrs = {
         "kind": "parameter_map",
         "title": title(model, columns, rows),
@@ -183,10 +193,26 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = [
         *_summary(dataset),
         *without_damping(model, columns, rows),
-        *of_motion(model.effects, "attractors are"),
+        *of_model(model, "attractors are"),
     ]
     dataset.attrs["summary"] = "\n".join(lines)
-    return dataset
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Progress | None) -> xr.Dataset:
+        return parameter_map(
+            one,
+            ranges,
+            starts=starts,
+            box=search.within(units),
+            tol=tol,
+            max_periods=max_periods,
+            threads=threads,
+            seed=seed,
+            progress=report,
+        )
+
+    return regimes_over(dataset, several, again, whole)
 
 
 def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
@@ -252,7 +278,7 @@ def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None
         return None, None
     furthest = 0.0
 
-    def part(number: int) -> Progress:
+    def half(number: int) -> Progress:
         def report(done: int, total: int) -> None:
             nonlocal furthest
             furthest = max(furthest, (number + done / max(total, 1)) / 2)
@@ -260,7 +286,7 @@ def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None
 
         return report
 
-    return part(0), part(1)
+    return half(0), half(1)
 
 
 def _curves(
@@ -361,11 +387,11 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
     for number, box in enumerate(find_objects(groups), 1):
         mine = groups == number
         ranges = {
-            str(name): (float(dataset[name].values[part][0]), float(dataset[name].values[part][-1]))
-            for name, part in zip(reversed(share.dims), reversed(box), strict=True)
+            str(name): (float(dataset[name].values[at][0]), float(dataset[name].values[at][-1]))
+            for name, at in zip(reversed(share.dims), reversed(box), strict=True)
         }
-        part = float(share.values[mine].mean())
-        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": part})
+        mean = float(share.values[mine].mean())
+        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
     return sorted(found, key=lambda one: -one["cells"])
 
 
@@ -400,8 +426,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
         lines.append(f"Cells with undecided starts: {listed}{more}.")
     lines.append(
-        f"{counted(a['starts'], 'start')} a cell; {counted(a['searched_again'], 'cell')} searched "
-        f"again for what a neighbour has; error after 5 periods {a['reached_error']:.2g}; "
+        f"{counted(a['starts'], 'start')} a cell, {box_said(a)}; "
+        f"{counted(a['searched_again'], 'cell')} searched again for what a neighbour has; error "
+        f"after 5 periods {a['reached_error']:.2g}; "
         f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
     )
     return lines

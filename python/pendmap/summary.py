@@ -7,32 +7,41 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap.grid import FASTEST
+from pendmap.model.covariance import misses
 from pendmap.model.pendulum import effects_of, is_driven
-from pendmap.model.units import TIME, Units
+from pendmap.model.units import TIME, VELOCITY, Units
 from pendmap.words import counted, with_error, written
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     import xarray as xr
 
-    from pendmap.model import Effect, Pendulum
+    from pendmap.model import Pendulum, Rig
 
-__all__ = ["of_motion", "summarise", "unlimited_rotation"]
+__all__ = ["box_said", "of_model", "summarise", "unlimited_rotation", "window_said"]
 
 _NEARLY_CHANCE = 0.15
 _STILL = 1e-12
 
 
-def of_motion(effects: Sequence[Effect], what: str) -> list[str]:
-    """Say that ``what`` is shown is the motion, where effects change its reading."""
-    names = [effect.name for effect in effects if effect.reads]
-    if not names:
-        return []
-    verb = "acts" if len(names) == 1 else "act"
-    return [
-        f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
-    ]
+def of_model(model: Pendulum | Rig, what: str) -> list[str]:
+    """Say what a model is worth: that it misses its record, and what acts on its reading alone.
+
+    Where effects change the sensor's reading ``what`` is shown is the motion.
+    """
+    ratio = misses(model.notes)
+    lines = []
+    if math.isfinite(ratio):
+        lines.append(f"This model misses its record by {ratio:.3g} times the noise.")
+    names = [effect.name for effect in model.effects if effect.reads]
+    if names:
+        verb = "acts" if len(names) == 1 else "act"
+        lines.append(
+            f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
+        )
+    return lines
 
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
@@ -68,7 +77,7 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
         lines += unlimited
         if not unlimited and a["undecided"] > 0:
             lines += _sustained_rotation(pendulum)
-    lines += of_motion(pendulum.effects, "this map is")
+    lines += of_model(pendulum, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
         f"{counted(a['steps_per_period'], 'step')} a period, "
@@ -156,12 +165,36 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
 
 def _window(dataset: xr.Dataset) -> str:
     """Say which starts the numbers are of: a selection of the map keeps them."""
-    said = []
-    for name in ("theta", "velocity"):
-        low, high = dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]
-        unit = str(dataset[name].attrs["units"]).removeprefix("1")
-        said.append(f"{name} = {low:.6g} to {high:.6g} {unit}".rstrip())
-    return f"{', '.join(said)}: {counted(dataset.attrs['cells'], 'start')}."
+    theta, velocity = (
+        tuple(dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]) for name in ("theta", "velocity")
+    )
+    said = window_said(theta, velocity, Units.of(dataset.attrs))
+    return f"{said}: {counted(dataset.attrs['cells'], 'start')}."
+
+
+def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Units) -> str:
+    """Return a window of starts in words, and whether it is the default one.
+
+    ``[-pi, pi] x [-3, 3]``, in SI ``[-pi, pi] x [-3 w0, 3 w0]``: the same motions either way.
+    """
+    usual = (math.pi, units.given(FASTEST, VELOCITY))
+    default = all(
+        np.allclose(span, (-reach, reach), rtol=1e-12)
+        for span, reach in zip((theta, velocity), usual, strict=True)
+    )
+    (low, high), (slow, fast) = theta, velocity
+    speeds = units.spoken(f"{slow:.6g} to {fast:.6g}")
+    said = f" (the default window{', to 3 w0' if units.si else ''})" if default else ""
+    return f"theta = {low:.6g} to {high:.6g} rad, velocity = {speeds}{said}"
+
+
+def box_said(attrs: Mapping[Any, Any]) -> str:
+    """Return in words where the starts of a search over many pendulums lie."""
+    theta, velocity = (
+        (float(attrs[f"low_{name}"]), float(attrs[f"high_{name}"]))
+        for name in ("theta", "velocity")
+    )
+    return f"in {window_said(theta, velocity, Units.of(attrs))}"
 
 
 def _conservative(dataset: xr.Dataset) -> str:

@@ -15,7 +15,7 @@ from pendmap.grid import starts
 from pendmap.model import Units, without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY
 from pendmap.store import FORMAT_VERSION
-from pendmap.summary import of_motion
+from pendmap.summary import of_model
 from pendmap.words import counted, with_error
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         "format_version": FORMAT_VERSION,
     }
     dataset.attrs["summary"] = "\n".join(
-        [_summary(dataset, units), *of_motion(model.effects, "angle and velocity here are")]
+        [_summary(dataset, units), *of_model(model, "angle and velocity here are")]
     )
     return dataset
 

@@ -12,18 +12,20 @@ from pendmap import _core, checks
 from pendmap.errors import InputError
 from pendmap.grid import coordinate
 from pendmap.model import without_dimensions
-from pendmap.model.rig import COUNTERPARTS
+from pendmap.model.quantities import check
+from pendmap.model.rig import COUNTERPARTS, Rig
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.model import Effect, Pendulum, Rig
+    from pendmap.model import Effect, Pendulum
 
 __all__ = ["Varied", "title", "title_without", "varied", "without_damping"]
 
 _UNITS = {"c_over_m": "1/s", "Omega": "rad/s", "Tr": "rad/s2", "phi": "rad", "phase": "rad"}
+_UNITS |= {"stroke_mm": "mm", "frequency_hz": "Hz"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,8 +36,10 @@ class Varied:
     ----------
     name : str
         ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque`` or ``phase``, without dimensions; of a
-        :class:`pendmap.Rig` also ``Omega``, ``c_over_m``, ``Tr`` and ``phi`` in SI; or
-        ``EFFECT.PARAMETER``, in the model's own units.
+        :class:`pendmap.Rig` also ``Omega``, ``c_over_m``, ``Tr`` and ``phi`` in SI,
+        ``frequency_hz = Omega / 2 pi`` with ``p`` kept, and ``stroke_mm``, the amplitude ``Y`` of
+        ``p = Y Omega^2 / g`` with ``Omega`` kept; or ``EFFECT.PARAMETER``, in the model's own
+        units.
     values : ndarray, shape (N,)
         Ascending, evenly spaced, in those units.
     index : int
@@ -113,6 +117,10 @@ def varied(
     places = [one.index for one in found]
     if len(set(places)) < len(places):
         raise InputError(f"{found[0].name} and {found[1].name} are one parameter: allowed are two")
+    if "stroke_mm" in ranges and {"omega", "Omega", "frequency_hz"} & set(ranges):
+        raise InputError(
+            "stroke_mm beside a frequency that varies: p = Y Omega^2 / g must vary in their place"
+        )
     return found
 
 
@@ -149,9 +157,11 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum.parameters)
     powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
+    laboratory = _laboratory(model) if isinstance(model, Rig) else {}
     if units.si:
         own = {si: (bare, power) for bare, (si, power) in COUNTERPARTS.items()}
         powers |= {si: own[si] for si in ("c_over_m", "Omega", "phi", "Tr")}
+        powers |= {name: own[si] for name, (si, _) in laboratory.items()}
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
     if name not in powers and name not in shared:
@@ -162,7 +172,11 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     values = _values(name, given)
     if name in powers:
         bare, power = powers[name]
-        plain, unit = units.bare(values, power), _UNITS.get(name, "")
+        factor = 1.0
+        if name in laboratory:
+            check(name, values[0])
+            factor = laboratory[name][1]
+        plain, unit = units.bare(factor * values, power), _UNITS.get(name, "")
     else:
         bare, unit = name, ""
         which, parameter = name.split(".", 1)
@@ -180,6 +194,14 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     for value in (plain[0], plain[-1]):
         _check(pendulum, bare, float(value), name)
     return Varied(name, values, known.index(bare), plain, unit)
+
+
+def _laboratory(rig: Rig) -> dict[str, tuple[str, float]]:
+    """Return which of a rig's numbers the laboratory's are, and what they are times to be it."""
+    known = {"frequency_hz": ("Omega", math.tau)}
+    if rig.Omega > 0:  # without a frequency no stroke is an acceleration
+        known["stroke_mm"] = ("p", 1e-3 * rig.Omega**2 / rig.gravity)
+    return known
 
 
 def _values(name: str, given: object) -> NDArray[np.float64]:

@@ -52,7 +52,7 @@ def test_axes_may_be_tuples_and_counts_numpys() -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        ({"grid": 100}, r"grid is 100: allowed is a Grid, like Grid\.square\(100\)"),
+        ({"grid": 1.5}, r"grid is 1.5: allowed is a Grid, like 100, Grid\.square\(100\)"),
         ({"pendulum": 0.6}, "pendulum is 0.6: allowed is a Pendulum"),
         ({"threads": 1.5}, "threads is 1.5: allowed is a whole number from 1 to 256"),
         ({"threads": 1000}, "threads is 1000: allowed is a whole number from 1 to 256"),

@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED
+from pendmap.checks import MOST_CELLS, MOST_PERIODS
 from pendmap.cli import price
 from pendmap.cli.model_options import model_from, model_options
 from pendmap.cli.options import (
     Outputs,
+    draws_option,
     output_options,
     progress_options,
+    seed_option,
 )
 from pendmap.cli.show import progress_bar, show
 from pendmap.cli.types import AXIS, NUMBER, Whole
@@ -21,8 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["command"]
-
-_DEFAULT = 1000
 
 
 @click.command("basins")
@@ -44,9 +44,8 @@ _DEFAULT = 1000
 @click.option(
     "--layer-periods", type=Whole(1, MOST_PERIODS), help="Periods of the finite-time layers."
 )
-@click.option(
-    "--seed", type=Whole(0, MOST_SEED), default=0, help="Shifts the samples.  [default: 0]"
-)
+@seed_option("Shifts the samples, and draws the models of --draws.")
+@draws_option
 @progress_options
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
@@ -64,12 +63,12 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
     from pendmap import _core
     from pendmap.grid import Axis, Grid
-    from pendmap.maps import basins
+    from pendmap.maps import DEFAULT_CELLS, basins
     from pendmap.model import without_dimensions
     from pendmap.pictures.layers import BYTES_OF_CELL
     from pendmap.summary import unlimited_rotation
 
-    usual = Grid.square(count or _DEFAULT, model.units.w0)
+    usual = Grid.of(count, DEFAULT_CELLS, model.units.w0)
     grid = Grid(
         Axis(*theta) if theta else usual.theta, Axis(*velocity) if velocity else usual.velocity
     )
@@ -80,7 +79,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
         for line in unlimited_rotation(without_dimensions(model)[0]):
             click.echo(line, err=True)
     if given["max_periods"] is None and not outputs.quiet:
-        cells = grid.theta.count * grid.velocity.count
+        cells = grid.theta.count * grid.velocity.count * (1 + (given["draws"] or 0))
         price.say(model, cells, tol=given["tol"], threads=given["threads"])
     with progress_bar("basins", shown=outputs.shows_progress) as progress:
         dataset = basins(model, grid, progress=progress, **given)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.checks import MOST_PERIODS, MOST_SEED
+from pendmap.checks import MOST_PERIODS
 from pendmap.cli import price
 from pendmap.cli.model_options import model_from, model_options
-from pendmap.cli.options import Outputs, output_options, progress_options
+from pendmap.cli.options import Outputs, draws_option, output_options, progress_options, seed_option
 from pendmap.cli.show import progress_bar, show
 from pendmap.cli.types import NUMBER, Whole
 
@@ -42,7 +42,8 @@ _STARTS = (100, 10_000_000)
     " is small, less beside chaos]",
 )
 @click.option("--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]")
-@click.option("--seed", type=Whole(0, MOST_SEED), default=0, help="Draws the starts.  [default: 0]")
+@seed_option("Draws the starts, and the models of --draws.")
+@draws_option
 @progress_options
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
@@ -58,7 +59,8 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     from pendmap.lifetimes import lifetime
 
     if given["max_periods"] is None and not outputs.quiet:
-        price.say(model, given["starts"], tol=given["tol"], threads=given["threads"])
+        starts = given["starts"] * (1 + (given["draws"] or 0))
+        price.say(model, starts, tol=given["tol"], threads=given["threads"])
     with progress_bar("lifetime", shown=outputs.shows_progress) as progress:
         dataset = lifetime(model, progress=progress, **given)
     show(dataset, outputs, fields)

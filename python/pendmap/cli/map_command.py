@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.model_options import model_from, varied_model_options
-from pendmap.cli.options import Outputs, output_options, progress_options, search_options
+from pendmap.cli.options import (
+    Outputs,
+    draws_option,
+    output_options,
+    progress_options,
+    search_options,
+)
 from pendmap.cli.show import progress_bar, searched, show
 
 if TYPE_CHECKING:
@@ -23,6 +29,7 @@ __all__ = ["command"]
 @click.option(
     "--curves", is_flag=True, help="Draw the critical curves of rest over it (p and omega)."
 )
+@draws_option
 @search_options
 @progress_options
 @output_options()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,13 +50,24 @@ def varied_model_options(function: Command) -> Command:
     def with_ranges(**given: Any) -> Any:  # noqa: ANN401 (as the command)
         ranges: dict[str, AxisText] = {}
         for name, value in list(given.items()):
-            if name in _BARE and isinstance(value, AxisText):
+            if name in _BARE | _SI and isinstance(value, AxisText):
                 ranges[name], given[name] = value, None
             for other, span in value if name == "vary" else ():
                 if other in ranges:
                     raise click.UsageError(f"--vary {other}: is there twice, allowed is once")
                 ranges[other] = span
         given.pop("vary")
+        frequency = next((n for n in ("omega", "Omega", "frequency_hz") if n in ranges), None)
+        if frequency is not None and given["stroke_mm"] is not None:
+            raise click.UsageError(
+                f"--stroke-mm beside {frequency} that varies: allowed is --p, which is kept"
+            )
+        typed = {name for name in ("p", "omega", "frequency_hz") if given[name] is not None}
+        if frequency is not None and typed == {"p"}:
+            # A model without a drive has no frequency of its own, and p needs one.
+            first = ranges[frequency].low
+            which = "omega" if frequency == "omega" else "frequency_hz"
+            given[which] = first / math.tau if frequency == "Omega" else first
         return function(**given, ranges=ranges)
 
     vary = click.option(
@@ -65,7 +77,8 @@ def varied_model_options(function: Command) -> Command:
         type=(str, RANGE),
         metavar="NAME A:B:N",
         help="A parameter that varies, N values from A to B: p, omega, ..., EFFECT.PARAMETER; of a"
-        " model in SI also Omega, c_over_m, Tr, phi.",
+        " model in SI also Omega, c_over_m, Tr, phi, frequency_hz (p is kept), stroke_mm (Omega"
+        " is).",
     )
     return _options(vary(with_ranges), NUMBER_OR_RANGE)
 
@@ -102,7 +115,7 @@ def _options(
         default = getattr(Pendulum(), name, None)
         function = click.option(
             f"--{name.replace('_', '-')}",
-            type=kind if name in _BARE else NUMBER,
+            type=kind,
             default=None,
             help=text if default is None else f"{text}  [default: {default:g}]",
         )(function)

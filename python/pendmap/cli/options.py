@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.checks import MOST_CELLS, MOST_PERIODS, MOST_SEED, MOST_THREADS
+from pendmap.checks import MOST_CELLS, MOST_DRAWS, MOST_PERIODS, MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.types import NUMBER, InstructionSet, OutputFile, Whole
 from pendmap.files import check_room
@@ -25,10 +25,12 @@ __all__ = [
     "RESULTS",
     "Outputs",
     "check_view",
+    "draws_option",
     "output_options",
     "progress_options",
     "rate_option",
     "search_options",
+    "seed_option",
     "simd_option",
 ]
 
@@ -80,12 +82,25 @@ def rate_option(function: Command) -> Command:
     return add(function)
 
 
+def draws_option(function: Command) -> Command:
+    """Add the number of models that are drawn from what the fit knows of its parameters."""
+    option = click.option(
+        "--draws",
+        type=Whole(2, MOST_DRAWS),
+        help="Draw so many models from the [covariance] of --model: the doubt of the result.",
+    )
+    return option(function)
+
+
+def seed_option(what: str) -> Decorator:
+    """Return what adds a seed that does ``what``."""
+    return click.option("--seed", type=Whole(0, MOST_SEED), default=0, help=f"{what}  [default: 0]")
+
+
 def search_options(function: Command) -> Command:
     """Add what the search for attractors at each of many parameters takes."""
     for option in (
-        click.option(
-            "--seed", type=Whole(0, MOST_SEED), default=0, help="Shifts the starts.  [default: 0]"
-        ),
+        seed_option("Shifts the starts, and draws the models of --draws."),
         click.option(
             "--max-periods",
             type=Whole(1, MOST_PERIODS),

@@ -8,7 +8,13 @@ import click
 
 from pendmap.checks import MOST_CELLS
 from pendmap.cli.model_options import model_from, model_options
-from pendmap.cli.options import Outputs, output_options, progress_options
+from pendmap.cli.options import (
+    Outputs,
+    draws_option,
+    output_options,
+    progress_options,
+    seed_option,
+)
 from pendmap.cli.show import progress_bar, show
 from pendmap.cli.types import AXIS, Whole
 
@@ -38,6 +44,8 @@ _LONGEST = 64
     help="Velocities of the box, in SI rad/s.  [default: as n, w and p ask]",
 )
 @click.option("--grid", type=Whole(1, MOST_CELLS), help="Cells on each side of the box.")
+@draws_option
+@seed_option("Draws the models.")
 @progress_options
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)

@@ -25,9 +25,10 @@ __all__ = ["command"]
 )
 @click.option(
     "--layer",
-    help="One part alone: labels, settle, turns, exponent of basins; kinds, exponent, attractors,"
-    " period, winding, undecided, 'share KIND' of a map; history, energy, phase, section of a"
-    " trajectory; theta, velocity of a bifurcation diagram; omega-p, e-alpha2 of critical curves.",
+    help="One part alone: labels, settle, turns, exponent of basins, over draws probability and"
+    " entropy; kinds, exponent, attractors, period, winding, undecided, 'share KIND', over draws"
+    " certainty of a map; history, energy, phase, section of a trajectory; theta, velocity of a"
+    " bifurcation diagram; omega-p, e-alpha2 of critical curves.",
 )
 @click.option("--size", help="Width x height in inches, like 8x4.")
 @click.option("--dpi", type=click.IntRange(20, 1200), help="Pixels an inch of a .png.")

@@ -79,7 +79,10 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
     files = ((functools.partial(write, dataset), path) for write, path in _files(outputs))
     written = write_all(files)
     if outputs.as_json:
-        click.echo(json.dumps(plain(as_json(dataset)), allow_nan=False))
+        from pendmap.draws.said import fields
+
+        said = {"misses_record": dataset.attrs.get("misses_record"), **fields(dataset)}
+        click.echo(json.dumps(plain(as_json(dataset) | said), allow_nan=False))
     elif not outputs.quiet:
         click.echo(dataset.attrs["title"])
         click.echo(dataset.attrs["summary"])

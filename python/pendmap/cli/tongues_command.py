@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.model_options import model_from, model_options_without
-from pendmap.cli.options import Outputs, output_options, progress_options
+from pendmap.cli.options import (
+    Outputs,
+    draws_option,
+    output_options,
+    progress_options,
+    seed_option,
+)
 from pendmap.cli.show import progress_bar, show
 from pendmap.cli.types import NUMBER, VALUES
 
@@ -32,6 +38,8 @@ __all__ = ["command"]
     default="omega-p",
     help="What is drawn: that of eq. 1.2, or of eq. 1.4 with e = p/omega^2, alpha^2 = 1/omega^2.",
 )
+@draws_option
+@seed_option("Draws the models.")
 @progress_options
 @output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)

@@ -102,12 +102,13 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
-        Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map;
-        ``history``, ``energy``, ``phase`` or ``section`` of a trajectory; ``growth``, ``average``
-        or ``distribution`` of an exponent; ``survival`` or ``tail`` of a lifetime; ``theta`` or
-        ``velocity`` of a bifurcation diagram; of critical curves the plane: ``omega-p`` or
-        ``e-alpha2``; of a map over two parameters ``kinds``, ``exponent``, ``attractors``,
-        ``period``, ``winding``, ``undecided`` or ``share KIND``.
+        Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
+        over draws also ``probability`` and ``entropy``; ``history``, ``energy``, ``phase`` or
+        ``section`` of a trajectory; ``growth``, ``average`` or ``distribution`` of an exponent;
+        ``survival`` or ``tail`` of a lifetime; ``theta`` or ``velocity`` of a bifurcation diagram;
+        of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map over two parameters
+        ``kinds``, ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, over draws
+        ``certainty``, or ``share KIND``.
     size : (float, float), optional
         Width and height in inches; by default as large as the parts need.
     dpi : float, optional

@@ -44,7 +44,13 @@ _SHAPES = {"oscillation": "sPXph8", "inverted_rest": "D"}
 """Markers by kind; the further ones where the colours begin again."""
 
 _SECTION = "its attractor, once a period"
-_COLOUR_MAPS = {"settle": "viridis", "turns": "RdBu_r", "exponent": "magma"}
+_COLOUR_MAPS = {
+    "settle": "viridis",
+    "turns": "RdBu_r",
+    "exponent": "magma",
+    "probability": "cividis",
+    "entropy": "magma",
+}
 
 
 def figure(
@@ -210,9 +216,12 @@ def _scale(
 
     Settle time is logarithmic; net turns are symmetric about 0 and leave out the outermost
     two percent, so that a few long transients do not wash out the rest; so does the exponent.
+    Probabilities reach from 0 to 1, entropies from 0 on.
     """
-    if values.size == 0:
+    if values.size == 0 or layer == "probability":
         return Normalize(0.0, 1.0), "neither", None
+    if layer == "entropy":
+        return Normalize(0.0, max(float(values.max()), 1e-3)), "neither", None
     if layer == "settle":
         low, high = float(values.min()), float(values.max())
         high = max(high, low + 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
@@ -14,6 +15,7 @@ from pendmap.model.units import VELOCITY, Units
 from pendmap.pictures import layers as layering
 from pendmap.pictures import orbits as drawn
 from pendmap.pictures import plane
+from pendmap.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,11 +50,13 @@ def figure(
     if len(orbits) > len(named):
         texts.append(f"and {len(orbits) - len(named)} more")
         handles.append(Line2D([], [], linestyle="none"))
+    count = int(dataset.attrs.get("draws", 0))
+    over = f";   grey dots: {counted(count, 'draw')}" if count else ""
     sheet = Sheet(
         [Panel()],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
         title=drawn.title(dataset),
-        subtitle=layering.parameters(dataset.attrs),
+        subtitle=layering.parameters(dataset.attrs) + over,
         handles=handles,
         texts=texts,
         labels=(style.widest(*velocity), style.widest(*theta, angle=True)),
@@ -60,6 +64,10 @@ def figure(
         dpi=dpi,
     )
     axes = sheet.axes[0]
+    if count:
+        at = [dataset[f"drawn_{name}"].values.ravel() for name in ("theta", "velocity")]
+        points = plane.copies(dataset, np.stack(at, axis=1)[np.isfinite(at[0])], *theta)
+        axes.plot(points[:, 0], points[:, 1], ".", color=style.QUIET, markersize=3, zorder=3)
     for one in orbits:
         _orbit(axes, one, dataset, theta)
     style.phase_plane(axes, theta, velocity, units)

@@ -52,7 +52,8 @@ def figure(
     colormap: str | None,
 ) -> Figure:
     """Return the figure of a map over two parameters; see :func:`pendmap.figures.draw`."""
-    shown = (drawn.named(dataset, layer),) if layer else _LEADING
+    leading = ("kinds", "certainty") if "certainty" in dataset else _LEADING
+    shown = (drawn.named(dataset, layer),) if layer else leading
     if colormap is not None:
         style.colour_map(colormap)
     listed = drawn.kinds(dataset) if "kinds" in shown else []

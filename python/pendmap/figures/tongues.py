@@ -74,6 +74,7 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
     )
     axes.add_collection(upright)
     axes.add_collection(LineCollection(chart.undamped, colors=style.QUIET, linewidths=0.6))
+    axes.add_collection(LineCollection(chart.bands, colors=style.QUIET, linewidths=3.0, alpha=0.5))
     for multiplier, colour in drawn.COLOURS.items():
         thick = 1.5 if multiplier < 0 else 1.1
         both = [*chart.lines[multiplier], *chart.inverted_lines[multiplier]]
@@ -129,6 +130,9 @@ def _legend(chart: drawn.Chart, *, own: bool, damped: bool) -> tuple[list[Any], 
         if np.isnan(parts).all():
             continue
         entries.append((Line2D([], [], color=style.INK, linewidth=1.0, linestyle=look), name))
+    if chart.bands:
+        band = Line2D([], [], color=style.QUIET, linewidth=3.0, alpha=0.5)
+        entries.append((band, "95 % of the draws"))
     if _ends_in_view(chart):
         edge = Line2D([], [], color="#c8c8c8", linewidth=3.0)
         entries.append((edge, "largest p computed"))

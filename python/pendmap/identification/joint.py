@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.identification.clock import from_first
@@ -15,7 +18,6 @@ from pendmap.identification.runs import RodSensor
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from pendmap.model import Effect, Rig
@@ -44,6 +46,13 @@ class JointFit:
     fit: TrajectoryFit
     runs: tuple[Run, ...]
     readings: tuple[Reading, ...]
+
+    @property
+    def noise(self) -> float:
+        """Root mean square of the noise of the readings that count, rad."""
+        counts = [int(run.trusted.sum()) for run in self.runs]
+        square = np.average([reading.sigma**2 for reading in self.readings], weights=counts)
+        return math.sqrt(square)
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:

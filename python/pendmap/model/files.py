@@ -12,6 +12,7 @@ from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.files import read_toml, toml_text, whole_file
 from pendmap.model import quantities
+from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula, formulas_of
 from pendmap.model.pendulum import Pendulum
@@ -41,7 +42,8 @@ def load_model(
     may stand for ``gamma`` = 2 zeta. A key that is left out is 0. Each ``[[effect]]`` has a
     ``name`` and ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``; each
     ``[[formula]]`` is a :class:`Formula`, which effects may name; ``[covariance]`` and
-    ``[provenance]`` are kept as they are in the model's ``notes``.
+    ``[provenance]`` are kept as they are in the model's ``notes``; what is typed is known exactly,
+    and no longer part of the covariance.
 
     Parameters
     ----------
@@ -73,8 +75,10 @@ def load_model(
         effects = _effects(content.get("effect", []), formulas_of(content.get("formula", [])))
         notes: dict[str, Any] = {name: content[name] for name in _NOTES if name in content}
         if _is_si(table):
-            return Rig.of(**_typed_over(table, typed), effects=effects, notes=notes)
-        return _pendulum(table, typed, effects, notes)
+            exact = [_own_name(name) for name in typed]
+            numbers = _typed_over(table, typed)
+            return Rig.of(**numbers, effects=effects, notes=without(notes, exact))
+        return _pendulum(table, typed, effects, without(notes, typed))
     except InputError as error:
         raise InputError(f"{os.fspath(path)}: {error}") from None
 
@@ -180,6 +184,13 @@ def _instead(key: str) -> str:
     nearest = f", perhaps {near[0]} is meant" if near else ""
     without = ", ".join(_BARE)
     return f"{nearest}: allowed are {without}, or in SI {', '.join(_SI)}"
+
+
+def _own_name(name: str) -> str:
+    """Return what a :class:`Rig` calls a quantity that is typed."""
+    if name in COUNTERPARTS:
+        return COUNTERPARTS[name][0]
+    return next((own for own, ways in quantities.GROUPS.items() if name in ways), name)
 
 
 def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:

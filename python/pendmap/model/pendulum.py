@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.model.covariance import said_of
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula, FormulaKey
 from pendmap.model.units import NONDIMENSIONAL, Units
@@ -148,10 +149,11 @@ class Pendulum:
 
     @property
     def attributes(self) -> dict[str, float | str]:
-        """The parameters as a dataset's attributes; effects as JSON."""
+        """The parameters as a dataset's attributes, as of a :class:`pendmap.Rig`."""
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
         effects = {"effects": effects_json(self.effects)}
-        return {"units": self.units.name} | numbers | effects | self.angle_attributes
+        own = effects | self.angle_attributes | said_of(self.notes)
+        return {"units": self.units.name} | numbers | own
 
     @property
     def title(self) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.model import quantities
+from pendmap.model.covariance import said_of
 from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
 from pendmap.model.units import Units
 
@@ -225,13 +226,14 @@ class Rig:
         """The parameters as a dataset's attributes, in SI; effects as JSON.
 
         ``gamma``, ``omega``, ``phase`` and ``theta_r``, which have no dimensions whatever the
-        units, stand there too.
+        units, stand there too, and ``misses_record``, residual over noise, of a model that misses
+        the record it was fitted to.
         """
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
         pendulum = self.pendulum
         bare = {n: getattr(pendulum, n) for n in ("gamma", "omega", "phase", "theta_r")}
         effects = {"effects": effects_json(self.effects)} | pendulum.angle_attributes
-        return {"units": self.units.name} | numbers | bare | effects
+        return {"units": self.units.name} | numbers | bare | effects | said_of(self.notes)
 
     @property
     def title(self) -> str:

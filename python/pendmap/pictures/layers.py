@@ -47,6 +47,8 @@ VARIABLES = {
     "settle": "settle_periods",
     "turns": "net_turns",
     "exponent": "finite_time_exponent",
+    "probability": "certainty",
+    "entropy": "label_entropy",
 }
 """Layers by the name a user types, and the variable that holds each."""
 
@@ -69,6 +71,9 @@ _SI_SYMBOLS = {
     "Tr": ("Tr", "rad/s\N{SUPERSCRIPT TWO}"),
     "lab_time_s": ("lab time", "s"),
 }
+
+LABORATORY = {"stroke_mm": "p", "frequency_hz": "Omega"}
+"""What varies in a laboratory, and which of a rig's parameters it is."""
 
 
 def reliable(dataset: xr.Dataset) -> bool:
@@ -143,14 +148,17 @@ def layers(dataset: xr.Dataset) -> tuple[str, ...]:
 
     Usually labels, then settle time and net turns. Where the labels are unreliable, settle time and
     net turns come before them; where labels tell nothing, there are only the net turns and the
-    finite-time exponent. Settle time is left out where no start settles.
+    finite-time exponent. Settle time is left out where no start settles. Over draws of the
+    parameters the probability of the most likely end comes second.
     """
     if finite_time(dataset):
         order: tuple[str, ...] = ("turns", "exponent")
     elif reliable(dataset):
-        order = ("labels", "settle", "turns", "exponent")
+        order = ("labels", "probability", "settle", "turns", "exponent", "entropy")
     else:
-        order = ("settle", "turns", "labels", "exponent")
+        # Three of them lead, and the labels are one.
+        middle = ("labels", "turns") if "certainty" in dataset else ("turns", "labels")
+        order = ("settle", "probability", *middle, "exponent", "entropy")
     present = [layer for layer in order if VARIABLES[layer] in dataset]
     if "settle" in present and not settles(dataset):
         present.remove("settle")
@@ -175,6 +183,7 @@ def named(dataset: xr.Dataset, layer: str) -> str:
 def what(dataset: xr.Dataset, layer: str) -> str:
     """Return what a layer shows, in words, for a title."""
     periods = counted(int(dataset.attrs.get("layer_periods", 0)), "period")
+    draws = counted(int(dataset.attrs.get("draws", 0)), "draw")
     turns = "until settled"
     if finite_time(dataset):
         turns = f"after {periods}"
@@ -185,6 +194,8 @@ def what(dataset: xr.Dataset, layer: str) -> str:
         "settle": "settle time",
         "turns": f"net turns {turns}",
         "exponent": f"finite-time exponent over {periods}",
+        "probability": f"most likely end over {draws}",
+        "entropy": f"doubt of the end over {draws}",
     }[layer]
 
 
@@ -197,6 +208,8 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
         "settle": "periods to settle" if driven else f"periods of {own} to settle",
         "turns": "net turns",
         "exponent": f"exponent {names.per_time(units)}",
+        "probability": "probability",
+        "entropy": "entropy (nat)",
     }[layer]
 
 
@@ -212,6 +225,7 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
     Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
     there is no frequency and no phase; nor do those of ``without``, which vary.
     """
+    without = {LABORATORY.get(name, name) for name in without}
     driven = float(attrs.get("p", 1.0)) != 0.0 or "p" in without
     units = Units.of(attrs)
     symbols = _SI_SYMBOLS if units.si else {key: (text, "") for key, text in _SYMBOLS.items()}

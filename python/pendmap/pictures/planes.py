@@ -38,6 +38,7 @@ LAYERS = {
     "period": "period of what most starts end on",
     "winding": "turns in that period",
     "undecided": "share of the starts undecided",
+    "certainty": "probability of the most likely regime",
 }
 """Layers by the name a user types; ``share KIND`` is the share of the starts of a kind."""
 
@@ -223,8 +224,9 @@ def named(dataset: xr.Dataset, name: str) -> str:
         If there is none of that name.
     """
     shares = [f"share {kind}" for kind in dataset["kind"].values]
-    if name not in LAYERS and name not in shares:
-        allowed = ", ".join([*LAYERS, *shares])
+    known = [one for one in LAYERS if one != "certainty" or one in dataset]
+    if name not in known and name not in shares:
+        allowed = ", ".join([*known, *shares])
         raise InputError(f"no layer {name!r} in this map: allowed are {allowed}")
     return name
 

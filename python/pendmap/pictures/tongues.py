@@ -70,6 +70,8 @@ class Chart:
         For each name a curve that is near the exact one, broken by nan, and the rest of it.
     own : (float, float)
         The pendulum's point.
+    bands : list of ndarray, shape (2, 2)
+        Over draws of the parameters the interval of each critical amplitude.
     """
 
     names: tuple[str, str]
@@ -84,6 +86,7 @@ class Chart:
     fold: Floats
     asymptotic: dict[str, tuple[Floats, Floats]]
     own: tuple[float, float]
+    bands: list[Floats]
 
 
 def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
@@ -136,7 +139,18 @@ def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
         to(np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0]),
         asymptotic,
         (float(own[0]), float(own[1])),
+        [to(band) for prefix in ("", "inverted_") for band in _bands(dataset, prefix)],
     )
+
+
+def _bands(dataset: xr.Dataset, prefix: str) -> list[Floats]:
+    """Return the interval of each critical amplitude over draws, as points (omega, p)."""
+    if f"{prefix}p_low" not in dataset:
+        return []
+    low, high = (dataset[f"{prefix}p_{end}"].values for end in ("low", "high"))
+    omega = dataset["omega"].values[dataset[f"{prefix}index"].values]
+    ends = np.stack([np.stack([omega, low], axis=1), np.stack([omega, high], axis=1)], axis=1)
+    return [*ends[np.isfinite(low)]]
 
 
 def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tuple[float, int]]]:

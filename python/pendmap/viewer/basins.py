@@ -26,11 +26,13 @@ CELLS = 4096
 SAMPLE = 1000
 """Rows and columns of the sample from which the limits of a colour scale are taken."""
 
-ROOTS = {"labels": "basin", "settle": "settle", "turns": "turns", "exponent": "exponent"}
+_SAME = {name: name for name in ("turns", "exponent", "probability", "entropy")}
+ROOTS = {"labels": "basin", "settle": "settle"} | _SAME
 """Where each layer is logged."""
 
-_LEAF = {"labels": "labels", "settle": "steps", "turns": "turns", "exponent": "exponent"}
+_LEAF = {"labels": "labels", "settle": "steps"} | _SAME
 _COLOUR_MAPS = {"settle": "viridis", "exponent": "magma"}
+_COLOUR_MAPS |= {"probability": "viridis", "entropy": "magma"}
 _TURNS_MOST = 30000
 
 
@@ -152,6 +154,18 @@ def _exponent(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Fra
         low, high = low - 0.5, high + 0.5
     _scalar(stream, around, "exponent", values, (low, high))
     _cover(stream, dataset, around, "exponent", absent)
+
+
+def _probability(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
+    """Log the probability of the most likely end of each cell over draws of the parameters."""
+    values = plane.pixels(dataset, dataset["certainty"], CELLS)
+    _scalar(stream, around, "probability", values, (0.0, 1.0))
+
+
+def _entropy(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
+    """Log the entropy of the end of each cell over draws of the parameters."""
+    values = plane.pixels(dataset, dataset["label_entropy"], CELLS)
+    _scalar(stream, around, "entropy", values, (0.0, max(float(values.max()), 1e-3)))
 
 
 def _scalar(
@@ -311,4 +325,11 @@ def _legend(dataset: xr.Dataset, listed: list[legend.Entry]) -> str:
     return "\n".join(lines)
 
 
-_LOGS = {"labels": _labels, "settle": _settle, "turns": _turns, "exponent": _exponent}
+_LOGS = {
+    "labels": _labels,
+    "settle": _settle,
+    "turns": _turns,
+    "exponent": _exponent,
+    "probability": _probability,
+    "entropy": _entropy,
+}

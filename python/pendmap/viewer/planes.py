@@ -30,7 +30,7 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
     """Return the layout: a tab a layer, legend and summary beside it."""
     around = _frame(dataset)
     tabs = [around.view("kinds", "Kinds of attractor; stripes: they coexist")]
-    for one in _FIELDS:
+    for one in _fields(dataset):
         text = drawn.said(dataset, one)
         tabs.append(around.view(one, text[0].upper() + text[1:]))
     aside = rrb.Vertical(
@@ -64,7 +64,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     if curves:
         lines += ["", f"Black lines: {'; '.join(curves)}."]
     frame.text(stream, "legend", "\n".join(lines))
-    for one in _FIELDS:
+    for one in _fields(dataset):
         values = drawn.layer(dataset, one, CELLS)
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
@@ -83,6 +83,11 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
         bar = np.linspace(low, high, 256)
         colours = palette.diverging((bar - middle) / half).reshape(256, 1, 3)
         around.bar(stream, one, rr.Image(colours), low=low, high=high)
+
+
+def _fields(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Return the layers beside the kinds; over draws also how sure they are."""
+    return (*(("certainty",) if "certainty" in dataset else ()), *_FIELDS)
 
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:

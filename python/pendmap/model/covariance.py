@@ -1,0 +1,145 @@
+"""The table ``[covariance]`` of a model's notes: what was fitted, and how well it is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap import checks
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from numpy.typing import NDArray
+
+__all__ = ["Covariance", "covariance_of", "misses", "said_of", "without"]
+
+MISSES: Final = 1.5
+"""Residual over noise above which a model misses its record."""
+
+_ROUNDING: Final = 1e-9
+"""Negative eigenvalues of a correlation that are no more than rounding."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Covariance:
+    """What was fitted, and how well it is known.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The parameters, in the model's own units: ``w0``, ``EFFECT.PARAMETER``, ...
+    matrix : ndarray of float, shape (K, K)
+        Their covariance, the variance between runs included.
+    """
+
+    names: tuple[str, ...]
+    matrix: NDArray[np.float64]
+
+    @property
+    def root(self) -> NDArray[np.float64]:
+        """Return ``A``, shape (K, K), with ``A A^T`` the matrix.
+
+        Raises
+        ------
+        InputError
+            If there is none: a variance is negative, or a correlation impossible.
+        """
+        size = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
+        scale = np.where(size > 0, size, 1.0)
+        values, vectors = np.linalg.eigh(self.matrix / np.outer(scale, scale))
+        if values.size and values.min() < -_ROUNDING * len(size):
+            raise InputError(
+                f"covariance: matrix must be positive semidefinite, got a correlation matrix with "
+                f"the eigenvalue {values.min():.3g}"
+            )
+        return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
+    """Return what the notes of a model hold of its uncertainty; none where they hold nothing.
+
+    ``[covariance]`` has ``names`` and ``matrix``, and may have ``between_runs``, standard
+    deviations between runs by name, whose squares are added to the diagonal. What belongs to
+    single runs (``phi[2]``) or to a sensor is left out: the rest is the marginal distribution.
+
+    Parameters
+    ----------
+    notes : mapping
+        As of :class:`pendmap.Rig`.
+
+    Raises
+    ------
+    InputError
+        If the table is not of that form.
+    """
+    if "covariance" not in notes:
+        return None
+    table = notes["covariance"]
+    names, rows = table.get("names"), table.get("matrix")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"covariance: names must be a list of names, got {checks.shown(names)}")
+    try:
+        matrix = np.asarray(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        matrix = np.full((1, 1), np.nan)
+    shape = (len(names), len(names))
+    if matrix.shape != shape or not np.isfinite(matrix).all():
+        raise InputError(f"covariance: matrix must be {shape[0]} x {shape[1]} finite numbers")
+    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=0.0):
+        raise InputError("covariance: matrix must be symmetric")
+    matrix = 0.5 * (matrix + matrix.T)
+    between = table.get("between_runs", {})
+    if not isinstance(between, dict) or not set(between) <= set(names):
+        raise InputError(
+            f"covariance: between_runs must be a table of names among {', '.join(names)}"
+        )
+    for name, deviation in between.items():
+        matrix[names.index(name), names.index(name)] += checks.number(name, deviation) ** 2
+    kept = [k for k, name in enumerate(names) if "[" not in name and name not in ("bias", "tilt")]
+    return Covariance(tuple(names[k] for k in kept), matrix[np.ix_(kept, kept)])
+
+
+def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
+    """Return notes whose covariance has no more of the parameters that are known exactly."""
+    try:
+        known = covariance_of(notes)
+    except InputError:  # said where it is drawn from
+        known = None
+    if known is None or not set(known.names) & set(exact):
+        return dict(notes)
+    table, names = notes["covariance"], notes["covariance"]["names"]
+    kept = [k for k, name in enumerate(names) if name not in exact]
+    parts = {
+        key: {name: part for name, part in table[key].items() if name not in exact}
+        for key in ("ci95", "between_runs")
+        if isinstance(table.get(key), dict)
+    }
+    cut = {
+        "names": [names[k] for k in kept],
+        "matrix": [[table["matrix"][j][k] for k in kept] for j in kept],
+    }
+    return {**notes, "covariance": table | cut | parts}
+
+
+def misses(notes: Mapping[str, Any]) -> float:
+    """Return residual over noise where a model misses the record it was fitted to; else nan.
+
+    ``[provenance]`` has both: ``rms`` and ``noise``, rad. It misses where ``rms > 1.5 noise``.
+    """
+    table = notes.get("provenance", {})
+    rms, noise = (table.get(name) for name in ("rms", "noise"))
+    if not all(isinstance(x, int | float) and x > 0 for x in (rms, noise)):
+        return math.nan
+    ratio = float(rms) / float(noise)
+    return ratio if ratio > MISSES else math.nan
+
+
+def said_of(notes: Mapping[str, Any]) -> dict[str, float | str]:
+    """Return the attribute ``misses_record`` of a dataset, where a model misses its record."""
+    ratio = misses(notes)
+    return {"misses_record": ratio} if math.isfinite(ratio) else {}

@@ -1,0 +1,218 @@
+"""Models drawn from a covariance, and basins over them, against what is known of both."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.stats import norm, truncnorm
+
+import pendmap
+from pendmap import Axis, Effect, Grid, InputError, Pendulum, Rig
+from pendmap.draws import Draws, drawn
+from pendmap.draws.basins import basins_over
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+SEED = 3
+
+
+def noted(names: Sequence[str], matrix: Any, **more: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Notes with a covariance, as a model file has them."""
+    return {"covariance": {"names": [*names], "matrix": np.asarray(matrix).tolist(), **more}}
+
+
+def test_draws_have_the_mean_and_covariance_of_the_file() -> None:
+    matrix = np.array([[4e-4, 3e-5, 0.0], [3e-5, 9e-6, 0.0], [0.0, 0.0, 1.0]])
+    notes = noted(["w0", "torque", "phi[2]"], matrix)
+    found = drawn(Rig(w0=6.2, torque=0.1, notes=notes), 4000, SEED)
+    assert found.names == ("w0", "torque")
+    assert found.values.mean(axis=0) == pytest.approx([6.2, 0.1], abs=4 * 0.02 / math.sqrt(4000))
+    assert np.cov(found.values.T) == pytest.approx(matrix[:2, :2], rel=0.1)
+    assert [one.w0 for one in found.models] == found.values[:, 0].tolist()
+    assert all(one.phi == 0 for one in found.models)
+
+
+def test_the_spread_between_runs_adds_to_the_variance() -> None:
+    notes = noted(["w0"], [[9e-6]], between_runs={"w0": 0.004})
+    found = drawn(Rig(w0=6.2, notes=notes), 4000, SEED)
+    assert found.values.std() == pytest.approx(0.005, rel=0.05)
+
+
+def test_a_few_draws_are_the_first_of_many() -> None:
+    rig = Rig(w0=6.2, notes=noted(["w0"], [[1e-4]]))
+    assert np.array_equal(drawn(rig, 5, SEED).values, drawn(rig, 50, SEED).values[:5])
+    assert not np.array_equal(drawn(rig, 5, SEED).values, drawn(rig, 5, SEED + 1).values)
+
+
+@pytest.mark.parametrize("name", ["c_over_m", "Tr", "quadratic_drag.q"])
+def test_what_opposes_the_motion_is_drawn_from_the_gaussian_cut_off_at_0(name: str) -> None:
+    own = {"c_over_m": 0.01, "Tr": 0.01} | noted([name], [[4e-4]])
+    notes = {"covariance": own.pop("covariance")}
+    drag = Effect("quadratic_drag", {"q": 0.01})
+    rig = Rig(w0=6.2, effects=(drag,), notes=notes, **own)
+    values = drawn(rig, 4000, SEED).values[:, 0]
+    assert values.min() >= 0
+    expected = truncnorm(-0.5, math.inf, loc=0.01, scale=0.02)
+    assert values.mean() == pytest.approx(expected.mean(), abs=4 * expected.std() / math.sqrt(4000))
+    assert values.std() == pytest.approx(expected.std(), rel=0.08)
+
+
+def test_what_may_have_either_sign_is_drawn_with_both() -> None:
+    bias = Effect("bias_torque", {"torque": 0.0})
+    rig = Rig(w0=6.2, effects=(bias,), notes=noted(["bias_torque.torque"], [[1e-4]]))
+    values = drawn(rig, 400, SEED).values
+    assert 120 < (values < 0).sum() < 280
+
+
+@pytest.mark.parametrize(
+    ("notes", "said"),
+    [
+        ({}, r"draws: the model must have a \[covariance\]"),
+        (noted(["w0"], [[1.0, 0.0]]), "matrix must be 1 x 1 finite numbers"),
+        (noted(["w0", "Tr"], [[1.0, 2.0], [2.0, 1.0]]), "must be positive semidefinite"),
+        (noted(["w0", "Tr"], [[1.0, 0.5], [0.4, 1.0]]), "must be symmetric"),
+        (noted(["friction"], [[1.0]]), "'friction' must be a parameter of the model"),
+        (noted(["w0"], [[1.0]], between_runs={"Tr": 1.0}), "must be a table of names among w0"),
+        (noted(["w0"], [[1e20]]), "must leave room for allowed values"),
+    ],
+)
+def test_what_cannot_be_drawn_from_is_refused(notes: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        drawn(Rig(w0=1e-3, notes=notes), 200, SEED)
+
+
+def test_what_is_typed_is_known_exactly(tmp_path: Any) -> None:  # noqa: ANN401
+    notes = noted(["w0", "c_over_m", "p", "Omega"], np.diag([1.0, 2.0, 3.0, 4.0]) * 1e-6)
+    path = tmp_path / "model.toml"
+    pendmap.save_model(Rig(w0=6.2, c_over_m=0.1, p=0.5, Omega=12.0, notes=notes), path)
+    typed = {"gamma": 0.1, "stroke_mm": 30.0}
+    assert drawn(pendmap.load_model(path, typed), 2, SEED).names == ("w0", "Omega")
+    assert drawn(pendmap.load_model(path), 2, SEED).names == ("w0", "c_over_m", "p", "Omega")
+
+
+def boundary(gamma: float, torque: float, velocity: float) -> float:
+    """The angle at which starts with this velocity begin to turn for ever, by scipy."""
+
+    def turns(theta: float) -> float:
+        def equation(_: float, state: np.ndarray) -> list[float]:
+            return [state[1], torque - gamma * state[1] - math.sin(state[0])]
+
+        run = solve_ivp(equation, (0, 60), [theta, velocity], method="DOP853", rtol=1e-11)
+        return 1.0 if run.y[0, -1] - theta > 8 * math.pi else -1.0
+
+    return float(brentq(turns, 1.0, 2.7, xtol=1e-9))
+
+
+def test_a_boundary_that_moves_with_a_parameter_makes_its_distribution_function() -> None:
+    """A tilt by d moves the plane of an undriven pendulum by -d, and the boundary with it."""
+    gamma, torque, velocity, sigma, count = 0.3, 0.6, 0.4, 0.04, 60
+    edge = boundary(gamma, torque, velocity)
+    tilt = Effect("rig_tilt", {"d": 0.0})
+    notes = noted(["rig_tilt.d"], [[sigma**2]])
+    pendulum = Pendulum(gamma=gamma, p=0.0, torque=torque, effects=(tilt,), notes=notes)
+    half = 0.2
+    grid = Grid(Axis(edge - half, edge + half, 101), Axis(velocity - 1e-9, velocity + 1e-9, 1))
+    result = pendmap.basins(pendulum, grid, draws=count, seed=SEED)
+    names = [str(name) for name in result.outcome.values]
+    assert names == ["rest", "rotation 1:+1"]
+    rests = result.probability.values[0, 0]
+    theta, tilts = result.theta.values, result.drawn.values[:, 0]
+    # Draw by draw.
+    exact = np.array([(x + tilts < edge).mean() for x in theta])
+    near = np.abs(theta[:, None] + tilts - edge).min(axis=1) < 1e-5
+    assert np.array_equal(rests[~near], exact[~near].astype(np.float32))
+    # The law: the normal distribution function, within four standard errors.
+    law = norm.cdf((edge - theta) / sigma)
+    assert np.abs(rests - law).max() < 4 * 0.5 / math.sqrt(count)
+    assert np.abs(rests - law).max() > 0
+    assert result.certainty.values[0] == pytest.approx(np.maximum(rests, 1 - rests))
+    # The share is the boundary's place over the window: its interval is slope times standard error.
+    low, high = float(result.share_low[0]), float(result.share_high[0])
+    assert high - low == pytest.approx(2 * 1.96 * sigma / (2 * half), rel=0.25)
+    assert float(result.share_mean[0]) == pytest.approx(0.5, abs=4 * sigma / 0.4 / math.sqrt(60))
+    assert result.attrs["summary"].count("60 draws of rig_tilt.d") == 1
+
+
+def painted(label: np.ndarray, names: Sequence[str]) -> xr.Dataset:
+    """A map with these labels."""
+    rows, columns = label.shape
+    count = len(names)
+    return xr.Dataset(
+        {
+            "label": (("velocity", "theta"), label.astype(np.int16)),
+            "id": ("attractor", np.arange(1, count + 1)),
+            "point_attractor": ("point", np.arange(1, count + 1)),
+            "point_theta": ("point", np.arange(count, dtype=float)),
+            "point_velocity": ("point", np.zeros(count)),
+        },
+        coords={
+            "attractor": [*names],
+            "theta": np.arange(columns, dtype=float),
+            "velocity": np.arange(rows, dtype=float),
+        },
+        attrs={"summary": "", "kind": "basins"},
+    )
+
+
+def gathered(maps: Sequence[xr.Dataset]) -> xr.Dataset:
+    """What is gathered of these maps, one a draw."""
+    models = tuple(Pendulum(gamma=0.1 + 0.001 * k) for k in range(len(maps)))
+    values = np.array([[one.gamma] for one in models])
+    draws = Draws(("gamma",), values, models, 0)
+    own = dict(zip(models, maps, strict=True))
+    return basins_over(maps[0], draws, lambda model, _: own[model], None)
+
+
+def test_what_is_fractal_is_told_from_what_the_parameters_do() -> None:
+    random = np.random.default_rng(SEED)
+    still = np.where(np.arange(50) < 23, 1, 2)[None].repeat(50, axis=0)
+    names = ["rest", "rotation 1:+1"]
+    fixed = gathered([painted(still, names)] * 8)
+    entropy = pendmap.basin_entropy(still).value
+    assert entropy > 0.05
+    assert fixed.attrs["doubt_start"] == pytest.approx(entropy)
+    assert fixed.attrs["doubt_parameters"] == pytest.approx(0, abs=1e-12)
+    assert fixed.attrs["sure_cells"] == 1
+    assert float(fixed.label_entropy.max()) == 0
+    # All starts end alike, here or there as the draw says.
+    flips = gathered([painted(np.full((50, 50), 1 + k % 2), names) for k in range(8)])
+    assert flips.attrs["doubt_start"] == 0
+    assert flips.attrs["doubt_parameters"] == pytest.approx(math.log(2))
+    assert flips.label_entropy.values == pytest.approx(math.log(2))
+    # Every cell changes from draw to draw, and from cell to cell: a draw tells nothing of a box.
+    mixed = [random.integers(1, 3, (50, 50)) for _ in range(200)]
+    fractal = gathered([painted(label, names) for label in mixed])
+    each = np.mean([pendmap.basin_entropy(label).value for label in mixed])
+    assert fractal.attrs["doubt_start"] == pytest.approx(each)
+    assert fractal.attrs["doubt_parameters"] == pytest.approx(1 / 50, rel=0.15)
+    assert fractal.attrs["sure_cells"] == 0
+
+
+def test_attractors_are_found_again_by_name_whatever_their_numbers() -> None:
+    left = np.where(np.arange(10) < 4, 1, 2)[None].repeat(10, axis=0)
+    one = painted(left, ["rest", "rotation 1:+1"])
+    other = painted(3 - left, ["rotation 1:+1", "oscillation 2:0"])
+    none = painted(np.zeros((10, 10)), [])
+    found = gathered([one, one, other, none])
+    assert [*found.outcome.values] == ["rest", "rotation 1:+1", "oscillation 2:0", "undecided"]
+    assert found.share_mean.values == pytest.approx([0.2, 0.45, 0.1, 0.25])
+    assert found.exists.values == pytest.approx([0.5, 0.75, 0.25, 0.25])
+    assert found.probability.values.sum(axis=0) == pytest.approx(1)
+
+
+def test_two_attractors_of_one_name_are_told_apart_by_their_places() -> None:
+    label = np.where(np.arange(10) < 4, 1, 2)[None].repeat(10, axis=0)
+    names = ["oscillation 2:0 at +0.1000", "oscillation 2:0 at +0.9000"]
+    own = painted(label, names)
+    moved = painted(3 - label, ["oscillation 2:0 at -0.2000", "oscillation 2:0 at +1.1000"])
+    moved["point_theta"] = ("point", np.array([1.1, -0.2]))
+    found = gathered([own, own, moved])
+    assert [*found.outcome.values] == names
+    assert found.share_mean.values == pytest.approx([0.4, 0.6])
