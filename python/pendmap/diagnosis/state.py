@@ -182,13 +182,13 @@ class State:
 
         The given model stands where none is as good as the best accepted one.
         """
-        reach = self._best.chi2 + self.thresholds.alike * self.level
+        reach = max(self._best.chi2 + self.thresholds.alike * self.level, best.chi2)
 
         def order(trial: Trial) -> tuple[float, ...]:
             common = sum(commonness(name) for name in trial.names)
             return trial.adapted, common, trial.chi2
 
-        alike = [t for t in self._fits.values() if t.chi2 < reach and self.room(t) >= 0]
+        alike = [t for t in self._fits.values() if t.chi2 <= reach and self.room(t) >= 0]
         for trial in sorted((best, *alike), key=order):
             if trial is best or self.holds(best, trial, self.thresholds.alike):
                 return trial

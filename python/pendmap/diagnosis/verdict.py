@@ -13,6 +13,8 @@ from pendmap.diagnosis.form import Form, form_of
 from pendmap.diagnosis.alternatives import Standing, standing_of
 
 if TYPE_CHECKING:
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.runs import RunByRun
     from pendmap.diagnosis.state import Found, State
 
@@ -115,7 +117,7 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
             key=lambda s: -s.gain,
         )
     )
-    spread = runs.spread(standings[0].candidate.free[0]) if standings else 0.0
+    spread = _spread(trial, runs, standings[0].candidate) if standings else 0.0
     sure = complete(form.chance, [s.gain for s in standings]) if standings else 1.0
     verdict: Verdict
     if not standings:
@@ -141,6 +143,12 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
         sure,
         verdict == "partial" or sure < limits.sure,
     )
+
+
+def _spread(trial: Trial, runs: RunByRun, candidate: Candidate) -> float:
+    """Return the standard deviation of an effect's size between the runs, over the size."""
+    size = candidate.free[0]
+    return runs.between(size) / max(abs(trial.fit[size]), 1e-300)
 
 
 def _closed(state: State, best: Found) -> float:
