@@ -203,9 +203,10 @@ impl Follow<'_> {
             }
             let (of_angle, of_velocity) =
                 slopes[2 * k * stride..2 * (k + 1) * stride].split_at(stride);
+            let lab = self.shaped.pendulum.lab_time + record.times[sample];
             let read = sensor
                 .as_ref()
-                .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given));
+                .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given, lab));
             let away = record.readings[sample] - read.value;
             let (weight, residual) = match &record.counts {
                 None => {
@@ -247,7 +248,8 @@ impl Sensor {
         }))
     }
 
-    fn read(&self, state: State) -> Tangent<f64, READINGS> {
-        self.0.read(Tangent::seeded(state[0], 0), Tangent::seeded(state[1], 1))
+    fn read(&self, state: State, lab: f64) -> Tangent<f64, READINGS> {
+        let [theta, velocity] = [0, 1].map(|of| Tangent::seeded(state[of], of));
+        self.0.read(theta, velocity, theta.like(lab))
     }
 }

@@ -46,8 +46,10 @@ pub fn replay(
             return Err(Error::Interrupted);
         }
         done();
-        let reading = |[theta, velocity]: &State| observation.read(*theta, *velocity);
-        Ok(run.states.iter().map(reading).collect())
+        let reading = |([theta, velocity], tau): (&State, &f64)| {
+            observation.read(*theta, *velocity, pendulum.lab_time + tau)
+        };
+        Ok(run.states.iter().zip(times).map(reading).collect())
     };
     starts.par_iter().map(one).collect()
 }

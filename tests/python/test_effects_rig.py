@@ -26,6 +26,7 @@ GAMMA, THETA_R, P, OMEGA = 0.05, 0.03, 0.6, 2.0
 
 EFFECTS = {
     "asymmetric_coulomb": {"d": 0.01},
+    "eddy_brake": {"b": 0.1, "vc": 0.7},
     "rough_spot": {"f": 0.05, "th0": 0.3, "w": 0.2},
     "inertia_ripple": {"e": 0.1, "n": 2.0, "psi": 0.4},
     "added_mass": {"e": 0.1},
@@ -43,6 +44,8 @@ def acceleration(name: str, tau: float, theta: float, v: float, sign: float) -> 
     match name:
         case "asymmetric_coulomb":
             friction += values["d"] * sign
+        case "eddy_brake":
+            own = -values["b"] * v / (1 + (v / values["vc"]) ** 2)
         case "rough_spot":
             away = 1 - math.cos(theta - values["th0"])
             friction += values["f"] * math.exp(-away / values["w"] ** 2)
@@ -109,7 +112,7 @@ def clean(folder: Path, effect: str) -> tuple[Evidence, dict[str, float]]:
     return dataclasses.replace(found, fitted=exact, held=held), truth["parameters"]
 
 
-@pytest.mark.parametrize("name", [*EFFECTS, "sensor_lag"])
+@pytest.mark.parametrize("name", [*EFFECTS, "sensor_lag", "encoder_drift"])
 def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path) -> None:
     evidence, truth = clean(tmp_path, name)
     base = baseline(evidence)
@@ -119,6 +122,10 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
     if unit.phase is not None:
         start[f"{name}.{unit.phase}"] = truth[unit.phase]
     model, free = placed(base.fit.model, [unit]), [*base.free, *unit.free]
+    if name == "eddy_brake":
+        # A velocity has units: it is found beside the size, from elsewhere.
+        free += unit.adapted
+        start["eddy_brake.vc"] = 0.8 * truth["vc"]
     found = fitted(evidence, model, free, (unit,), start=start).fit
     # Of a lag the second power of tau is left.
     assert found.rms < (1e-5 if name == "sensor_lag" else 1e-8)
@@ -128,3 +135,5 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
         # A negative size is a positive one half a turn on.
         near *= math.cos(found[f"{name}.{unit.phase}"] - truth[unit.phase])
     assert near == pytest.approx(truth[size], rel=0.02 if name == "sensor_lag" else 1e-4)
+    if name == "eddy_brake":
+        assert found["eddy_brake.vc"] == pytest.approx(truth["vc"], rel=1e-6)

@@ -157,10 +157,16 @@ fn a_bias_needs_a_sensor_on_the_rod() {
 
 #[test]
 fn derivatives_hold_for_forced_motion_with_sticks() {
-    let pendulum = with(
+    let mut pendulum = with(
         driven(0.1, 1.5, 0.87).with_friction(0.2).expect("in range"),
-        &[(Kind::DriveFrequency, &[0.01]), (Kind::EncoderGain, &[0.01])],
+        &[
+            (Kind::DriveFrequency, &[0.01]),
+            (Kind::EncoderGain, &[0.01]),
+            (Kind::EncoderDrift, &[0.002]),
+            (Kind::EddyBrake, &[0.02, 0.8]),
+        ],
     );
+    pendulum.lab_time = 20.0;
     let start = [-0.43, 1.03];
     let error = worst(record(pendulum, None, start, 15.0), None, start);
     assert!(error < 1e-6, "{error:e}");

@@ -43,6 +43,7 @@ impl Kind {
             | Self::QuadraticDrag
             | Self::CubicDamping
             | Self::PowerLawDrag
+            | Self::EddyBrake
             | Self::AsymmetricViscous
             | Self::ViscousDrift
             | Self::ViscousWarmUp => Family::Damping,
@@ -68,6 +69,7 @@ impl Kind {
             | Self::DriveSecondHarmonic
             | Self::LateralDrive => Family::Drive,
             Self::EncoderOffset
+            | Self::EncoderDrift
             | Self::EncoderGain
             | Self::EncoderEccentricity
             | Self::SensorLag

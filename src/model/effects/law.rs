@@ -292,9 +292,10 @@ pub trait Law {
         at.constant(0.0)
     }
 
-    /// What a sensor reads at the angle `theta`, passing it at `velocity`.
+    /// What a sensor reads at the angle `theta`, passing it at `velocity` at the laboratory's time
+    /// `lab`.
     #[inline(always)]
-    fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R, _: R) -> R {
+    fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {
         theta
     }
 

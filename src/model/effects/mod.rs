@@ -108,9 +108,10 @@ macro_rules! library {
                 parameters: &[R; MOST_PARAMETERS],
                 theta: R,
                 velocity: R,
+                lab: R,
             ) -> R {
                 match self {
-                    $(Self::$law => $module::$law::reading(parameters, theta, velocity),)*
+                    $(Self::$law => $module::$law::reading(parameters, theta, velocity, lab),)*
                     Self::Formula(_) => theta,
                 }
             }
@@ -151,6 +152,7 @@ library! {
     quadratic_drag::QuadraticDrag,
     cubic_damping::CubicDamping,
     power_law_drag::PowerLawDrag,
+    eddy_brake::EddyBrake,
     stribeck_friction::StribeckFriction,
     load_dependent_friction::LoadDependentFriction,
     asymmetric_viscous::AsymmetricViscous,
@@ -175,6 +177,7 @@ library! {
     drive_second_harmonic::DriveSecondHarmonic,
     lateral_drive::LateralDrive,
     encoder_offset::EncoderOffset,
+    encoder_drift::EncoderDrift,
     encoder_gain::EncoderGain,
     encoder_eccentricity::EncoderEccentricity,
     sensor_lag::SensorLag,
