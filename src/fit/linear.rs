@@ -164,7 +164,8 @@ impl Follow<'_> {
                 None => *state,
                 Some(sensor) => {
                     let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
-                    let reading = sensor.read(&course, times[k], *state, run.signs[k], own);
+                    let moving = run.signs[k].map(|signs| (signs, run.pasts[k]));
+                    let reading = sensor.read(&course, times[k], *state, moving, own);
                     [reading, reading.like(0.0)]
                 }
             };

@@ -13,6 +13,8 @@ pub struct Sampled<N> {
     pub states: Vec<[N; 2]>,
     /// The sense of the motion and the side of a corner at each time; none where it does not move.
     pub signs: Vec<Option<[f64; 2]>>,
+    /// The angle of the last turn before each time, and what an effect kept there.
+    pub pasts: Vec<[N; 2]>,
     /// Turns, sticks and releases up to the last time.
     pub events: Vec<Event>,
     /// Whether friction holds the pendulum at the last time.
@@ -38,6 +40,7 @@ pub fn sample<N: Number>(
     let at_start = times.iter().take_while(|time| **time <= tau).count();
     states.extend(std::iter::repeat_n(flight.state, at_start));
     let mut signs = vec![flight.signs_held(); at_start];
+    let mut pasts = vec![flight.leap.past; at_start];
     let mut curve = Curve::none(flight.state);
     while let Some(piece) = flight.advance() {
         let done = states.len();
@@ -48,6 +51,7 @@ pub fn sample<N: Number>(
                 flight.leap.trace(course.field(), &mut curve);
             }
             signs.resize(done + due, moves.then_some(flight.leap.signs));
+            pasts.resize(done + due, flight.leap.past);
             for time in &times[done..done + due] {
                 let within = moves && *time < flight.tau;
                 states.push(if within { curve.at(*time) } else { flight.state });
@@ -60,6 +64,7 @@ pub fn sample<N: Number>(
     let lost = flight.state.map(|x| x.reset(f64::NAN, 1.0));
     states.resize(times.len(), lost);
     signs.resize(times.len(), None);
+    pasts.resize(times.len(), lost);
     let stuck = flight.is_stuck();
-    Sampled { states, signs, stuck, steps: flight.steps, events: flight.events }
+    Sampled { states, signs, pasts, stuck, steps: flight.steps, events: flight.events }
 }

@@ -121,6 +121,7 @@ impl<R: Real> Equation<R> {
             per_gravity: zero,
             lab: zero,
             phase: zero,
+            past: [zero; 2],
         };
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
@@ -257,7 +258,27 @@ impl<R: Real> Equation<R> {
     ) -> Point<R> {
         let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
         let Forcing { vertical, per_gravity, lab, phase, .. } = *forcing;
-        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase }
+        let past = [theta, sense];
+        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase, past }
+    }
+
+    /// Whether an effect keeps something of the motion.
+    #[must_use]
+    pub fn remembers(&self) -> bool {
+        let at = self.point(&self.forcing(self.gamma), self.gamma, self.gamma, self.gamma);
+        self.kept(&at).is_some()
+    }
+
+    /// What an effect keeps of the motion; none where no effect does.
+    #[inline(always)]
+    pub fn kept(&self, at: &Point<R>) -> Option<R> {
+        for (kind, parameters) in &self.torques {
+            let kept = kind.kept(parameters, at);
+            if kept.is_some() {
+                return kept;
+            }
+        }
+        None
     }
 
     /// The function at whose zeros an effect has a corner; none where no effect has.

@@ -124,6 +124,8 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
         ("cubic_damping", [k3]) => own = -k3 * velocity.powi(3),
         ("power_law_drag", [q, n]) => own = -q * speed.powf(*n) * sign,
         ("eddy_brake", [b, vc]) => own = -b * velocity * vc * vc / (vc * vc + velocity * velocity),
+        // After a long way in one sense.
+        ("dahl_friction", [f, _]) => own = -f * sign,
         ("stribeck_friction", [a, vs]) => own = -a * (-(velocity / vs).powi(2)).exp() * sign,
         ("load_dependent_friction", [k]) => {
             let load = (1.0 + up) * theta.cos() + (velocity / w0).powi(2);

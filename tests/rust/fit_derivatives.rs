@@ -149,6 +149,34 @@ fn derivatives_hold_for_what_sensors_on_the_rod_read() {
 }
 
 #[test]
+fn derivatives_hold_where_a_contact_yields() {
+    let dahl: (Kind, &[f64]) = (Kind::DahlFriction, &[0.05, 0.1]);
+    let start = [1.2, -0.1];
+    // To swings far smaller than the contact yields.
+    let decay = with(undriven(0.02, 0.0), &[dahl, (Kind::QuadraticDrag, &[0.01])]);
+    let error = worst(record(decay, None, start, 60.0), None, start);
+    assert!(error < 1e-6, "{error:e}");
+    // Held fast now and then, and seen by an accelerometer.
+    let rubbing = with(driven(0.05, 0.9, 0.87).with_friction(0.1).expect("in range"), &[dahl]);
+    let mut record = record(rubbing.clone(), None, start, 30.0);
+    let course = Course::new(&rubbing, true, TOLERANCE, |_, value| value);
+    let events = sample(&course, 0.0, start, &[30.0], |_, _| true).events;
+    assert!(events.iter().any(|event| event.kind == EventKind::Release), "{events:?}");
+    let error = worst(record.clone(), None, start);
+    assert!(error < 1e-6, "{error:e}");
+    record.rod_sensor = Some(RodSensor {
+        rate: 0.0,
+        place: 1.0,
+        gravity: 1.0,
+        bias: 0.0,
+        interval: 0.0,
+        tilt: 0.1,
+    });
+    let error = worst(record, None, start);
+    assert!(error < 1e-6, "{error:e}");
+}
+
+#[test]
 fn a_bias_needs_a_sensor_on_the_rod() {
     let record = record(undriven(0.02, 0.0), None, [1.0, 0.0], 20.0);
     let fault = Problem::new(vec![record], free(&[Slot::Bias], 1, &[0.0]), TOLERANCE);

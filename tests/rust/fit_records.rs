@@ -39,9 +39,8 @@ pub fn record(
     }
     let states = sample(&course, 0.0, start, &times, |_, _| true).states;
     let sensor = Observation::lift(&pendulum, |_, value| value);
-    let read = |(state, tau): (&State, &f64)| {
-        sensor.read(state[0], state[1], pendulum.lab_time + tau)
-    };
+    let read =
+        |(state, tau): (&State, &f64)| sensor.read(state[0], state[1], pendulum.lab_time + tau);
     let readings = states.iter().zip(&times).map(read).collect();
     let weights = vec![1.0; times.len()];
     Record {

@@ -49,6 +49,7 @@ impl Kind {
             | Self::ViscousWarmUp => Family::Damping,
             Self::CoulombFriction
             | Self::StribeckFriction
+            | Self::DahlFriction
             | Self::LoadDependentFriction
             | Self::AsymmetricCoulomb
             | Self::CoulombDrift

@@ -199,6 +199,8 @@ pub struct Point<R> {
     pub lab: R,
     /// Phase of the harmonic drive, rad; it is 0 where no formula asks for it.
     pub phase: R,
+    /// The angle at which the motion last turned or began, and the effect's [`Law::kept`] there.
+    pub past: [R; 2],
 }
 
 impl<R: Real> Point<R> {
@@ -279,6 +281,16 @@ pub trait Law {
     #[inline(always)]
     #[must_use]
     fn switch<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
+        None
+    }
+
+    /// What it keeps of the motion, between -1 and 1, 0 where a motion begins; none where it keeps
+    /// nothing. The formulas take it, as it was at the last turn, from [`Point::past`]; without a
+    /// motion before, it is [`Point::sense`]. One effect of a model may keep something, and no map can
+    /// have it.
+    #[inline(always)]
+    #[must_use]
+    fn kept<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
         None
     }
 

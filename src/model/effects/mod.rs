@@ -85,6 +85,19 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::kept`].
+            #[inline(always)]
+            pub fn kept<R: Real>(
+                self,
+                parameters: &[R; MOST_PARAMETERS],
+                at: &Point<R>,
+            ) -> Option<R> {
+                match self {
+                    $(Self::$law => $module::$law::kept(parameters, at),)*
+                    Self::Formula(_) => None,
+                }
+            }
+
             /// [`Law::inertia`].
             #[inline(always)]
             pub fn inertia<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
@@ -154,6 +167,7 @@ library! {
     power_law_drag::PowerLawDrag,
     eddy_brake::EddyBrake,
     stribeck_friction::StribeckFriction,
+    dahl_friction::DahlFriction,
     load_dependent_friction::LoadDependentFriction,
     asymmetric_viscous::AsymmetricViscous,
     asymmetric_coulomb::AsymmetricCoulomb,
@@ -285,6 +299,7 @@ impl Effect {
             per_gravity: 1.0,
             lab: 0.0,
             phase: 0.0,
+            past: [0.0; 2],
         };
         self.kind.switch(&self.parameters, &nowhere).is_some()
     }
