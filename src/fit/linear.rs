@@ -161,10 +161,10 @@ impl Follow<'_> {
         let rows = into.slopes.chunks_exact_mut(2 * into.stride);
         for (k, (state, rows)) in run.states.iter().zip(rows).enumerate() {
             let given = match rod_sensor {
-                None => *state,
+                None => [run.given(&course, k), state[1]],
                 Some(sensor) => {
                     let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
-                    let moving = run.signs[k].map(|signs| (signs, run.pasts[k]));
+                    let moving = run.signs[k].map(|signs| (signs, run.past(k)));
                     let reading = sensor.read(&course, times[k], *state, moving, own);
                     [reading, reading.like(0.0)]
                 }

@@ -46,10 +46,10 @@ pub fn replay(
             return Err(Error::Interrupted);
         }
         done();
-        let reading = |([theta, velocity], tau): (&State, &f64)| {
-            observation.read(*theta, *velocity, pendulum.lab_time + tau)
+        let reading = |(k, tau): (usize, &f64)| {
+            observation.read(run.given(&course, k), run.states[k][1], pendulum.lab_time + tau)
         };
-        Ok(run.states.iter().zip(times).map(reading).collect())
+        Ok(times.iter().enumerate().map(reading).collect())
     };
     starts.par_iter().map(one).collect()
 }

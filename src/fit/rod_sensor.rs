@@ -44,7 +44,7 @@ impl RodSensor {
         course: &Course<N>,
         tau: f64,
         state: [N; 2],
-        moving: Option<([f64; 2], [N; 2])>,
+        moving: Option<([f64; 2], [N; 3])>,
         own: [N; 2],
     ) -> N {
         let mut reading = own[0];
@@ -66,7 +66,7 @@ struct Reading<'a, N> {
     course: &'a Course<N>,
     tau: f64,
     state: [N; 2],
-    moving: Option<([f64; 2], [N; 2])>,
+    moving: Option<([f64; 2], [N; 3])>,
     own: [N; 2],
     into: &'a mut N,
 }
@@ -97,7 +97,7 @@ impl<N: Number> Reading<'_, N> {
     /// `th''`, with the jump of friction at a turn less than half an interval away shared: the turn
     /// is `|th'| / |th''|` away.
     #[inline(always)]
-    fn mean_acceleration(&self, [sense, side]: [f64; 2], past: [N; 2]) -> N {
+    fn mean_acceleration(&self, [sense, side]: [f64; 2], past: [N; 3]) -> N {
         let (course, tau, state) = (self.course, self.tau, self.state);
         let velocity = state[1];
         let here = course.acceleration(tau, state, [sense, side], past);

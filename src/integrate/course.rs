@@ -81,9 +81,9 @@ impl<N: Number> Course<N> {
         let tolerance = tolerance.max(FINEST);
         let harmonic = plain.has_closed_release() && !plain.remembers();
         Self {
+            watches: jumps || pendulum.has_events() || plain.has_play(),
             field: Field { equation, recorded: None },
             plain: Field { equation: plain, recorded: None },
-            watches: jumps || pendulum.has_events(),
             jumps,
             harmonic,
             period: (!changes).then(|| pendulum.period()),
@@ -136,21 +136,42 @@ impl<N: Number> Course<N> {
     }
 
     /// [`Field::acceleration`].
-    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 2]) -> N {
+    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
         self.field.acceleration(tau, state, signs, past)
+    }
+
+    /// Whether anything depends on the last turn.
+    #[must_use]
+    pub fn keeps(&self) -> bool {
+        self.plain.equation.has_play() || self.plain.equation.remembers()
     }
 
     /// The angle of a turn and what an effect keeps there, reached in this sense from the last one.
     #[must_use]
-    pub fn turned(&self, theta: N, sense: f64, past: [N; 2]) -> [N; 2] {
+    pub fn turned(&self, theta: N, sense: f64, past: [N; 3]) -> [N; 3] {
+        if !self.keeps() {
+            return past;
+        }
         let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
-        self.field.equation.kept(&at).map_or(past, |kept| [theta, kept])
+        let kept = self.field.equation.kept(&at).unwrap_or(past[1]);
+        [theta, kept, self.played(theta, sense, past) - theta]
+    }
+
+    /// What the sensor's play makes of an angle, reached in this sense from the last turn.
+    #[must_use]
+    pub fn played(&self, theta: N, sense: f64, [turned, _, played]: [N; 3]) -> N {
+        if !self.plain.equation.has_play() {
+            return theta;
+        }
+        let past = [turned, played, played];
+        let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
+        self.field.equation.played(&at).map_or(theta, |apart| theta + apart)
     }
 
     /// The switching function of an effect with a corner; 1 where there is none.
     #[must_use]
     pub fn switch(&self, tau: f64, [theta, velocity]: [f64; 2]) -> f64 {
-        let at = self.plain.point(tau, [theta, velocity], [1.0; 2], [theta, 1.0]).1;
+        let at = self.plain.point(tau, [theta, velocity], [1.0; 2], [theta, 1.0, 0.0]).1;
         self.plain.equation.switch(&at).unwrap_or(1.0)
     }
 
@@ -211,18 +232,18 @@ impl<N: Number> Field<N> {
         tau: f64,
         [theta, velocity]: [N; 2],
         [sense, side]: [f64; 2],
-        past: [N; 2],
+        past: [N; 3],
     ) -> (Forcing<N>, Point<N>) {
         let forcing = self.forcing(tau, theta);
         let signs = [theta.like(sense), theta.like(side)];
         let at = self.equation.point_held(&forcing, theta, velocity, signs);
-        (forcing, Point { past, ..at })
+        (forcing, Point { past: [past[0], past[1]], ..at })
     }
 
     /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
     /// says (1 or -1), since the turn that `past` says.
     #[inline(never)]
-    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 2]) -> N {
+    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
         let mut acceleration = state[1];
         let into = &mut acceleration;
         state[0].aside(Accelerating { field: self, tau, state, signs, past, into });
@@ -231,7 +252,7 @@ impl<N: Number> Field<N> {
 
     /// The same within its caller.
     #[inline(always)]
-    pub fn at(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 2]) -> N {
+    pub fn at(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
         let (forcing, at) = self.point(tau, state, signs, past);
         self.equation.acceleration(&forcing, &at)
     }
@@ -243,7 +264,7 @@ struct Accelerating<'a, N> {
     tau: f64,
     state: [N; 2],
     signs: [f64; 2],
-    past: [N; 2],
+    past: [N; 3],
     into: &'a mut N,
 }
 

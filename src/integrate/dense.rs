@@ -20,8 +20,8 @@ pub struct Leap<N> {
     pub length: f64,
     /// The sense and the side held: 1 or -1.
     pub signs: [f64; 2],
-    /// The angle of the last turn, and what an effect kept there.
-    pub past: [N; 2],
+    /// The angle of the last turn, and what an effect and the sensor's play kept there.
+    pub past: [N; 3],
     /// Angle and velocity at its start.
     pub start: [N; 2],
     /// Angle and velocity at its end.
@@ -36,7 +36,8 @@ impl<N: Number> Leap<N> {
     pub fn none(start: [N; 2]) -> Self {
         let none = [start[0].like(0.0); ALL_STAGES];
         let (tau, length, signs) = (0.0, 0.0, [1.0; 2]);
-        let past = [start[0], start[0].like(0.0)];
+        let zero = start[0].like(0.0);
+        let past = [start[0], zero, zero];
         Self { tau, length, signs, past, start, end: start, velocity: none, acceleration: none }
     }
 

@@ -57,8 +57,8 @@ pub struct Flight<'a, N> {
     pub tau: f64,
     /// Angle, not wrapped, and velocity.
     pub state: [N; 2],
-    /// The angle of the last turn, and what an effect kept there.
-    past: [N; 2],
+    /// The angle of the last turn, and what an effect and the sensor's play kept there.
+    pub past: [N; 3],
     /// Turns, sticks and releases so far.
     pub events: Vec<Event>,
     /// The product of the ratios of accelerations at the turns, 0 after a stick.
@@ -87,7 +87,7 @@ impl<'a, N: Number> Flight<'a, N> {
             course,
             tau,
             state,
-            past: [state[0], state[0].like(0.0)],
+            past: Leap::none(state).past,
             events,
             ratio: 1.0,
             steps: 0,

@@ -43,6 +43,8 @@ pub struct Equation<R> {
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// The formulas once more, for what they hold at rest.
     formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
+    /// The effect on the reading that depends on the last turn.
+    play: Option<(Kind, [R; MOST_PARAMETERS])>,
     /// The effect with a corner.
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
@@ -110,7 +112,7 @@ impl<R: Real> Equation<R> {
         let (mut frictions, mut formulas) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
-        let mut corner = None;
+        let (mut corner, mut play) = (None, None);
         let probe = Point {
             theta: zero,
             velocity: zero,
@@ -157,6 +159,7 @@ impl<R: Real> Equation<R> {
                     effect.kind.drive(&parameters, &mut motion);
                     (sideways, plain) = (true, false);
                 }
+                Action::Play => play = Some((effect.kind, parameters)),
                 Action::Reading => {}
             }
         }
@@ -175,6 +178,7 @@ impl<R: Real> Equation<R> {
             inertias,
             frictions,
             formulas,
+            play,
             corner,
             sideways,
             plain,
@@ -262,14 +266,29 @@ impl<R: Real> Equation<R> {
         Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase, past }
     }
 
-    /// Whether an effect keeps something of the motion.
+    /// Whether an effect with a torque keeps something of the motion.
     #[must_use]
     pub fn remembers(&self) -> bool {
         let at = self.point(&self.forcing(self.gamma), self.gamma, self.gamma, self.gamma);
         self.kept(&at).is_some()
     }
 
-    /// What an effect keeps of the motion; none where no effect does.
+    /// Whether the sensor has play.
+    #[must_use]
+    pub fn has_play(&self) -> bool {
+        self.play.is_some()
+    }
+
+    /// What the sensor's play reads less the angle; none where it has no play.
+    #[inline(always)]
+    pub fn played(&self, at: &Point<R>) -> Option<R> {
+        match &self.play {
+            Some((kind, parameters)) => kind.kept(parameters, at),
+            None => None,
+        }
+    }
+
+    /// What an effect with a torque keeps of the motion; none where no effect does.
     #[inline(always)]
     pub fn kept(&self, at: &Point<R>) -> Option<R> {
         for (kind, parameters) in &self.torques {
@@ -435,6 +454,7 @@ impl Equation<f64> {
             inertias: Vec::new(),
             frictions: Vec::new(),
             formulas: Vec::new(),
+            play: None,
             corner: self
                 .corner
                 .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),

@@ -53,10 +53,6 @@ fn alone(effect: Effect) -> Pendulum {
     has(Pendulum::new(0.0, 0.7, 1.3, 0.4, 0.0).expect("in range"), effect)
 }
 
-fn acts(kind: Kind) -> Action {
-    kind.definition().action
-}
-
 #[test]
 fn definitions_are_whole() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/model/effects");
@@ -85,7 +81,7 @@ fn definitions_are_whole() {
             Action::Position if *kind == Kind::AsymmetricCoulomb => Group::Damping,
             Action::Position | Action::Driven | Action::Inertia => Group::Torque,
             Action::Drive | Action::FurtherDrive => Group::Drive,
-            Action::Reading => Group::Reading,
+            Action::Reading | Action::Play => Group::Reading,
         };
         assert_eq!(group, expected, "{name}");
         let words: Vec<&str> = formula.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
@@ -169,7 +165,7 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
             let all = gravity + 0.5 * e * n * angle.sin() * velocity * velocity;
             own = all / (1.0 + e * angle.cos()) - gravity;
         }
-        (name, _) if acts(kind) == Action::Reading => {
+        (name, _) if kind.definition().group == Group::Reading => {
             assert!(name.starts_with("encoder") || name == "sensor_lag");
         }
         (name, _) => panic!("{name} has no formula here"),

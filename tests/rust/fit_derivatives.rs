@@ -177,6 +177,20 @@ fn derivatives_hold_where_a_contact_yields() {
 }
 
 #[test]
+fn derivatives_hold_where_a_sensor_has_play() {
+    // Ending in swings smaller than the play, and held fast at last.
+    let effects: [(Kind, &[f64]); 3] = [
+        (Kind::EncoderGain, &[0.02]),
+        (Kind::EncoderBacklash, &[0.07]),
+        (Kind::DahlFriction, &[0.02, 0.1]),
+    ];
+    let pendulum = with(undriven(0.05, 0.0).with_friction(0.004).expect("in range"), &effects);
+    let start = [1.2, -0.1];
+    let error = worst(record(pendulum, None, start, 90.0), None, start);
+    assert!(error < 1e-6, "{error:e}");
+}
+
+#[test]
 fn a_bias_needs_a_sensor_on_the_rod() {
     let record = record(undriven(0.02, 0.0), None, [1.0, 0.0], 20.0);
     let fault = Problem::new(vec![record], free(&[Slot::Bias], 1, &[0.0]), TOLERANCE);

@@ -71,6 +71,7 @@ impl Kind {
             | Self::LateralDrive => Family::Drive,
             Self::EncoderOffset
             | Self::EncoderDrift
+            | Self::EncoderBacklash
             | Self::EncoderGain
             | Self::EncoderEccentricity
             | Self::SensorLag

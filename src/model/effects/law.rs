@@ -64,6 +64,8 @@ pub enum Action {
     FurtherDrive,
     /// Another reading; no torque.
     Reading,
+    /// Another reading, which depends on where the motion last turned; it comes before the others.
+    Play,
 }
 
 /// Whether a map over initial conditions can have the effect.
@@ -284,10 +286,10 @@ pub trait Law {
         None
     }
 
-    /// What it keeps of the motion, between -1 and 1, 0 where a motion begins; none where it keeps
-    /// nothing. The formulas take it, as it was at the last turn, from [`Point::past`]; without a
-    /// motion before, it is [`Point::sense`]. One effect of a model may keep something, and no map can
-    /// have it.
+    /// What it keeps of the motion, 0 where a motion begins; none where it keeps nothing. The formulas
+    /// take it, as it was at the last turn, from [`Point::past`]. Of a torque it is [`Point::sense`]
+    /// without a motion before, and no map can have it; one effect of a model may keep something. Of
+    /// [`Action::Play`] it is the reading less the angle.
     #[inline(always)]
     #[must_use]
     fn kept<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {

@@ -192,6 +192,7 @@ library! {
     lateral_drive::LateralDrive,
     encoder_offset::EncoderOffset,
     encoder_drift::EncoderDrift,
+    encoder_backlash::EncoderBacklash,
     encoder_gain::EncoderGain,
     encoder_eccentricity::EncoderEccentricity,
     sensor_lag::SensorLag,
