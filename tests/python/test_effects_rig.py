@@ -190,8 +190,8 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
         free += unit.adapted
         start["eddy_brake.vc"] = 0.8 * truth["vc"]
     found = fitted(evidence, model, free, (unit,), start=start).fit
-    # Of a lag the second power of tau is left. Each window begins with a contact that has not yielded
-    # and a sensor in the middle of its play.
+    # Of a lag the second power of tau is left. Each window begins with a contact that has not
+    # yielded and a sensor in the middle of its play.
     left = {"sensor_lag": 1e-5, "dahl_friction": 1e-6, "encoder_backlash": 1e-4}
     assert found.rms < left.get(name, 1e-8)
     assert base.fit.rms > 10 * found.rms
