@@ -79,9 +79,9 @@ impl<N: Number> Course<N> {
         // Negative friction, which a fit may pass through, holds nothing, but jumps all the same.
         let jumps = pendulum.has_friction() || pendulum.theta_r < 0.0;
         let tolerance = tolerance.max(FINEST);
-        let harmonic = plain.has_closed_release() && !plain.remembers();
+        let harmonic = plain.has_closed_release() && !plain.keeps()[0];
         Self {
-            watches: jumps || pendulum.has_events() || plain.has_play(),
+            watches: jumps || pendulum.has_events() || plain.keeps()[1],
             field: Field { equation, recorded: None },
             plain: Field { equation: plain, recorded: None },
             jumps,
@@ -143,7 +143,7 @@ impl<N: Number> Course<N> {
     /// Whether anything depends on the last turn.
     #[must_use]
     pub fn keeps(&self) -> bool {
-        self.plain.equation.has_play() || self.plain.equation.remembers()
+        self.plain.equation.keeps() != [false; 2]
     }
 
     /// The angle of a turn and what an effect keeps there, reached in this sense from the last one.
@@ -153,19 +153,19 @@ impl<N: Number> Course<N> {
             return past;
         }
         let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
-        let kept = self.field.equation.kept(&at).unwrap_or(past[1]);
+        let kept = self.field.equation.kept(0, &at).unwrap_or(past[1]);
         [theta, kept, self.played(theta, sense, past) - theta]
     }
 
     /// What the sensor's play makes of an angle, reached in this sense from the last turn.
     #[must_use]
     pub fn played(&self, theta: N, sense: f64, [turned, _, played]: [N; 3]) -> N {
-        if !self.plain.equation.has_play() {
+        if !self.plain.equation.keeps()[1] {
             return theta;
         }
         let past = [turned, played, played];
         let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
-        self.field.equation.played(&at).map_or(theta, |apart| theta + apart)
+        self.field.equation.kept(1, &at).map_or(theta, |apart| theta + apart)
     }
 
     /// The switching function of an effect with a corner; 1 where there is none.

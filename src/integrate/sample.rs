@@ -25,17 +25,21 @@ pub struct Sampled<N> {
 }
 
 impl<N: Number> Sampled<N> {
-    /// The past at the time of that place; where nothing depends on it, any.
+    /// The past at the time of that place; that of a motion's start where nothing depends on it.
     #[must_use]
     pub fn past(&self, place: usize) -> [N; 3] {
-        self.pasts.get(place).copied().unwrap_or([self.states[place][0]; 3])
+        let [theta, _] = self.states[place];
+        let zero = theta.like(0.0);
+        self.pasts.get(place).copied().unwrap_or([theta, zero, zero])
     }
 
     /// What the sensor is given at the time of that place: the angle, or what its play makes of it.
     #[must_use]
     pub fn given(&self, course: &Course<N>, place: usize) -> N {
-        let sense = self.signs[place].map_or(1.0, |[sense, _]| sense);
-        course.played(self.states[place][0], sense, self.past(place))
+        let ([theta, _], past) = (self.states[place], self.past(place));
+        // At rest the play is what the last turn left: either sense may be next.
+        self.signs[place]
+            .map_or_else(|| theta + past[2], |[sense, _]| course.played(theta, sense, past))
     }
 }
 

@@ -43,8 +43,8 @@ pub struct Equation<R> {
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// The formulas once more, for what they hold at rest.
     formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
-    /// The effect on the reading that depends on the last turn.
-    play: Option<(Kind, [R; MOST_PARAMETERS])>,
+    /// What depends on the last turn: an effect with a torque, and the sensor's play.
+    keepers: [Option<(Kind, [R; MOST_PARAMETERS])>; 2],
     /// The effect with a corner.
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
@@ -112,7 +112,7 @@ impl<R: Real> Equation<R> {
         let (mut frictions, mut formulas) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
-        let (mut corner, mut play) = (None, None);
+        let (mut corner, mut keepers) = (None, [None; 2]);
         let probe = Point {
             theta: zero,
             velocity: zero,
@@ -129,6 +129,9 @@ impl<R: Real> Equation<R> {
             let parameters = effect.lift(&mut next);
             if effect.kind.switch(&parameters, &probe).is_some() {
                 corner = Some((effect.kind, parameters));
+            }
+            if effect.kind.kept(&parameters, &probe).is_some() {
+                keepers[usize::from(effect.is(&[Action::Play]))] = Some((effect.kind, parameters));
             }
             if let Kind::Formula(formula) = effect.kind {
                 holds[0] |= formula.is_driven();
@@ -159,8 +162,7 @@ impl<R: Real> Equation<R> {
                     effect.kind.drive(&parameters, &mut motion);
                     (sideways, plain) = (true, false);
                 }
-                Action::Play => play = Some((effect.kind, parameters)),
-                Action::Reading => {}
+                Action::Reading | Action::Play => {}
             }
         }
         let lab_time = gamma.like(pendulum.lab_time);
@@ -178,7 +180,7 @@ impl<R: Real> Equation<R> {
             inertias,
             frictions,
             formulas,
-            play,
+            keepers,
             corner,
             sideways,
             plain,
@@ -266,38 +268,17 @@ impl<R: Real> Equation<R> {
         Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase, past }
     }
 
-    /// Whether an effect with a torque keeps something of the motion.
+    /// Whether a torque depends on the last turn, and whether the sensor has play.
     #[must_use]
-    pub fn remembers(&self) -> bool {
-        let at = self.point(&self.forcing(self.gamma), self.gamma, self.gamma, self.gamma);
-        self.kept(&at).is_some()
+    pub fn keeps(&self) -> [bool; 2] {
+        [self.keepers[0].is_some(), self.keepers[1].is_some()]
     }
 
-    /// Whether the sensor has play.
+    /// What that torque keeps, or what the play reads less the angle; none where there is none.
     #[must_use]
-    pub fn has_play(&self) -> bool {
-        self.play.is_some()
-    }
-
-    /// What the sensor's play reads less the angle; none where it has no play.
-    #[inline(always)]
-    pub fn played(&self, at: &Point<R>) -> Option<R> {
-        match &self.play {
-            Some((kind, parameters)) => kind.kept(parameters, at),
-            None => None,
-        }
-    }
-
-    /// What an effect with a torque keeps of the motion; none where no effect does.
-    #[inline(always)]
-    pub fn kept(&self, at: &Point<R>) -> Option<R> {
-        for (kind, parameters) in &self.torques {
-            let kept = kind.kept(parameters, at);
-            if kept.is_some() {
-                return kept;
-            }
-        }
-        None
+    pub fn kept(&self, which: usize, at: &Point<R>) -> Option<R> {
+        let (kind, parameters) = self.keepers[which].as_ref()?;
+        kind.kept(parameters, at)
     }
 
     /// The function at whose zeros an effect has a corner; none where no effect has.
@@ -454,7 +435,7 @@ impl Equation<f64> {
             inertias: Vec::new(),
             frictions: Vec::new(),
             formulas: Vec::new(),
-            play: None,
+            keepers: [None; 2],
             corner: self
                 .corner
                 .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),
