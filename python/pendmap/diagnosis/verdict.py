@@ -123,7 +123,7 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
     if not standings:
         verdict = "unknown" if rest else "none"
     elif rest:
-        verdict = "partial" if closed >= limits.main and spread <= limits.spread else "unknown"
+        verdict = "partial" if closed >= limits.closes and spread <= limits.spread else "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
     else:
