@@ -67,7 +67,7 @@ def run(case: Case) -> dict[str, Any]:
             hard: dict[str, Any] = {"G": [], "s": 1.0, "equals": [], "beyond": 0.0}
             without: list[str] = []
             if case.effects != ("none",):
-                base = baseline(
+                base, _ = baseline(
                     evidence_of(record(plain, folder)[0] if plain != case else experiment)
                 )
                 hard, alike = difficulty(plain, folder, base)

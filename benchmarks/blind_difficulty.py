@@ -16,9 +16,9 @@ from blind_cases import record
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
 from pendmap.diagnosis.data import Evidence, evidence_of
+from pendmap.diagnosis.fitted_model import fitted
 from pendmap.diagnosis.refit import Refits
 from pendmap.diagnosis.scores import scores_of
-from pendmap.diagnosis.fitted_model import fitted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

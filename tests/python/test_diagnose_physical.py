@@ -11,11 +11,11 @@ from pendmap.diagnosis import diagnose
 from pendmap.diagnosis.below_zero import below_zero
 from pendmap.diagnosis.candidates import candidates
 from pendmap.diagnosis.data import evidence_of
+from pendmap.diagnosis.fitted_model import fitted
 from pendmap.diagnosis.held import Held, tried
 from pendmap.diagnosis.physical import physical, unphysical
 from pendmap.diagnosis.state import Found
 from pendmap.diagnosis.summary import as_json, as_text
-from pendmap.diagnosis.fitted_model import fitted
 from pendmap.errors import InputError
 from pendmap.model import Effect, Rig
 from pendmap.records import read_experiment

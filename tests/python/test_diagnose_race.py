@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from pendmap.diagnosis.rests import Rests
+from pendmap.diagnosis.slipped import from_short_windows, slipped
 
 from pendmap import read_experiment, virtual_rig
 from pendmap.diagnosis.baseline import baseline, taken_by
 from pendmap.diagnosis.candidates import candidates
 from pendmap.diagnosis.data import Evidence, evidence_of
 from pendmap.diagnosis.refit import Refits
-from pendmap.diagnosis.rests import Rests
 from pendmap.diagnosis.scores import Scores, scores_of
-from pendmap.diagnosis.slipped import from_short_windows, slipped
 from pendmap.errors import InputError
 from pendmap.identification.fitting import fit_runs
 

@@ -9,9 +9,9 @@ import pytest
 
 import pendmap
 from hidden import diagnosed
+from pendmap.diagnosis.alternatives import SPECIAL, Rival, Standing
 from pendmap.diagnosis.calibration import complete
 from pendmap.diagnosis.candidates import candidates
-from pendmap.diagnosis.alternatives import SPECIAL, Rival, Standing
 from pendmap.diagnosis.fitted_model import ALIKE
 from pendmap.diagnosis.verdict import CHANCE, SURE, closes_most
 
