@@ -7,6 +7,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from hidden import diagnosed
+from pendmap import virtual_rig
+from pendmap.diagnosis import diagnose
+from pendmap.errors import InputError
+from pendmap.identification.fitting import fit_runs
+from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,6 +46,42 @@ def test_what_is_hidden_is_named_with_its_size(effect: str, parameter: str, tmp_
     assert gap.after < gap.before
     assert gap.held_out_after < gap.held_out_before
     assert gap.held_out_after < 1.05 * gap.noise_floor
+
+
+def test_the_drag_is_named_in_noise_that_hangs_together(tmp_path: Path) -> None:
+    found, truth = diagnosed(
+        tmp_path, "quadratic_drag", free=1, forced=0, size=3.0, correlation=0.8
+    )
+    assert "quadratic_drag" in _names(found)
+    assert found.verdict in {"named", "ambiguous"}
+    low, high = next(e.ci95["q"] for e in found.effects if e.name == "quadratic_drag")
+    wide = high - low
+    assert low - wide < truth["quadratic_drag"]["q"] < high + wide
+
+
+def test_a_chirp_of_the_only_forced_run_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lost: list[InputError] = []
+
+    def watched(*given: object, **named: object) -> object:
+        try:
+            return fit_runs(*given, **named)  # type: ignore[arg-type]
+        except InputError as error:
+            lost.append(error)
+            raise
+
+    for module in ("fitted_model", "held"):
+        monkeypatch.setattr(f"pendmap.diagnosis.{module}.fit_runs", watched)
+    request = virtual_rig.Request(
+        "hidden", seed=3, effects=("drive_chirp",), size=4.0, free=4, forced=1
+    )
+    where = virtual_rig.places(tmp_path / "lab", replace=True)
+    virtual_rig.write(virtual_rig.make(request), where)
+    found = diagnose(read_experiment(where.experiment))
+    assert "drive_chirp" in _names(found)
+    # No fit was given up because of what the records lack.
+    assert [str(error) for error in lost if "range of numbers" not in str(error)] == []
 
 
 def test_a_friction_that_sticks_is_among_the_names(tmp_path: Path) -> None:
