@@ -1,4 +1,4 @@
-"""A diagnosis gives out what a pendulum can be: nothing drives itself, no time constant is hidden."""
+"""A diagnosis gives out what a pendulum can be: no coefficient of it drives the motion."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,7 +16,6 @@ from pendmap.diagnosis.alternatives import standing_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import CORE
 from pendmap.diagnosis.data import Evidence, evidence_of
-from pendmap.diagnosis.fitted_model import Trial
 from pendmap.diagnosis.held import predictive
 from pendmap.diagnosis.prune import pruned
 from pendmap.diagnosis.search import search
@@ -24,6 +24,9 @@ from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
 from pendmap.identification.fitting import fit_runs
 from pendmap.records import Experiment, Run
+
+if TYPE_CHECKING:
+    from pendmap.diagnosis.fitted_model import Trial
 
 
 def recorded(folder: Path, *effects: str, **given: float) -> Evidence:
