@@ -29,7 +29,7 @@ def ranked(found: Discrepancy) -> Section:
     blocks: list[Block] = [
         Paragraph(
             "Every effect of the library, scored at the baseline's fit: the score G is what it "
-            "would take off the sum of squares by itself, in independent readings. The best were "
+            "would take off the sum of squares by itself, in units of the noise. The best were "
             "fitted with all other parameters: they have the fall of the sum of squares with "
             "Schwarz's penalty, and the least one on a held-out set."
         ),
