@@ -13,7 +13,7 @@ use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::{State, Strobe};
 use pendmap::lanes::Path;
 use pendmap::maps::starts::{Axis, Starts};
-use pendmap::model::effects::{Action, Parameter};
+use pendmap::model::effects::{Group, Mappable, Parameter};
 use pendmap::model::{Effect, Kind, Pendulum};
 
 #[path = "../tests/rust/rewritten.rs"]
@@ -89,7 +89,8 @@ fn main() {
         );
         for kind in Kind::ALL {
             let definition = kind.definition();
-            if definition.action == Action::Reading || !wanted(&[path.name(), definition.name]) {
+            let absent = definition.group == Group::Reading || definition.mappable == Mappable::No;
+            if absent || !wanted(&[path.name(), definition.name]) {
                 continue;
             }
             let base = if *kind == Kind::ViscousDamping { &base } else { &damped };

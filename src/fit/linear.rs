@@ -161,10 +161,11 @@ impl Follow<'_> {
         let rows = into.slopes.chunks_exact_mut(2 * into.stride);
         for (k, (state, rows)) in run.states.iter().zip(rows).enumerate() {
             let given = match rod_sensor {
-                None => *state,
+                None => [run.given(&course, k), state[1]],
                 Some(sensor) => {
                     let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
-                    let reading = sensor.read(&course, times[k], *state, run.signs[k], own);
+                    let moving = run.signs[k].map(|signs| (signs, run.past(k)));
+                    let reading = sensor.read(&course, times[k], *state, moving, own);
                     [reading, reading.like(0.0)]
                 }
             };
@@ -203,9 +204,10 @@ impl Follow<'_> {
             }
             let (of_angle, of_velocity) =
                 slopes[2 * k * stride..2 * (k + 1) * stride].split_at(stride);
+            let lab = self.shaped.pendulum.lab_time + record.times[sample];
             let read = sensor
                 .as_ref()
-                .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given));
+                .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given, lab));
             let away = record.readings[sample] - read.value;
             let (weight, residual) = match &record.counts {
                 None => {
@@ -247,7 +249,8 @@ impl Sensor {
         }))
     }
 
-    fn read(&self, state: State) -> Tangent<f64, READINGS> {
-        self.0.read(Tangent::seeded(state[0], 0), Tangent::seeded(state[1], 1))
+    fn read(&self, state: State, lab: f64) -> Tangent<f64, READINGS> {
+        let [theta, velocity] = [0, 1].map(|of| Tangent::seeded(state[of], of));
+        self.0.read(theta, velocity, theta.like(lab))
     }
 }

@@ -46,8 +46,10 @@ pub fn replay(
             return Err(Error::Interrupted);
         }
         done();
-        let reading = |[theta, velocity]: &State| observation.read(*theta, *velocity);
-        Ok(run.states.iter().map(reading).collect())
+        let reading = |(k, tau): (usize, &f64)| {
+            observation.read(run.given(&course, k), run.states[k][1], pendulum.lab_time + tau)
+        };
+        Ok(times.iter().enumerate().map(reading).collect())
     };
     starts.par_iter().map(one).collect()
 }

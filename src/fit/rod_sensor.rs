@@ -37,19 +37,19 @@ pub struct RodSensor {
 }
 
 impl RodSensor {
-    /// The reading in one state; `signs` are the sense of the motion and the side of a corner, none
-    /// where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
+    /// The reading in one state; `moving` says the sense of the motion and the side of a corner, and
+    /// what was kept at the last turn, none where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
     pub fn read<N: Number>(
         &self,
         course: &Course<N>,
         tau: f64,
         state: [N; 2],
-        signs: Option<[f64; 2]>,
+        moving: Option<([f64; 2], [N; 3])>,
         own: [N; 2],
     ) -> N {
         let mut reading = own[0];
         let (sensor, into) = (*self, &mut reading);
-        own[0].aside(Reading { sensor, course, tau, state, signs, own, into });
+        own[0].aside(Reading { sensor, course, tau, state, moving, own, into });
         reading
     }
     /// Whether all of it are numbers, and it shows anything.
@@ -66,7 +66,7 @@ struct Reading<'a, N> {
     course: &'a Course<N>,
     tau: f64,
     state: [N; 2],
-    signs: Option<[f64; 2]>,
+    moving: Option<([f64; 2], [N; 3])>,
     own: [N; 2],
     into: &'a mut N,
 }
@@ -83,8 +83,8 @@ impl<N: Number> Work for Reading<'_, N> {
         }
         let leaning = (theta + tilt).scale(FRAC_1_PI).sine::<Fine>().scale(gravity);
         let turned = tilt.scale(FRAC_1_PI);
-        let pull = match self.signs {
-            Some(signs) => self.mean_acceleration(signs),
+        let pull = match self.moving {
+            Some((signs, past)) => self.mean_acceleration(signs, past),
             None => theta.like(0.0),
         };
         let inward = velocity * velocity * turned.sine::<Fine>();
@@ -97,15 +97,17 @@ impl<N: Number> Reading<'_, N> {
     /// `th''`, with the jump of friction at a turn less than half an interval away shared: the turn
     /// is `|th'| / |th''|` away.
     #[inline(always)]
-    fn mean_acceleration(&self, [sense, side]: [f64; 2]) -> N {
-        let (course, tau, [theta, velocity]) = (self.course, self.tau, self.state);
-        let here = course.acceleration(tau, theta, velocity, [sense, side]);
+    fn mean_acceleration(&self, [sense, side]: [f64; 2], past: [N; 3]) -> N {
+        let (course, tau, state) = (self.course, self.tau, self.state);
+        let velocity = state[1];
+        let here = course.acceleration(tau, state, [sense, side], past);
         let away = velocity.scale(sense);
         let reach = here.scale((0.5 * self.sensor.interval).copysign(here.value()));
         if !course.jumps() || away.value() >= reach.value() {
             return here;
         }
-        let mut there = course.acceleration(tau, theta, velocity, [-sense, side]);
+        let past = course.turned(state[0], sense, past);
+        let mut there = course.acceleration(tau, state, [-sense, side], past);
         // Before a turn the pull is against the motion; where it would be so after it, too, friction
         // holds the pendulum.
         if here.value() * sense < 0.0 && there.value() * sense >= 0.0 {

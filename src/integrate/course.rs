@@ -79,11 +79,11 @@ impl<N: Number> Course<N> {
         // Negative friction, which a fit may pass through, holds nothing, but jumps all the same.
         let jumps = pendulum.has_friction() || pendulum.theta_r < 0.0;
         let tolerance = tolerance.max(FINEST);
-        let harmonic = plain.has_closed_release();
+        let harmonic = plain.has_closed_release() && !plain.keeps()[0];
         Self {
+            watches: jumps || pendulum.has_events() || plain.keeps()[1],
             field: Field { equation, recorded: None },
             plain: Field { equation: plain, recorded: None },
-            watches: jumps || pendulum.has_events(),
             jumps,
             harmonic,
             period: (!changes).then(|| pendulum.period()),
@@ -136,14 +136,42 @@ impl<N: Number> Course<N> {
     }
 
     /// [`Field::acceleration`].
-    pub fn acceleration(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
-        self.field.acceleration(tau, theta, velocity, signs)
+    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
+        self.field.acceleration(tau, state, signs, past)
+    }
+
+    /// Whether anything depends on the last turn.
+    #[must_use]
+    pub fn keeps(&self) -> bool {
+        self.plain.equation.keeps() != [false; 2]
+    }
+
+    /// The angle of a turn and what an effect keeps there, reached in this sense from the last one.
+    #[must_use]
+    pub fn turned(&self, theta: N, sense: f64, past: [N; 3]) -> [N; 3] {
+        if !self.keeps() {
+            return past;
+        }
+        let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
+        let kept = self.field.equation.kept(0, &at).unwrap_or(past[1]);
+        [theta, kept, self.played(theta, sense, past) - theta]
+    }
+
+    /// What the sensor's play makes of an angle, reached in this sense from the last turn.
+    #[must_use]
+    pub fn played(&self, theta: N, sense: f64, [turned, _, played]: [N; 3]) -> N {
+        if !self.plain.equation.keeps()[1] {
+            return theta;
+        }
+        let past = [turned, played, played];
+        let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
+        self.field.equation.kept(1, &at).map_or(theta, |apart| theta + apart)
     }
 
     /// The switching function of an effect with a corner; 1 where there is none.
     #[must_use]
     pub fn switch(&self, tau: f64, [theta, velocity]: [f64; 2]) -> f64 {
-        let at = self.plain.point(tau, theta, velocity, [1.0; 2]).1;
+        let at = self.plain.point(tau, [theta, velocity], [1.0; 2], [theta, 1.0, 0.0]).1;
         self.plain.equation.switch(&at).unwrap_or(1.0)
     }
 
@@ -202,30 +230,30 @@ impl<N: Number> Field<N> {
     fn point(
         &self,
         tau: f64,
-        theta: N,
-        velocity: N,
+        [theta, velocity]: [N; 2],
         [sense, side]: [f64; 2],
+        past: [N; 3],
     ) -> (Forcing<N>, Point<N>) {
         let forcing = self.forcing(tau, theta);
         let signs = [theta.like(sense), theta.like(side)];
         let at = self.equation.point_held(&forcing, theta, velocity, signs);
-        (forcing, at)
+        (forcing, Point { past: [past[0], past[1]], ..at })
     }
 
     /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
-    /// says (1 or -1).
+    /// says (1 or -1), since the turn that `past` says.
     #[inline(never)]
-    pub fn acceleration(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
-        let mut acceleration = velocity;
-        let state = [theta, velocity];
-        theta.aside(Accelerating { field: self, tau, state, signs, into: &mut acceleration });
+    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
+        let mut acceleration = state[1];
+        let into = &mut acceleration;
+        state[0].aside(Accelerating { field: self, tau, state, signs, past, into });
         acceleration
     }
 
     /// The same within its caller.
     #[inline(always)]
-    pub fn at(&self, tau: f64, theta: N, velocity: N, signs: [f64; 2]) -> N {
-        let (forcing, at) = self.point(tau, theta, velocity, signs);
+    pub fn at(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
+        let (forcing, at) = self.point(tau, state, signs, past);
         self.equation.acceleration(&forcing, &at)
     }
 }
@@ -236,35 +264,42 @@ struct Accelerating<'a, N> {
     tau: f64,
     state: [N; 2],
     signs: [f64; 2],
+    past: [N; 3],
     into: &'a mut N,
 }
 
 impl<N: Number> Work for Accelerating<'_, N> {
     #[inline(always)]
     fn run(self) {
-        let Self { field, tau, state: [theta, velocity], signs, into } = self;
-        *into = field.at(tau, theta, velocity, signs);
+        let Self { field, tau, state, signs, past, into } = self;
+        *into = field.at(tau, state, signs, past);
     }
 }
 
-impl<N> Load for Course<N> {
+/// A course, and what an effect keeps where the pendulum rests.
+#[derive(Debug)]
+pub struct Resting<'a, N>(pub &'a Course<N>, pub f64);
+
+impl<N> Load for Resting<'_, N> {
     fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
-        let equation = &self.plain.equation;
-        let forcing = self.plain.forcing(tau, theta);
-        let at = equation.point(&forcing, theta, 0.0, 1.0);
+        let Self(course, kept) = self;
+        let equation = &course.plain.equation;
+        let forcing = course.plain.forcing(tau, theta);
+        let past = [theta, *kept];
+        let at = Point { past, ..equation.point(&forcing, theta, 0.0, 1.0) };
         [equation.load(&forcing, &at), equation.friction(&at).max(0.0)]
     }
     fn equation(&self) -> &Equation<f64> {
-        &self.plain.equation
+        &self.0.plain.equation
     }
     fn has_closed_release(&self) -> bool {
-        self.harmonic
+        self.0.harmonic
     }
     fn period(&self) -> Option<f64> {
-        self.period
+        self.0.period
     }
     fn time_scale(&self) -> f64 {
-        self.look
+        self.0.look
     }
 }
 
@@ -280,7 +315,9 @@ pub fn greatest_rate(pendulum: &Pendulum) -> f64 {
         for i in 0..LOOKS[0] {
             let theta = PI * (2.0 * i as f64 / LOOKS[0] as f64 - 1.0);
             let (theta, velocity) = (Tangent::seeded(theta, 0), Tangent::seeded(0.0, 1));
-            let at = equation.point(&forcing, theta, velocity, Tangent::constant(1.0));
+            let mut at = equation.point(&forcing, theta, velocity, Tangent::constant(1.0));
+            // What an effect keeps changes quickest right after a turn.
+            at.past = [theta.value, -1.0].map(Tangent::constant);
             let [by_theta, by_velocity] = equation.acceleration(&forcing, &at).slope;
             stiffness = stiffness.max(by_theta.abs());
             damping = damping.max(by_velocity.abs());

@@ -20,6 +20,8 @@ pub struct Leap<N> {
     pub length: f64,
     /// The sense and the side held: 1 or -1.
     pub signs: [f64; 2],
+    /// The angle of the last turn, and what an effect and the sensor's play kept there.
+    pub past: [N; 3],
     /// Angle and velocity at its start.
     pub start: [N; 2],
     /// Angle and velocity at its end.
@@ -29,12 +31,14 @@ pub struct Leap<N> {
 }
 
 impl<N: Number> Leap<N> {
-    /// No step yet, at `start`.
+    /// No step yet, at `start`, where the motion begins.
     #[must_use]
     pub fn none(start: [N; 2]) -> Self {
         let none = [start[0].like(0.0); ALL_STAGES];
         let (tau, length, signs) = (0.0, 0.0, [1.0; 2]);
-        Self { tau, length, signs, start, end: start, velocity: none, acceleration: none }
+        let zero = start[0].like(0.0);
+        let past = [start[0], zero, zero];
+        Self { tau, length, signs, past, start, end: start, velocity: none, acceleration: none }
     }
 
     /// The step of `length` from `start` at `tau`, where the acceleration is `first`.
@@ -82,6 +86,7 @@ impl<N: Number> Leap<N> {
             tau: self.tau,
             length: self.length,
             signs: self.signs,
+            past: self.past.map(N::value),
             start: self.start.map(N::value),
             end: self.end.map(N::value),
             velocity: self.velocity.map(N::value),
@@ -113,7 +118,7 @@ impl<N: Number> Leap<N> {
         let velocity = gained.scale_add(self.length, self.start[1]);
         let tau = self.tau + C[i] * self.length;
         self.velocity[i] = velocity;
-        self.acceleration[i] = field.at(tau, theta, velocity, self.signs);
+        self.acceleration[i] = field.at(tau, [theta, velocity], self.signs, self.past);
         if i == STAGES {
             self.end = [theta, velocity];
         }

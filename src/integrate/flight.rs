@@ -7,7 +7,7 @@
 //! Budd, Champneys & Kowalczyk (2008), Piecewise-smooth Dynamical Systems, section 2.5).
 
 use super::corner;
-use super::course::Course;
+use super::course::{Course, Resting};
 use super::dense::Leap;
 use super::event::{Event, EventKind};
 use crate::model::rest::{Release, release};
@@ -57,6 +57,8 @@ pub struct Flight<'a, N> {
     pub tau: f64,
     /// Angle, not wrapped, and velocity.
     pub state: [N; 2],
+    /// The angle of the last turn, and what an effect and the sensor's play kept there.
+    pub past: [N; 3],
     /// Turns, sticks and releases so far.
     pub events: Vec<Event>,
     /// The product of the ratios of accelerations at the turns, 0 after a stick.
@@ -85,6 +87,7 @@ impl<'a, N: Number> Flight<'a, N> {
             course,
             tau,
             state,
+            past: Leap::none(state).past,
             events,
             ratio: 1.0,
             steps: 0,
@@ -100,12 +103,12 @@ impl<'a, N: Number> Flight<'a, N> {
         if velocity != 0.0 {
             flight.set_out(1_f64.copysign(velocity));
         } else if course.jumps() {
-            match release(course, tau, state[0].value(), until) {
+            match release(&Resting(course, 0.0), tau, state[0].value(), until) {
                 Release::Now(sense) => flight.set_out(sense),
                 wait => flight.settle(wait),
             }
         } else {
-            let pull = course.acceleration(tau, state[0], state[1], flight.signs(1.0));
+            let pull = course.acceleration(tau, state, flight.signs(1.0), flight.past);
             flight.set_out(1_f64.copysign(pull.value()));
         }
         flight
@@ -162,6 +165,7 @@ impl<'a, N: Number> Flight<'a, N> {
     pub fn scale_derivatives(&mut self, factor: f64) {
         let scaled = |x: N| x.reset(x.value(), factor);
         self.state = self.state.map(scaled);
+        self.past = self.past.map(scaled);
         if let Mode::Moving(signs, first) = self.mode {
             self.mode = Mode::Moving(signs, scaled(first));
         }
@@ -191,6 +195,7 @@ impl<'a, N: Number> Flight<'a, N> {
                 self.lose();
                 return None;
             }
+            self.leap.past = self.past;
             self.leap.take(course.field(), self.tau, self.state, first, signs, length);
             self.steps += 1;
             let error = self.leap.error(course.tolerance());
@@ -253,9 +258,11 @@ impl<'a, N: Number> Flight<'a, N> {
 
     /// At a velocity 0, reached in the sense `sense` with the acceleration `before`.
     fn turn(&mut self, sense: f64, before: f64) {
+        self.past = self.course.turned(self.state[0], sense, self.past);
         let theta = self.state[0].value();
         let goes_on = if self.course.jumps() {
-            self.uncrowded(release(self.course, self.tau, theta, self.until))
+            let resting = Resting(self.course, self.past[1].value());
+            self.uncrowded(release(&resting, self.tau, theta, self.until))
         } else {
             Release::Now(-sense)
         };
@@ -271,7 +278,7 @@ impl<'a, N: Number> Flight<'a, N> {
         }
         self.note(EventKind::Turn);
         let signs = self.signs(next);
-        let after = self.course.acceleration(self.tau, self.state[0], self.state[1], signs).value();
+        let after = self.course.acceleration(self.tau, self.state, signs, self.past).value();
         let ratio = if self.course.jumps() { after / before } else { 1.0 };
         self.ratio *= ratio;
         self.state[1] = self.state[1].reset(0.0, ratio);
@@ -304,7 +311,7 @@ impl<'a, N: Number> Flight<'a, N> {
     }
 
     fn go_on(&mut self, signs: [f64; 2]) {
-        let first = self.course.acceleration(self.tau, self.state[0], self.state[1], signs);
+        let first = self.course.acceleration(self.tau, self.state, signs, self.past);
         self.mode = Mode::Moving(signs, first);
     }
 

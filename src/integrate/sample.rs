@@ -13,12 +13,34 @@ pub struct Sampled<N> {
     pub states: Vec<[N; 2]>,
     /// The sense of the motion and the side of a corner at each time; none where it does not move.
     pub signs: Vec<Option<[f64; 2]>>,
+    /// The angle of the last turn before each time, and what an effect and the sensor's play kept there;
+    /// empty where nothing depends on it.
+    pub pasts: Vec<[N; 3]>,
     /// Turns, sticks and releases up to the last time.
     pub events: Vec<Event>,
     /// Whether friction holds the pendulum at the last time.
     pub stuck: bool,
     /// Steps taken.
     pub steps: usize,
+}
+
+impl<N: Number> Sampled<N> {
+    /// The past at the time of that place; that of a motion's start where nothing depends on it.
+    #[must_use]
+    pub fn past(&self, place: usize) -> [N; 3] {
+        let [theta, _] = self.states[place];
+        let zero = theta.like(0.0);
+        self.pasts.get(place).copied().unwrap_or([theta, zero, zero])
+    }
+
+    /// What the sensor is given at the time of that place: the angle, or what its play makes of it.
+    #[must_use]
+    pub fn given(&self, course: &Course<N>, place: usize) -> N {
+        let ([theta, _], past) = (self.states[place], self.past(place));
+        // At rest the play is what the last turn left: either sense may be next.
+        self.signs[place]
+            .map_or_else(|| theta + past[2], |[sense, _]| course.played(theta, sense, past))
+    }
 }
 
 /// The states at `times`, which do not fall and are not before `tau`, of the trajectory that starts
@@ -38,6 +60,8 @@ pub fn sample<N: Number>(
     let at_start = times.iter().take_while(|time| **time <= tau).count();
     states.extend(std::iter::repeat_n(flight.state, at_start));
     let mut signs = vec![flight.signs_held(); at_start];
+    let kept = if course.keeps() { times.len() } else { 0 };
+    let mut pasts = vec![flight.past; at_start.min(kept)];
     let mut curve = Curve::none(flight.state);
     while let Some(piece) = flight.advance() {
         let done = states.len();
@@ -48,6 +72,7 @@ pub fn sample<N: Number>(
                 flight.leap.trace(course.field(), &mut curve);
             }
             signs.resize(done + due, moves.then_some(flight.leap.signs));
+            pasts.resize(kept.min(done + due), if moves { flight.leap.past } else { flight.past });
             for time in &times[done..done + due] {
                 let within = moves && *time < flight.tau;
                 states.push(if within { curve.at(*time) } else { flight.state });
@@ -60,6 +85,7 @@ pub fn sample<N: Number>(
     let lost = flight.state.map(|x| x.reset(f64::NAN, 1.0));
     states.resize(times.len(), lost);
     signs.resize(times.len(), None);
+    pasts.resize(kept, [lost[0]; 3]);
     let stuck = flight.is_stuck();
-    Sampled { states, signs, stuck, steps: flight.steps, events: flight.events }
+    Sampled { states, signs, pasts, stuck, steps: flight.steps, events: flight.events }
 }

@@ -282,8 +282,9 @@ impl Run {
         });
         let growth = lengths.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let states = run.states.iter().map(|state| state.map(Number::value)).collect();
+        let pasts = run.pasts.iter().map(|past| past.map(Number::value)).collect();
         let Sampled { signs, events, stuck, steps, .. } = run;
-        (Self { states, signs, events, stuck, steps }, growth)
+        (Self { states, signs, pasts, events, stuck, steps }, growth)
     }
 }
 

@@ -43,6 +43,8 @@ pub struct Equation<R> {
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// The formulas once more, for what they hold at rest.
     formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
+    /// What depends on the last turn: an effect with a torque, and the sensor's play.
+    keepers: [Option<(Kind, [R; MOST_PARAMETERS])>; 2],
     /// The effect with a corner.
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
@@ -110,7 +112,7 @@ impl<R: Real> Equation<R> {
         let (mut frictions, mut formulas) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
-        let mut corner = None;
+        let (mut corner, mut keepers) = (None, [None; 2]);
         let probe = Point {
             theta: zero,
             velocity: zero,
@@ -121,11 +123,15 @@ impl<R: Real> Equation<R> {
             per_gravity: zero,
             lab: zero,
             phase: zero,
+            past: [zero; 2],
         };
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
             if effect.kind.switch(&parameters, &probe).is_some() {
                 corner = Some((effect.kind, parameters));
+            }
+            if effect.kind.kept(&parameters, &probe).is_some() {
+                keepers[usize::from(effect.is(&[Action::Play]))] = Some((effect.kind, parameters));
             }
             if let Kind::Formula(formula) = effect.kind {
                 holds[0] |= formula.is_driven();
@@ -156,7 +162,7 @@ impl<R: Real> Equation<R> {
                     effect.kind.drive(&parameters, &mut motion);
                     (sideways, plain) = (true, false);
                 }
-                Action::Reading => {}
+                Action::Reading | Action::Play => {}
             }
         }
         let lab_time = gamma.like(pendulum.lab_time);
@@ -174,6 +180,7 @@ impl<R: Real> Equation<R> {
             inertias,
             frictions,
             formulas,
+            keepers,
             corner,
             sideways,
             plain,
@@ -257,7 +264,21 @@ impl<R: Real> Equation<R> {
     ) -> Point<R> {
         let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
         let Forcing { vertical, per_gravity, lab, phase, .. } = *forcing;
-        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase }
+        let past = [theta, sense];
+        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase, past }
+    }
+
+    /// Whether a torque depends on the last turn, and whether the sensor has play.
+    #[must_use]
+    pub fn keeps(&self) -> [bool; 2] {
+        [self.keepers[0].is_some(), self.keepers[1].is_some()]
+    }
+
+    /// What that torque keeps, or what the play reads less the angle; none where there is none.
+    #[must_use]
+    pub fn kept(&self, which: usize, at: &Point<R>) -> Option<R> {
+        let (kind, parameters) = self.keepers[which].as_ref()?;
+        kind.kept(parameters, at)
     }
 
     /// The function at whose zeros an effect has a corner; none where no effect has.
@@ -414,6 +435,7 @@ impl Equation<f64> {
             inertias: Vec::new(),
             frictions: Vec::new(),
             formulas: Vec::new(),
+            keepers: [None; 2],
             corner: self
                 .corner
                 .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),

@@ -30,13 +30,13 @@ impl<R: Real> Observation<R> {
         Self { readings }
     }
 
-    /// The reading at the angle `theta`, rad and not wrapped, passed at `velocity`: each effect in the
-    /// order of the model takes what the one before it gives.
+    /// The reading at the angle `theta`, rad and not wrapped, passed at `velocity` at the laboratory's
+    /// time `lab`: each effect in the order of the model takes what the one before it gives.
     #[must_use]
-    pub fn read(&self, theta: R, velocity: R) -> R {
+    pub fn read(&self, theta: R, velocity: R, lab: R) -> R {
         let mut reading = theta;
         for (kind, parameters) in &self.readings {
-            reading = kind.reading(parameters, reading, velocity);
+            reading = kind.reading(parameters, reading, velocity, lab);
         }
         reading
     }

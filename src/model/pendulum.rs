@@ -180,7 +180,7 @@ impl Pendulum {
         None
     }
 
-    /// The acceleration `th''` at time `tau`, moving in the sense of `velocity`.
+    /// The acceleration `th''` at time `tau`, moving in the sense of `velocity` since long.
     #[must_use]
     pub fn acceleration(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
         let equation = self.equation();

@@ -140,6 +140,11 @@ def test_what_does_not_repeat_every_turn_is_simulated_and_not_mapped() -> None:
     ):
         with pytest.raises(InputError, match="not in maps: it does not repeat every turn"):
             ask()
+    # No start says where a contact turned last.
+    yielding = pendmap.Pendulum(p=0.6, effects=(middle("dahl_friction"),))
+    assert pendmap.simulate(yielding, 1.0, 0.0, 10.0).theta.size > 1
+    with pytest.raises(InputError, match="not in maps: it depends on where the motion last turned"):
+        pendmap.basins(yielding, pendmap.Grid.square(4))
     # An elastic torque bounds the angle, and nothing is taken off it.
     spring = pendmap.Pendulum(p=0.6, effects=(uneven, middle("elastic_restoring")))
     assert pendmap.basins(spring, pendmap.Grid.square(4)).sizes["attractor"] > 0

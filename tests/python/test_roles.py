@@ -20,6 +20,8 @@ ROLES = {"size", "width", "place", "power", "order", "time constant", "phase"}
 SHAPES = {
     "bearing_harmonic": {"n": "order"},
     "coulomb_warm_up": {"tau": "time constant"},
+    "dahl_friction": {"zc": "width"},
+    "eddy_brake": {"vc": "width"},
     "inertia_ripple": {"n": "order"},
     "magnet": {"width": "width"},
     "power_law_drag": {"n": "power"},

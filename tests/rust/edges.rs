@@ -1,7 +1,7 @@
 //! Where rounding could decide: grazing contacts, starts at rest, the stick's edge.
 
 use pendmap::integrate::State;
-use pendmap::integrate::course::Course;
+use pendmap::integrate::course::{Course, Resting};
 use pendmap::integrate::event::{Event, EventKind};
 use pendmap::integrate::flight::Flight;
 use pendmap::integrate::flow::Flow;
@@ -195,8 +195,8 @@ proptest! {
                     EventKind::Release => {
                         stuck = false;
                         // The sense of the load.
-                        sense = if course.excess_toward(event.tau, event.theta, 1.0)
-                            > course.excess_toward(event.tau, event.theta, -1.0) { 1.0 } else { -1.0 };
+                        sense = if Resting(&course, 0.0).excess_toward(event.tau, event.theta, 1.0)
+                            > Resting(&course, 0.0).excess_toward(event.tau, event.theta, -1.0) { 1.0 } else { -1.0 };
                     }
                     EventKind::StuckForEver => prop_assert!(stuck),
                 }
@@ -207,7 +207,7 @@ proptest! {
             if stuck {
                 prop_assert!(state[1].abs() == 0.0);
                 for s in [1.0, -1.0] {
-                    prop_assert!(course.excess_toward(tau, state[0], s) < 2e-10);
+                    prop_assert!(Resting(&course, 0.0).excess_toward(tau, state[0], s) < 2e-10);
                 }
             } else if sense == 0.0 {
                 sense = state[1].signum();

@@ -53,10 +53,6 @@ fn alone(effect: Effect) -> Pendulum {
     has(Pendulum::new(0.0, 0.7, 1.3, 0.4, 0.0).expect("in range"), effect)
 }
 
-fn acts(kind: Kind) -> Action {
-    kind.definition().action
-}
-
 #[test]
 fn definitions_are_whole() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/model/effects");
@@ -85,7 +81,7 @@ fn definitions_are_whole() {
             Action::Position if *kind == Kind::AsymmetricCoulomb => Group::Damping,
             Action::Position | Action::Driven | Action::Inertia => Group::Torque,
             Action::Drive | Action::FurtherDrive => Group::Drive,
-            Action::Reading => Group::Reading,
+            Action::Reading | Action::Play => Group::Reading,
         };
         assert_eq!(group, expected, "{name}");
         let words: Vec<&str> = formula.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
@@ -123,6 +119,9 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
         ("quadratic_drag", [q]) => own = -q * velocity * speed,
         ("cubic_damping", [k3]) => own = -k3 * velocity.powi(3),
         ("power_law_drag", [q, n]) => own = -q * speed.powf(*n) * sign,
+        ("eddy_brake", [b, vc]) => own = -b * velocity * vc * vc / (vc * vc + velocity * velocity),
+        // After a long way in one sense.
+        ("dahl_friction", [f, _]) => own = -f * sign,
         ("stribeck_friction", [a, vs]) => own = -a * (-(velocity / vs).powi(2)).exp() * sign,
         ("load_dependent_friction", [k]) => {
             let load = (1.0 + up) * theta.cos() + (velocity / w0).powi(2);
@@ -166,7 +165,7 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
             let all = gravity + 0.5 * e * n * angle.sin() * velocity * velocity;
             own = all / (1.0 + e * angle.cos()) - gravity;
         }
-        (name, _) if acts(kind) == Action::Reading => {
+        (name, _) if kind.definition().group == Group::Reading => {
             assert!(name.starts_with("encoder") || name == "sensor_lag");
         }
         (name, _) => panic!("{name} has no formula here"),
@@ -208,11 +207,13 @@ fn readings_are_what_they_say() {
     for (kind, values, theta, expected) in [
         (Kind::EncoderOffset, &[0.1][..], 2.0, 2.1),
         (Kind::EncoderGain, &[0.1], -20.0, -22.0),
+        // 250 into the laboratory's time, and 40 more.
+        (Kind::EncoderDrift, &[1e-3], 2.0, 2.29),
         (Kind::EncoderEccentricity, &[0.1, 0.5 * PI], 2.0 * PI, 2.0 * PI + 0.1),
         (Kind::SensorLag, &[0.01], 2.0, 2.0 - 0.01 * 3.0),
     ] {
         let pendulum = alone(Effect::new(kind, values).expect("in range"));
-        let found = Observation::lift(&pendulum, |_, value| value).read(theta, 3.0);
+        let found = Observation::lift(&pendulum, |_, value| value).read(theta, 3.0, 290.0);
         assert!((found - expected).abs() < 1e-14, "{kind:?}: {found}");
     }
 }
@@ -223,7 +224,7 @@ fn readings_follow_one_another_in_order() {
     let gain = Effect::new(Kind::EncoderGain, &[0.5]).expect("in range");
     for (effects, expected) in [([offset, gain], 1.5 * 1.1), ([gain, offset], 1.5 + 0.1)] {
         let pendulum = effects.into_iter().fold(driven(0.1, 1.0, 2.0), has);
-        let found = Observation::lift(&pendulum, |_, value| value).read(1.0, 3.0);
+        let found = Observation::lift(&pendulum, |_, value| value).read(1.0, 3.0, 0.0);
         assert!((found - expected).abs() < 1e-14, "{effects:?}: {found}");
     }
 }
@@ -248,7 +249,8 @@ pub fn evaluated(
     let [theta, velocity] = [change(count, at[0]), change(count + 1, at[1])];
     let forcing = equation.forcing(tau);
     let point = equation.point(&forcing, theta, velocity, 1_f64.copysign(at[1]));
-    let reading = Observation::lift(pendulum, change).read(theta, velocity);
+    let lab = pendulum.lab_time + tau;
+    let reading = Observation::lift(pendulum, change).read(theta, velocity, lab);
     [equation.acceleration(&forcing, &point), reading]
 }
 
@@ -260,7 +262,8 @@ pub fn derivatives(pendulum: &Pendulum, tau: f64, at: State) -> [Dual; 2] {
     let [theta, velocity] = [seeded(count, at[0]), seeded(count + 1, at[1])];
     let forcing = equation.forcing(constant(tau));
     let point = equation.point(&forcing, theta, velocity, constant(1_f64.copysign(at[1])));
-    let reading = Observation::lift(pendulum, seeded).read(theta, velocity);
+    let lab = constant(pendulum.lab_time + tau);
+    let reading = Observation::lift(pendulum, seeded).read(theta, velocity, lab);
     [equation.acceleration(&forcing, &point), reading]
 }
 

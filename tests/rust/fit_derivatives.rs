@@ -149,6 +149,54 @@ fn derivatives_hold_for_what_sensors_on_the_rod_read() {
 }
 
 #[test]
+fn derivatives_hold_where_a_contact_yields() {
+    let dahl: (Kind, &[f64]) = (Kind::DahlFriction, &[0.05, 0.1]);
+    let start = [1.2, -0.1];
+    // To swings far smaller than the contact yields.
+    let decay = with(undriven(0.02, 0.0), &[dahl, (Kind::QuadraticDrag, &[0.01])]);
+    let error = worst(record(decay, None, start, 60.0), None, start);
+    assert!(error < 1e-6, "{error:e}");
+    // Held fast now and then, and seen by an accelerometer.
+    let rubbing = with(driven(0.05, 0.9, 0.87).with_friction(0.1).expect("in range"), &[dahl]);
+    let mut record = record(rubbing.clone(), None, start, 30.0);
+    let course = Course::new(&rubbing, true, TOLERANCE, |_, value| value);
+    let events = sample(&course, 0.0, start, &[30.0], |_, _| true).events;
+    assert!(events.iter().any(|event| event.kind == EventKind::Release), "{events:?}");
+    let error = worst(record.clone(), None, start);
+    assert!(error < 1e-6, "{error:e}");
+    record.rod_sensor = Some(RodSensor {
+        rate: 0.0,
+        place: 1.0,
+        gravity: 1.0,
+        bias: 0.0,
+        interval: 0.0,
+        tilt: 0.1,
+    });
+    let error = worst(record, None, start);
+    assert!(error < 1e-6, "{error:e}");
+}
+
+#[test]
+fn derivatives_hold_where_a_sensor_has_play() {
+    // No sample is so near where the play is taken up that a difference passes it.
+    for (theta_r, until) in [(0.004, 40.0), (0.03, 60.0)] {
+        let effects: [(Kind, &[f64]); 3] = [
+            (Kind::EncoderGain, &[0.02]),
+            (Kind::EncoderBacklash, &[0.07]),
+            (Kind::DahlFriction, &[0.02, 0.1]),
+        ];
+        let base = undriven(0.05, 0.0).with_friction(theta_r).expect("in range");
+        let start = [1.2, -0.1];
+        let record = record(with(base, &effects), None, start, until);
+        let last = record.readings.len() - 1;
+        let rests = (record.readings[last] - record.readings[last - 50]).abs() < 1e-12;
+        assert_eq!(rests, theta_r > 0.01);
+        let error = worst(record, None, start);
+        assert!(error < 1e-6, "{theta_r}: {error:e}");
+    }
+}
+
+#[test]
 fn a_bias_needs_a_sensor_on_the_rod() {
     let record = record(undriven(0.02, 0.0), None, [1.0, 0.0], 20.0);
     let fault = Problem::new(vec![record], free(&[Slot::Bias], 1, &[0.0]), TOLERANCE);
@@ -157,10 +205,16 @@ fn a_bias_needs_a_sensor_on_the_rod() {
 
 #[test]
 fn derivatives_hold_for_forced_motion_with_sticks() {
-    let pendulum = with(
+    let mut pendulum = with(
         driven(0.1, 1.5, 0.87).with_friction(0.2).expect("in range"),
-        &[(Kind::DriveFrequency, &[0.01]), (Kind::EncoderGain, &[0.01])],
+        &[
+            (Kind::DriveFrequency, &[0.01]),
+            (Kind::EncoderGain, &[0.01]),
+            (Kind::EncoderDrift, &[0.002]),
+            (Kind::EddyBrake, &[0.02, 0.8]),
+        ],
     );
+    pendulum.lab_time = 20.0;
     let start = [-0.43, 1.03];
     let error = worst(record(pendulum, None, start, 15.0), None, start);
     assert!(error < 1e-6, "{error:e}");

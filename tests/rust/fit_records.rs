@@ -37,9 +37,12 @@ pub fn record(
     if let Some(recorded) = &recorded {
         course = course.driven_by(Arc::clone(recorded));
     }
-    let states = sample(&course, 0.0, start, &times, |_, _| true).states;
+    let run = sample(&course, 0.0, start, &times, |_, _| true);
     let sensor = Observation::lift(&pendulum, |_, value| value);
-    let readings = states.iter().map(|state| sensor.read(state[0], state[1])).collect();
+    let read = |(k, tau): (usize, &f64)| {
+        sensor.read(run.given(&course, k), run.states[k][1], pendulum.lab_time + tau)
+    };
+    let readings = times.iter().enumerate().map(read).collect();
     let weights = vec![1.0; times.len()];
     Record {
         pendulum,

@@ -16,7 +16,10 @@ use crate::support::{driven, spread, undriven};
 #[test]
 fn members_read_what_one_trajectory_would() {
     let offset: (Kind, &[f64]) = (Kind::EncoderOffset, &[0.03]);
-    let forced = with(driven(0.05, 1.2, 2.0).with_friction(0.02).expect("in range"), &[offset]);
+    let drift: (Kind, &[f64]) = (Kind::EncoderDrift, &[0.002]);
+    let plain = driven(0.05, 1.2, 2.0).with_friction(0.02).expect("in range");
+    let mut forced = with(plain, &[offset, drift]);
+    forced.lab_time = 50.0;
     let starts = spread(9, PI, 3.0);
     let template = record(forced.clone(), None, starts[0], 30.0);
     let count = AtomicUsize::new(0);

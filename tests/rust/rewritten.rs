@@ -12,6 +12,7 @@ pub fn term(kind: Kind) -> Option<&'static str> {
         "quadratic_drag" => "-q*v*abs(v)",
         "cubic_damping" => "-k3*v^3",
         "power_law_drag" => "-q*abs(v)^n*sign(v)",
+        "eddy_brake" => "-b*v/(1 + (v/vc)^2)",
         "stribeck_friction" => "-size*exp(-(v/vs)^2)*sign(v)",
         "load_dependent_friction" => "-k*(abs((1 + a)*cos(theta) + v^2/w0^2) - 1)*sign(v)",
         "asymmetric_viscous" => "-b*abs(v)",

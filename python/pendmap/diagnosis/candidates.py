@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap import checks
 from pendmap.errors import InputError
+from pendmap.identification.report import DRAG
 from pendmap.model.effects import Effect, definition, is_shape, library, middle
 from pendmap.model.formula import Formula
 from pendmap.model.rig import COUNTERPARTS
@@ -26,7 +27,7 @@ __all__ = ["CORE", "ZERO", "Candidate", "candidates", "checked_own", "commonness
 ZERO: Final = "encoder_offset"
 """The sensor's zero: it says nothing of the pendulum, and does not count among the effects."""
 
-CORE: Final = ("quadratic_drag", ZERO)
+CORE: Final = (DRAG, ZERO)
 """What the physical core has beside viscous damping and Coulomb friction."""
 
 COMMON: Final = (*CORE, "encoder_gain", "bias_torque")

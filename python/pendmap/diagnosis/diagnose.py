@@ -249,8 +249,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
     report(steps - 1, steps)
     with _followed(experiment):
-        runs = run_by_run(evidence, nearest.trial)
-        after = residual_torque(evidence, nearest.trial)
+        runs = run_by_run(state.evidence, nearest.trial)
+        after = residual_torque(state.evidence, nearest.trial)
     judgement = judge(state, nearest, runs, after.chance)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else begin
@@ -260,7 +260,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         before = attempted(
             reasons,
             "where",
-            lambda: residual_torque(evidence, begin.trial),
+            lambda: residual_torque(state.evidence, begin.trial),
             Torque.unknown(begin.trial),
         )
     scores = state.scores(begin.trial)
@@ -270,7 +270,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         best,
         nearest,
         judgement,
-        named_effects(evidence, best, judgement, reasons) if claimed else (),
+        named_effects(evidence, best, judgement, runs, reasons) if claimed else (),
         gap_of(evidence, begin, best),
         before,
         after if claimed else before,

@@ -178,6 +178,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     least_gain: float = 1e-3,
     growth: float = QUICK,
     zeroed: Sequence[str] = (),
+    target: float = math.inf,
 ) -> Trial:
     """Fit a model to the evidence.
 
@@ -191,7 +192,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         What is fitted.
     chosen : sequence of Candidate
         The effects of the model that were added to the baseline.
-    start, windows, steps, least_gain, growth
+    start, windows, steps, least_gain, growth, target
         As of :func:`pendmap.identification.fitting.fit_runs`.
     zeroed : sequence of str
         Coefficients that are held at 0.
@@ -206,6 +207,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         steps=steps,
         least_gain=least_gain,
         growth=growth,
+        target=target,
     )
     return Trial(
         fit, tuple(free), tuple(chosen), evidence.fitted, evidence.floors, tuple(zeroed)

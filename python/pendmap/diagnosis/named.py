@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.diagnose import Discrepancy
     from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.state import Found
+    from pendmap.diagnosis.runs import RunByRun
     from pendmap.diagnosis.verdict import Judgement
     from pendmap.model import Formula, Rig
 
@@ -78,7 +79,7 @@ class NamedEffect:
 
 
 def named_effects(
-    evidence: Evidence, best: Found, judgement: Judgement, reasons: Reasons
+    evidence: Evidence, best: Found, judgement: Judgement, runs: RunByRun, reasons: Reasons
 ) -> tuple[NamedEffect, ...]:
     """Return the effects of the best model.
 
@@ -90,10 +91,12 @@ def named_effects(
         The model.
     judgement : Judgement
         Its standing. Of effects that the model does not have nothing is returned.
+    runs : RunByRun
+        Parameters run by run: what differs between them widens the intervals.
     reasons : dict of str to str
         Where it is kept why intervals are those of the covariance where a profile is wanted.
     """
-    widening = math.sqrt(best.trial.widening)
+    widening = best.trial.widening
     none: dict[str, dict[str, tuple[float, float]]] = {}
     profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)
     others = elsewhere(evidence, best.trial)
@@ -104,12 +107,14 @@ def named_effects(
             continue
         parameters, errors = values_of(best, candidate)
         mixed = best.trial.fit.mixed
-        ci95 = {
-            n: interval(parameters[n], half, mixed=f"{candidate.name}.{n}" in mixed)
-            for n, error in errors.items()
-            if math.isfinite(half := Z95 * widening * error)
-        }
-        ci95 |= profiled.get(candidate.name, {})
+        ci95 = {}
+        for n, error in errors.items():
+            between = runs.between(f"{candidate.name}.{n}")
+            half = Z95 * math.hypot(math.sqrt(widening) * error, between)
+            if math.isfinite(half):
+                ci95[n] = interval(parameters[n], half, mixed=f"{candidate.name}.{n}" in mixed)
+            if not between:
+                ci95 |= {k: v for k, v in profiled.get(candidate.name, {}).items() if k == n}
         named.append(
             NamedEffect(
                 candidate.name,
@@ -150,7 +155,8 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """Return the model of a diagnosis with the notes of its file.
 
     Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
-    fitted, widened as those intervals are, ``[provenance]`` the records with their SHA-256, the
+    fitted, widened as those intervals are, and ``between_runs`` in it the standard deviation of each
+    parameter that differs between runs by more than its error; ``[provenance]`` the records with their SHA-256, the
     version, the command and the verdict, and which coefficients are held at 0.
 
     Parameters
@@ -173,8 +179,15 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         "covariance": {
             "names": [_called(name, named) for name in fit.names],
             "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
+            "between_runs": {
+                _called(name, named): between
+                for name in fit.names
+                if "[" not in name and (between := found.runs.between(name)) > 0
+            },
         },
-        "provenance": provenance(files, command)
+        "provenance": provenance(
+            files, command, rms=found.gap.after, noise=found.gap.noise_floor
+        )
         | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
     }
     if found.best.trial.zeroed:

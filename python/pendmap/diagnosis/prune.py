@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pendmap.diagnosis.refit import key_of
+
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.refit import Key
     from pendmap.diagnosis.state import State
 
 __all__ = ["pruned", "rivals_of"]
@@ -15,7 +18,8 @@ __all__ = ["pruned", "rivals_of"]
 def pruned(state: State, best: Trial) -> Trial:
     """Return a model without effects that gain too little, each in its cheapest form.
 
-    Of all fits that the records do not tell from the best, the simplest and commonest stands.
+    Of all fits that the records do not tell from the best, the simplest and commonest stands. No
+    set of effects is looked at twice.
 
     Parameters
     ----------
@@ -24,13 +28,24 @@ def pruned(state: State, best: Trial) -> Trial:
     best : Trial
         An accepted model.
     """
-    state.accept(best)
+    seen: set[Key] = set()
+    following: Trial | None = best
+    while following is not None and key_of(following.chosen) not in seen:
+        best = state.settled(following)
+        seen.add(key_of(best.chosen))
+        state.accept(best)
+        following = _following(state, best)
+    return best
+
+
+def _following(state: State, best: Trial) -> Trial | None:
+    """Return a model that is preferred to another one; none where that stands."""
     for candidate in best.chosen:
         rest = state.rest(best, candidate)
         if rest is None:
             continue  # without it there is no motion to speak of
         if not state.gains(rest, best):
-            return pruned(state, state.settled(rest))
+            return rest
         for _, other in rivals_of(state, best, candidate, rest):
             if (
                 other is not None
@@ -38,9 +53,8 @@ def pruned(state: State, best: Trial) -> Trial:
                 and state.cost(other) < state.cost(best)
                 and state.holds(best, other)
             ):
-                return pruned(state, state.settled(other))
-    simplest = state.simplest(best)
-    return best if simplest is best else pruned(state, state.settled(simplest))
+                return other
+    return state.simplest(best)
 
 
 def rivals_of(

@@ -154,8 +154,12 @@ def replaced(  # noqa: PLR0913 (what is fitted, and what decides)
     scores: Scores,
     place: int,
     level: float,
+    target: float,
 ) -> Trial | None:
-    """Return a trial's model with another effect in the place of one, from the trial's motion."""
+    """Return a trial's model with another effect in the place of one, from the trial's motion.
+
+    The fit is given up where it promises to end far above the sum of squares ``target``.
+    """
     model, free, start = _without(trial, dropped)
     score = scores.scores[place]
     other = score.candidate
@@ -169,10 +173,11 @@ def replaced(  # noqa: PLR0913 (what is fitted, and what decides)
             windows=trial.fit.windows,
             steps=FEW_STEPS,
             least_gain=LITTLE * level,
+            target=target,
         )
     except InputError:
         return None
-    return within_physics(evidence, found)
+    return found if found.fit.given_up else within_physics(evidence, found)
 
 
 def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:

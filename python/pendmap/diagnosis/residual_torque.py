@@ -9,7 +9,8 @@ fit has anyhow (variation of constants). A torque that is constant while the pen
 of the angle, say, so has a column like any parameter, at the price of two running integrals; the
 torques of all bins are fitted together, with what the parameters and the initial states can follow
 taken off. Since an error adds up over a record, this sees torques far below what second differences
-of the readings show.
+of the readings show. The bins of angle, velocity, amplitude, phase and time are fitted together too: what one
+of them explains is no artefact of another.
 
 What is shown is therefore the torque beyond what the model's own terms could take up.
 """
@@ -125,13 +126,28 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
     further, residual = freed(evidence, windows, columns)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
+    joint = _solved(further, residual)
+    wide = math.sqrt(trial.level)
     first = 0
     for name in names:
-        count = edges[name].size - 1
-        found[name], gains[name] = _solved(
-            further[:, first : first + count], residual, name, edges[name], trial.remainder.level
-        )
-        first += count
+        last = first + edges[name].size - 1
+        own = _solved(further[:, first:last], residual)
+        gains[name] = (own.gain, own.rank)
+        torque, errors = joint.torque[first:last], wide * joint.errors[first:last]
+        found[name] = [
+            {
+                "over": name,
+                "unit": OVER[name],
+                "along_motion": name in ALONG,
+                "from": float(edges[name][k]),
+                "to": float(edges[name][k + 1]),
+                "torque": float(torque[k]),
+                "stderr": float(errors[k]),
+                "z": float(torque[k] / errors[k]) if errors[k] > 0 else 0.0,
+            }
+            for k in range(torque.size)
+        ]
+        first = last
     return Torque(found, gains, trial.remainder)
 
 
@@ -248,32 +264,26 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
     return np.asarray(response * weight[:, None], np.float64)
 
 
-def _solved(
-    columns: Floats, residual: Floats, name: str, edges: Floats, level: float
-) -> tuple[list[dict[str, Any]], tuple[float, int]]:
+@dataclasses.dataclass(frozen=True)
+class _Solution:
+    """Torques of bins that are fitted together, their errors for noise of 1, and what they gain."""
+
+    torque: Floats
+    errors: Floats
+    gain: float
+    rank: int
+
+
+def _solved(columns: Floats, residual: Floats) -> _Solution:
+    """Return the torques of bins that explain residuals best, those of least size where many do."""
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
-    if not np.all(scale > 0):
-        return [], (0.0, 0)
+    scale[scale == 0] = 1.0
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    seen = values > BLIND * values[-1]
+    seen = values > BLIND * max(float(values[-1]), 1e-300)
     spread = vectors[:, seen] / np.sqrt(values[seen])
     inverse = (spread @ spread.T) / np.outer(scale, scale)
     pull = columns.T @ residual
     torque = inverse @ pull
-    gain = float(pull @ torque)
-    stderr = np.sqrt(level * np.diag(inverse))
-    rows = [
-        {
-            "over": name,
-            "unit": OVER[name],
-            "along_motion": name in ALONG,
-            "from": float(edges[k]),
-            "to": float(edges[k + 1]),
-            "torque": float(torque[k]),
-            "stderr": float(stderr[k]),
-            "z": float(torque[k] / stderr[k]) if stderr[k] > 0 else 0.0,
-        }
-        for k in range(len(torque))
-    ]
-    return rows, (gain, int(np.count_nonzero(seen)))
+    errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    return _Solution(torque, errors, float(pull @ torque), int(np.count_nonzero(seen)))

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["RunByRun", "run_by_run"]
 
+CHANCE: Final = 1e-3
+"""Probability that noise alone makes a parameter differ between runs, below which it differs."""
+
 BLIND: Final = 1e-9
 """A direction with this part of a run's greatest information is not seen in it."""
 
@@ -42,12 +45,14 @@ class RunByRun:
     uneven: float
     chance: float
 
-    def spread(self, name: str) -> float:
-        """Return how much a parameter differs from run to run beyond noise, over its size.
+    def between(self, name: str) -> float:
+        """Return the standard deviation of a parameter between the runs beyond its errors, SI.
 
-        The standard deviation between runs of DerSimonian & Laird (1986), Controlled Clinical
-        Trials 7, 177; 0 where fewer than two runs show it.
+        That of DerSimonian & Laird (1986), Controlled Clinical Trials 7, 177; 0 where fewer than
+        two runs show the parameter, or chance makes it differ as much (Cochran's Q).
         """
+        from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
+
         shown = [(v, e) for v, e in self.coefficients.get(name, []) if math.isfinite(e) and e > 0]
         if len(shown) < 2:  # noqa: PLR2004 (nothing to compare)
             return 0.0
@@ -55,9 +60,10 @@ class RunByRun:
         weights = np.array([error**-2 for _, error in shown])
         mean = float(np.average(values, weights=weights))
         q = float(np.sum(weights * (values - mean) ** 2))
+        if chdtrc(len(shown) - 1, q) > CHANCE:
+            return 0.0
         scale = float(np.sum(weights) - np.sum(weights**2) / np.sum(weights))
-        between = max(q - (len(shown) - 1), 0.0) / scale
-        return math.sqrt(between) / max(abs(mean), 1e-300)
+        return math.sqrt(max(q - (len(shown) - 1), 0.0) / scale)
 
 
 def run_by_run(evidence: Evidence, trial: Trial) -> RunByRun:
@@ -92,7 +98,7 @@ def run_by_run(evidence: Evidence, trial: Trial) -> RunByRun:
                 wanted[name].append((value, math.inf))
                 continue
             step = float(pull[place]) / seen / sizes[place]
-            wanted[name].append((value + step, math.sqrt(noise.level / seen) / sizes[place]))
+            wanted[name].append((value + step, math.sqrt(trial.level / seen) / sizes[place]))
     degrees = max(degrees, 0)
     uneven = (q / noise.level - degrees) / math.sqrt(2 * degrees) if degrees else 0.0
     return RunByRun(wanted, uneven, noise.chance_of(q, degrees))

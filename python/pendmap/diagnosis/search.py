@@ -1,17 +1,18 @@
 """The search for the effects that a model lacks.
 
 1. The given model is fitted, and the physical core: viscous damping, Coulomb friction and quadratic
-   drag with the sensor's zero. The cheaper one is where the search starts.
-2. All effects of the library, in all their shapes, are scored there, alone and in pairs; before
-   anything is accepted also at the given model, where an effect stands in place of the drag.
-3. The best few are fitted jointly with all other parameters, within physics.
-4. A model costs its sum of squares, counted in independent readings of the residuals that the best
-   model leaves, and Schwarz's penalty. The cheapest is accepted if noise alone hardly gains as
+   drag with the sensor's zero. The core keeps what it needs of its effects.
+2. Readings get the error that the best model so far leaves, beside their noise. A sum of squares
+   counts in independent readings of that model's residuals.
+3. All effects of the library, in all their shapes, are scored at the best model (Rao), alone and in
+   pairs; at first also at the models without one of the core's effects.
+4. The best few are fitted with all other parameters, within physics.
+5. The cheapest, by its sum of squares and Schwarz's penalty, is accepted if noise hardly gains as
    much, if it closes its share of a gap that it does not close whole, and if it loses on no
    held-out set.
-5. Steps 2 to 4 are repeated until nothing is accepted.
-6. Each accepted effect is dropped where it gains too little beside the others, and replaced by
-   whatever is cheaper in its place (:mod:`pendmap.diagnosis.prune`).
+6. Accepted effects are dropped where they gain too little beside the others, and replaced by what
+   fits better; of fits that the records do not tell apart the simplest and commonest stands.
+7. Steps 2 to 6 are repeated until nothing is accepted.
 """
 
 from __future__ import annotations

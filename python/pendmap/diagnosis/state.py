@@ -14,7 +14,7 @@ from pendmap.diagnosis.fitted_model import fitted, settled
 from pendmap.diagnosis.held import Held, predictive, tried
 from pendmap.diagnosis.model_error import model_errors, weighted
 from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.refit import Key, best_of, key_of, refitted, replaced, without
+from pendmap.diagnosis.refit import Key, key_of, refitted, replaced, without
 from pendmap.diagnosis.scores import Scores, scores_of
 from pendmap.errors import InputError
 
@@ -84,6 +84,7 @@ class State:
         self._fits: dict[Key, Trial] = {key_of(()): base}
         self._rests: dict[tuple[Key, str], Trial | None] = {}
         self._refits: dict[tuple[Key, Key], Trial | None] = {}
+        self._instead: dict[tuple[Key, Key, str], Trial | None] = {}
         self._scores: dict[Key, Scores] = {}
         self._held: dict[int, tuple[Trial, Held | None, tuple[float, ...]]] = {}
 
@@ -182,13 +183,13 @@ class State:
 
         The given model stands where none is as good as the best accepted one.
         """
-        reach = self._best.chi2 + self.thresholds.alike * self.level
+        reach = max(self._best.chi2 + self.thresholds.alike * self.level, best.chi2)
 
         def order(trial: Trial) -> tuple[float, ...]:
             common = sum(commonness(name) for name in trial.names)
             return trial.adapted, common, trial.chi2
 
-        alike = [t for t in self._fits.values() if t.chi2 < reach and self.room(t) >= 0]
+        alike = [t for t in self._fits.values() if t.chi2 <= reach and self.room(t) >= 0]
         for trial in sorted((best, *alike), key=order):
             if trial is best or self.holds(best, trial, self.thresholds.alike):
                 return trial
@@ -196,12 +197,15 @@ class State:
 
     def instead(self, trial: Trial, dropped: Candidate, rest: Trial, place: int) -> Trial | None:
         """Return a trial's model with a candidate of the rest's scores in an effect's place."""
-        found = replaced(
-            self.evidence, trial, dropped, self.scores(rest), place, self.level
-        )
-        if found is None or found.chi2 > rest.chi2:
-            found = best_of(found, self.refit(rest, [place]))
-        return self.keep(found)
+        scores = self.scores(rest)
+        way = key_of(trial.chosen), key_of([scores.scores[place].candidate]), dropped.name
+        if way not in self._instead:
+            target = trial.chi2 + self.thresholds.alike * self.level
+            found = replaced(self.evidence, trial, dropped, scores, place, self.level, target)
+            if found is None:
+                found = self.refit(rest, [place])
+            self._instead[way] = found if found is None or found.fit.given_up else self.keep(found)
+        return self._instead[way]
 
     def held(self, trial: Trial) -> Held | None:
         """Return how a model does on what was held back; none where its motion is lost there."""

@@ -21,7 +21,7 @@ __all__ = ["as_json", "as_text", "ranking_table"]
 SAID: Final = {
     "none": "none: the baseline describes the records to within their noise",
     "named": "named: the effects below explain what the baseline lacks",
-    "partial": "partial: the effects below close most of the gap, and something is left",
+    "partial": "partial: the effects below close a part of the gap, and something is left",
     "ambiguous": "ambiguous: these records do not tell the effects of a class apart",
     "unknown": "unknown: something is missing that no candidate explains",
 }
@@ -65,6 +65,9 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 "ci95": {name: list(bounds) for name, bounds in effect.ci95.items()},
                 "probability": effect.probability,
                 "approximate": effect.approximate,
+                "closes": next(
+                    s.closed for s in judgement.standings if s.candidate.name == effect.name
+                ),
                 "elsewhere": effect.elsewhere,
             }
             for effect in found.effects
@@ -264,7 +267,14 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         nearly = (
             ", with reserve: what is missing may only resemble it" if effect.approximate else ""
         )
-        yield f"  {effect.name}: {values}; probability {effect.probability:.3f}{nearly}"
+        share = next(
+            100 * s.closed for s in judgement.standings if s.candidate.name == effect.name
+        )
+        yield (
+            f"  {effect.name}: {values}; closes {share:.0f} % of the squared gap that the others "
+            f"leave; probability {effect.probability:.3f}, given that the effect is in the "
+            f"library{nearly}"
+        )
         for name, value in effect.elsewhere.items():
             said = f"{name} = {value:.4g} {units[name]}".rstrip()
             yield f"    or {said}, which does as well: the sides are not told apart"
@@ -285,6 +295,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         by = "" if found.effects else " by what is nearest"
         yield f"Share of the squared gap closed{by}: {100 * max(judgement.closed, 0.0):.0f} %"
     yield from zeroed(found)
+    yield from _between(found)
     yield from confined(found)
     # Of each thing that it may go by the clearest place: neighbours say the same.
     clearest = {row["over"]: row for row in reversed(found.where)}
@@ -301,6 +312,18 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         )
     yield from _further(found)
     yield from findings_said(found.evidence.experiment, *runs)
+
+
+def _between(found: Discrepancy) -> Iterator[str]:
+    """Yield which parameters differ from run to run by more than their errors."""
+    for name in found.best.trial.fit.names:
+        between = found.runs.between(name)
+        if between > 0:
+            yield (
+                f"{name} differs from run to run by {between:.3g} "
+                f"{unit_of(name, found.definition)}".rstrip()
+                + ", more than its error: intervals are wider by it"
+            )
 
 
 def _further(found: Discrepancy) -> Iterator[str]:

@@ -26,11 +26,8 @@ class Thresholds:
         Twice the difference of log-likelihoods, in independent readings, up to which two models are
         not told apart.
     closes : float
-        Share of the squared gap above the noise that an effect closes at least where the model with
-        it still lacks something.
-    main : float
-        Share of the squared gap above the noise that the accepted effects close at least to be
-        named ``partial``.
+        Share of the squared gap above the noise that effects close at least where the model with
+        them still lacks something: each to be accepted, all together to be named ``partial``.
     loss : float
         Rise of the sum of squares on a held-out set, in independent readings, up to which an effect
         is accepted.
@@ -58,8 +55,7 @@ class Thresholds:
     chance: float = 1e-3
     rest: float = 1e-3
     alike: float = 10.0
-    closes: float = 1 / 3
-    main: float = 0.5
+    closes: float = 0.25
     loss: float = 4.0
     singles: int = 4
     pairs: int = 2

@@ -13,6 +13,8 @@ from pendmap.diagnosis.form import Form, form_of
 from pendmap.diagnosis.alternatives import Standing, standing_of
 
 if TYPE_CHECKING:
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.runs import RunByRun
     from pendmap.diagnosis.state import Found, State
 
@@ -45,7 +47,7 @@ class Judgement:
     ratio_held : float
         Sum of squares over degrees of freedom on what was held back.
     closed : float
-        Share of the gap that the effects close, the lesser one of what was fitted and held back.
+        Share of the squared gap above the noise that the effects close on what was fitted.
     uneven : float
         How differently the runs would have the parameters, over the standard error of that
         (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
@@ -115,13 +117,13 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
             key=lambda s: -s.gain,
         )
     )
-    spread = runs.spread(standings[0].candidate.free[0]) if standings else 0.0
+    spread = _spread(trial, runs, standings[0].candidate) if standings else 0.0
     sure = complete(form.chance, [s.gain for s in standings]) if standings else 1.0
     verdict: Verdict
     if not standings:
         verdict = "unknown" if rest else "none"
     elif rest:
-        verdict = "partial" if closed >= limits.main and spread <= limits.spread else "unknown"
+        verdict = "partial" if closed >= limits.closes and spread <= limits.spread else "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
     else:
@@ -143,21 +145,22 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
     )
 
 
-def _closed(state: State, best: Found) -> float:
-    """Return the share of the gap closed, the lesser one of what was fitted and held back.
+def _spread(trial: Trial, runs: RunByRun, candidate: Candidate) -> float:
+    """Return the standard deviation of an effect's size between the runs, over the size."""
+    size = candidate.free[0]
+    return runs.between(size) / max(abs(trial.fit[size]), 1e-300)
 
-    The gap is the sum of squares above that of noise, as the best model's spectrum shows it.
+
+def _closed(state: State, best: Found) -> float:
+    """Return the share of the gap closed on what was fitted.
+
+    The gap is the sum of squares above that of noise, as the best model's spectrum shows it; 1
+    where it is no more than noise scatters.
     """
-    trial, base = best.trial, state.found(state.base)
-    noise = min(trial.remainder.level, trial.chi2 / max(trial.fit.degrees, 1))
-    shares = []
-    for before, after, degrees in (
-        (base.trial.chi2, trial.chi2, trial.fit.degrees),
-        (base.held.chi2, best.held.chi2, best.held.degrees),
-    ):
-        scatter = noise * math.sqrt(2 * degrees)
-        gap = before - noise * degrees
-        # Noise alone scatters by this much: a gap below it cannot be divided.
-        if gap > scatter:
-            shares.append(1 - max(after - noise * degrees, 0.0) / gap)
-    return float(np.clip(min(shares, default=1.0), -1.0, 1.0))
+    trial, base = best.trial, state.base
+    degrees = max(trial.fit.degrees, 1)
+    noise = min(trial.remainder.level, trial.chi2 / degrees)
+    gap = base.chi2 - noise * degrees
+    if gap <= noise * math.sqrt(2 * degrees):
+        return 1.0
+    return float(np.clip(1 - max(trial.chi2 - noise * degrees, 0.0) / gap, -1.0, 1.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -32,7 +32,13 @@ if TYPE_CHECKING:
     from pendmap.model import Effect
     from pendmap.records import Run
 
-__all__ = ["BEST", "IdentificationReport", "decay_of", "identify_experiment"]
+__all__ = ["BEST", "DRAG", "IdentificationReport", "decay_of", "identify_experiment"]
+
+DRAG: Final = "quadratic_drag"
+"""The effect that is tried unasked where viscous damping and friction leave more than the noise."""
+
+MISSES: Final = 1.2
+"""Residual over noise above which the drag is tried."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -53,6 +59,9 @@ class IdentificationReport(Readable):
         What stands behind the best one; none where it was not asked for or cannot be applied.
     table : Table1
         Table 1 and figure 7 of the decay.
+    with_drag : JointFit or None
+        The same with quadratic drag, where the best one leaves more than the noise and no effect
+        was asked for.
     """
 
     experiment: Experiment
@@ -61,6 +70,7 @@ class IdentificationReport(Readable):
     methods: dict[str, Identification]
     joint: JointFit | None
     table: Table1
+    with_drag: JointFit | None = None
 
     def __repr__(self) -> str:
         sound = (found.short for found in self.methods.values() if found.sound)
@@ -211,8 +221,21 @@ def identify_experiment(
         progress=lambda done, _total: report(before + done, steps),
     )
     table = table_of_run(run, peaks, found)
+    drag = None if joint is None or start is not None or effects else _with_drag(joint)
     report(steps, steps)
-    return IdentificationReport(experiment, run, peaks, found, joint, table)
+    return IdentificationReport(experiment, run, peaks, found, joint, table, drag)
+
+
+def _with_drag(joint: JointFit) -> JointFit | None:
+    """Return a fit with quadratic drag, where the one without leaves more than the noise."""
+    noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
+    if joint.fit.rms < MISSES * noise:
+        return None
+    try:
+        found = fit_together(joint.runs, start=joint.fit.model, effects=[DRAG])
+    except InputError:
+        return None  # the motion with the drag is lost
+    return found if found.fit.rms < joint.fit.rms else None
 
 
 def _best(

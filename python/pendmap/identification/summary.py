@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.errors import InputError
 from pendmap.identification.digits import interval, with_error
 from pendmap.identification.left_out import left_out
+from pendmap.identification.report import DRAG
 from pendmap.records.summary import doubts, findings_said
 
 if TYPE_CHECKING:
@@ -54,6 +55,12 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "table1_left_out": report.table.left_out or None,
         "not_simulated": dict(report.table.lost),
         "rms": None if report.joint is None else report.joint.fit.rms,
+        "with_drag": None
+        if report.with_drag is None
+        else {
+            "rms": report.with_drag.fit.rms,
+            "parameters": {n: e.value for n, e in report.with_drag.fit.estimates.items()},
+        },
         "findings": [
             found.text
             for found in (
@@ -116,6 +123,14 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
         for name, estimate in {**best.estimates, **best.derived}.items():
             if estimate.ci95 is not None:
                 yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
+    if report.with_drag is not None and report.joint is not None:
+        drag = report.with_drag.fit
+        name = next(n for n in drag.estimates if n.startswith(DRAG))
+        yield (
+            f"With {DRAG} ({name.partition('.')[2]} = {with_error(drag.estimates[name])}) the "
+            f"residual is {drag.rms:.3g} rad, {report.joint.fit.rms:.3g} without: --effect {DRAG} "
+            "fits it, diagnose looks for more"
+        )
     if report.table.left_out:
         yield f"{report.run.name}: {report.table.left_out}"
     said = left_out(report.experiment, report.runs)

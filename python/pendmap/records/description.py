@@ -33,7 +33,8 @@ NAME: Final = "experiment.toml"
 
 RATE: Final = "rate_hz"
 
-_RIG: Final = ("gravity", "length_m", "w0", "encoder_counts")
+_LIMITS: Final = ("max_angle", "max_velocity", "max_frequency")
+_RIG: Final = ("gravity", "length_m", "w0", "encoder_counts", *_LIMITS)
 _TOP: Final = ("rig", "columns", "reader", "run")
 _COLUMN: Final = ("name", "unit", "scale", "zero")
 _PLACE: Final = ("direction", "distance_m", "gravity_removed")

@@ -192,7 +192,8 @@ class Experiment:
     runs : tuple of Run
         In the order of the experiment.
     known : mapping
-        What ``[rig]`` says: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``.
+        What ``[rig]`` says: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``; ``max_angle``
+        (rad), ``max_velocity`` and ``max_frequency`` (rad/s) that it can do.
     findings : tuple of Finding
         What concerns the experiment and no run alone: of a file with several releases also what was
         found in all of it.

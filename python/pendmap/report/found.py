@@ -167,7 +167,7 @@ def run_by_run(found: Discrepancy) -> Section:
         blocks.append(Paragraph("There is one run, and nothing to compare it with."))
     for size in sizes:
         pairs = found.runs.coefficients[size]
-        spread = found.runs.spread(size)
+        spread = found.runs.between(size) / max(abs(found.best.trial.fit[size]), 1e-300)
         said = _said(
             found.nearest.trial.fit.estimates[size], math.sqrt(found.nearest.trial.widening)
         )

@@ -42,7 +42,7 @@ MORE: Final = 1.5
 """Times the noise of the readings from which it is said what counts as noise."""
 
 FIGURES: Final = {
-    "separation": "s G",
+    "separation": "separation",
     "interval": "half an interval of 95 %, over the value",
     "limits": "smallest size seen, over that now",
 }
@@ -71,7 +71,7 @@ def _meaning(outlook: Outlook) -> Text:
     )
     if outlook.aim == "separation":
         return (
-            f"{start}s G is the part of the gain of one name that the other cannot follow; from "
+            f"{start}the separation is the part of the gain of one name that the other cannot follow; from "
             f"{outlook.wanted:g} on a wrong name is improbable. Now it is {gained(outlook.now)}."
         )
     if outlook.aim == "interval":

@@ -84,7 +84,7 @@ def _rivals(found: Discrepancy, standing: Standing) -> Iterator[Block]:
         )
     )
     yield Table(
-        ("instead", "gain", "behind", "s", "s G", "why not"),
+        ("instead", "gain", "behind", "share", "separation", "why not"),
         tuple(
             (
                 Name(rival.candidate.title),

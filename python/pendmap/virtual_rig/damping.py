@@ -128,6 +128,24 @@ class AsymmetricCoulomb(Effect):
 
 
 @dataclass(frozen=True)
+class EddyBrake(Effect):
+    """Eddy currents in a plate that passes a magnet: strongest at one velocity.
+
+    Smythe (1942), Trans. AIEE 61, 681: ``2/(x + 1/x)`` of the greatest torque at ``x = v/vc``.
+    """
+
+    name = "eddy_brake"
+    group = "damping"
+    formula = "-b v/(1 + (v/vc)^2)"
+
+    b: float = size(0.008, 0.032, "1/s")
+    vc: float = shape(2.0, 8.0, "rad/s", least=1e-3)
+
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        return -self.b * self.vc**2 * motion.velocity / (self.vc**2 + motion.velocity**2)
+
+
+@dataclass(frozen=True)
 class StribeckFriction(Effect):
     """Dry friction that is larger when the motion is slow."""
 
@@ -216,6 +234,7 @@ DAMPING: tuple[type[Effect], ...] = (
     QuadraticDrag,
     CubicDamping,
     PowerLawDrag,
+    EddyBrake,
     StribeckFriction,
     SharpStribeckFriction,
     LoadDependentFriction,

@@ -325,7 +325,10 @@ def _integrate(
         theta=np.array([plan.theta for plan in plans]),
         velocity=np.array([plan.velocity for plan in plans]),
     )
-    return integrate(equation, starts)
+    paths = integrate(equation, starts)
+    for path, plan in zip(paths, plans, strict=True):
+        path.lab = plan.lab_time
+    return paths
 
 
 def _true(time: Floats, readings: list[ReadingEffect]) -> Floats:

@@ -37,9 +37,13 @@ class Event:
 
 
 class Path:
-    """Angle and velocity of one run at any time; a polynomial for each step of the integrator."""
+    """Angle and velocity of one run at any time; a polynomial for each step of the integrator.
+
+    ``lab`` is the time in the laboratory at which the run begins, s.
+    """
 
     def __init__(self) -> None:
+        self.lab = 0.0
         self.events: list[Event] = []
         self._begins: list[float] = []
         self._lengths: list[float] = []

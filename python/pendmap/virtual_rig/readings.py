@@ -87,6 +87,21 @@ class EncoderOffset(ReadingEffect):
 
 
 @dataclass(frozen=True)
+class EncoderDrift(ReadingEffect):
+    """The zero of the sensor wanders off, by as much in every second."""
+
+    name = "encoder_drift"
+    formula = "reading th + r t, t lab time"
+    signed = True
+    order = 4
+
+    r: float = size(4e-06, 1.5e-05, "rad/s")
+
+    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
+        return angle + self.r * (path.lab + time)
+
+
+@dataclass(frozen=True)
 class EncoderGain(ReadingEffect):
     """The sensor's scale is wrong."""
 
@@ -195,6 +210,7 @@ class Timebase(ReadingEffect):
 
 READINGS: tuple[type[Effect], ...] = (
     EncoderOffset,
+    EncoderDrift,
     EncoderGain,
     EncoderEccentricity,
     EncoderBacklash,

@@ -36,7 +36,7 @@ impl Law for EncoderEccentricity {
         mappable: Mappable::Yes,
     };
 
-    fn reading<R: Real>([e, psi, ..]: &[R; MOST_PARAMETERS], theta: R, _: R) -> R {
+    fn reading<R: Real>([e, psi, ..]: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {
         let sine = (theta + *psi).scale(std::f64::consts::FRAC_1_PI).sine::<Fine>();
         theta + *e * sine
     }

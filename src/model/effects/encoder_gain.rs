@@ -24,7 +24,7 @@ impl Law for EncoderGain {
         mappable: Mappable::Yes,
     };
 
-    fn reading<R: Real>([e, ..]: &[R; MOST_PARAMETERS], theta: R, _: R) -> R {
+    fn reading<R: Real>([e, ..]: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {
         theta + *e * theta
     }
 }

@@ -24,7 +24,7 @@ impl Law for EncoderOffset {
         mappable: Mappable::Yes,
     };
 
-    fn reading<R: Real>([d, ..]: &[R; MOST_PARAMETERS], theta: R, _: R) -> R {
+    fn reading<R: Real>([d, ..]: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {
         theta + *d
     }
 }

@@ -43,11 +43,13 @@ impl Kind {
             | Self::QuadraticDrag
             | Self::CubicDamping
             | Self::PowerLawDrag
+            | Self::EddyBrake
             | Self::AsymmetricViscous
             | Self::ViscousDrift
             | Self::ViscousWarmUp => Family::Damping,
             Self::CoulombFriction
             | Self::StribeckFriction
+            | Self::DahlFriction
             | Self::LoadDependentFriction
             | Self::AsymmetricCoulomb
             | Self::CoulombDrift
@@ -68,6 +70,8 @@ impl Kind {
             | Self::DriveSecondHarmonic
             | Self::LateralDrive => Family::Drive,
             Self::EncoderOffset
+            | Self::EncoderDrift
+            | Self::EncoderBacklash
             | Self::EncoderGain
             | Self::EncoderEccentricity
             | Self::SensorLag

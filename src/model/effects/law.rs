@@ -64,6 +64,8 @@ pub enum Action {
     FurtherDrive,
     /// Another reading; no torque.
     Reading,
+    /// Another reading, which depends on where the motion last turned; it comes before the others.
+    Play,
 }
 
 /// Whether a map over initial conditions can have the effect.
@@ -199,6 +201,8 @@ pub struct Point<R> {
     pub lab: R,
     /// Phase of the harmonic drive, rad; it is 0 where no formula asks for it.
     pub phase: R,
+    /// The angle at which the motion last turned or began, and the effect's [`Law::kept`] there.
+    pub past: [R; 2],
 }
 
 impl<R: Real> Point<R> {
@@ -282,6 +286,16 @@ pub trait Law {
         None
     }
 
+    /// What it keeps of the motion, 0 where a motion begins; none where it keeps nothing. The formulas
+    /// take it, as it was at the last turn, from [`Point::past`]. Of a torque it is [`Point::sense`]
+    /// without a motion before, and no map can have it; one effect of a model may keep something. Of
+    /// [`Action::Play`] it is the reading less the angle.
+    #[inline(always)]
+    #[must_use]
+    fn kept<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
+        None
+    }
+
     /// Changes the pivot's motion.
     #[inline(always)]
     fn drive<R: Real>(_: &[R; MOST_PARAMETERS], _: &mut Motion<R>) {}
@@ -292,9 +306,10 @@ pub trait Law {
         at.constant(0.0)
     }
 
-    /// What a sensor reads at the angle `theta`, passing it at `velocity`.
+    /// What a sensor reads at the angle `theta`, passing it at `velocity` at the laboratory's time
+    /// `lab`.
     #[inline(always)]
-    fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R, _: R) -> R {
+    fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {
         theta
     }
 

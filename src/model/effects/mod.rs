@@ -85,6 +85,19 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::kept`].
+            #[inline(always)]
+            pub fn kept<R: Real>(
+                self,
+                parameters: &[R; MOST_PARAMETERS],
+                at: &Point<R>,
+            ) -> Option<R> {
+                match self {
+                    $(Self::$law => $module::$law::kept(parameters, at),)*
+                    Self::Formula(_) => None,
+                }
+            }
+
             /// [`Law::inertia`].
             #[inline(always)]
             pub fn inertia<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
@@ -108,9 +121,10 @@ macro_rules! library {
                 parameters: &[R; MOST_PARAMETERS],
                 theta: R,
                 velocity: R,
+                lab: R,
             ) -> R {
                 match self {
-                    $(Self::$law => $module::$law::reading(parameters, theta, velocity),)*
+                    $(Self::$law => $module::$law::reading(parameters, theta, velocity, lab),)*
                     Self::Formula(_) => theta,
                 }
             }
@@ -151,7 +165,9 @@ library! {
     quadratic_drag::QuadraticDrag,
     cubic_damping::CubicDamping,
     power_law_drag::PowerLawDrag,
+    eddy_brake::EddyBrake,
     stribeck_friction::StribeckFriction,
+    dahl_friction::DahlFriction,
     load_dependent_friction::LoadDependentFriction,
     asymmetric_viscous::AsymmetricViscous,
     asymmetric_coulomb::AsymmetricCoulomb,
@@ -175,6 +191,8 @@ library! {
     drive_second_harmonic::DriveSecondHarmonic,
     lateral_drive::LateralDrive,
     encoder_offset::EncoderOffset,
+    encoder_drift::EncoderDrift,
+    encoder_backlash::EncoderBacklash,
     encoder_gain::EncoderGain,
     encoder_eccentricity::EncoderEccentricity,
     sensor_lag::SensorLag,
@@ -282,6 +300,7 @@ impl Effect {
             per_gravity: 1.0,
             lab: 0.0,
             phase: 0.0,
+            past: [0.0; 2],
         };
         self.kind.switch(&self.parameters, &nowhere).is_some()
     }

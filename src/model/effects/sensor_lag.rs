@@ -27,7 +27,7 @@ impl Law for SensorLag {
         mappable: Mappable::Yes,
     };
 
-    fn reading<R: Real>([tau, ..]: &[R; MOST_PARAMETERS], theta: R, velocity: R) -> R {
+    fn reading<R: Real>([tau, ..]: &[R; MOST_PARAMETERS], theta: R, velocity: R, _: R) -> R {
         theta - *tau * velocity
     }
 }

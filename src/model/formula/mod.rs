@@ -415,6 +415,7 @@ fn is_odd(program: &Program, parameters: &[Parameter]) -> bool {
                 per_gravity: 1.0,
                 lab: 3.0,
                 phase: 1.1 - velocity,
+                past: [theta, sense],
             };
             let [forth, back] = [1.0, -1.0].map(|sense| program.run(&given, &at(sense)));
             (forth + back).abs() <= 1e-12 * (forth.abs() + back.abs())

@@ -63,8 +63,9 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
 ) -> Advice:
     """Return what to record next.
 
-    Names that are alike are to be told apart (``s G`` of 25); of effects that are told apart the
-    widest interval is to be halved; where nothing is named, more is to be seen.
+    Names that are alike are to be told apart (``s G`` of 25), named or leading explanations of what
+    is unknown; of effects that are told apart the widest interval is to be halved; where nothing is
+    found, more is to be seen.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     limits = detection_limits(scores, level, best.trial.names, best.trial.fit.model.units)
 
     def proposed() -> Outlook | None:
-        if judgement.verdict == "ambiguous":
+        if any(len(standing.equivalent) > 1 for standing in judgement.standings):
             return separated(evidence, nearest, judgement.standings, level, reasons)
         if judgement.verdict == "named":
             return tightened(evidence, best, level, reasons)
@@ -106,8 +107,8 @@ def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> l
     said = []
     if judgement.verdict in {"unknown", "partial"}:
         said.append(
-            "Repeat one free decay several times over an hour, and record one that begins in "
-            "rotation: whether the rest repeats, and over what it changes, says what it is."
+            "Repeat one free decay several times over an hour: whether the rest repeats, and "
+            "over what it changes, says what it is."
         )
     if outlook is None:
         return said
@@ -138,11 +139,11 @@ def _separation(outlook: Outlook, best: Prospect) -> str:
         # Information adds up, run by run.
         part = (outlook.wanted - outlook.now) / (best.value - outlook.now)
         runs = math.ceil(len(best.proposal.runs) * part)
-        enough = f"; for {outlook.wanted:g} about {runs} such runs are needed"
+        enough = f"; about {runs} such runs are needed"
     return (
-        f"To tell {names} apart, record {best.proposal.what}: predicted s G = "
-        f"{_power(best.value)} (now {_power(outlook.now)}{enough}), chance of a wrong name "
-        f"{chance_said(best.wrong or 0.0)}."
+        f"To tell {names} apart, record {best.proposal.what}: predicted separation "
+        f"{_power(best.value)} (now {_power(outlook.now)}, {outlook.wanted:g} wanted{enough}), "
+        f"chance of a wrong name {chance_said(best.wrong or 0.0)}."
     )
 
 

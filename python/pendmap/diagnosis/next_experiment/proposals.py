@@ -20,7 +20,10 @@ from pendmap.words import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from numpy.typing import NDArray
+
     from pendmap.diagnosis.data import Evidence
+    from pendmap.identification.runs import FitRun
 
 __all__ = ["Planned", "Proposal", "Start", "menu_of"]
 
@@ -54,6 +57,12 @@ PAUSE_S: Final = 60.0
 
 DRIVEN: Final = (1.0, 1.5, 2.0)
 """Drive frequencies over ``w0``: second resonance, between, first resonance."""
+
+BEYOND: Final = 1.25
+"""What a rig surely can, over the greatest that its records show."""
+
+FASTEST: Final = 0.98
+"""Quantile of the speeds between readings that noise does not reach."""
 
 SWINGING: Final = 1.0
 """Angle at which a driven swing begins, rad."""
@@ -143,7 +152,8 @@ def menu_of(evidence: Evidence, w0: float) -> tuple[Proposal, ...]:
 
     Free decays from small and wide angles and flung round, either way, of several lengths, repeated
     and after pauses; with a harmonic drive among the records forced runs at other frequencies, half
-    as strong, swinging and turning.
+    as strong, swinging and turning; of all these what the rig can do: ``max_angle``,
+    ``max_velocity`` and ``max_frequency`` of ``[rig]``, else a little more than the records show.
 
     Parameters
     ----------
@@ -155,10 +165,12 @@ def menu_of(evidence: Evidence, w0: float) -> tuple[Proposal, ...]:
     usual = _usual_length(evidence)
     most = max(usual, LONGEST_S)
     least = SHORTEST * math.tau / w0
+    limits = _limits(evidence)
     lengths = [x for f in LENGTHS if least <= (x := _round(f * usual)) <= most] or [_round(least)]
     ended = max(run.lab_time_s + float(run.time[-1]) for run in evidence.fitted) + PAUSE_S
     singles, pairs = _free(w0, ended)
-    singles += list(_forced(evidence, w0, ended))
+    singles = [s for s in (*singles, *_forced(evidence, w0, ended)) if limits.allows(s)]
+    pairs = [pair for pair in pairs if all(map(limits.allows, pair))]
     found = [Proposal((Planned(start, x),)) for start in singles for x in lengths]
     for x in lengths:
         found += [Proposal((Planned(a, x), Planned(b, x))) for a, b in pairs]
@@ -168,6 +180,44 @@ def menu_of(evidence: Evidence, w0: float) -> tuple[Proposal, ...]:
             if start.wait_s == 0
         ]
     return tuple(found)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Limits:
+    """The greatest angle (rad), velocity and drive frequency (rad/s) of a rig."""
+
+    angle: float
+    velocity: float
+    frequency: float
+
+    def allows(self, start: Start) -> bool:
+        """Whether the rig can begin a run so."""
+        omega = abs(float((start.drive or {}).get("Omega") or 0.0))
+        return (
+            abs(start.theta) <= self.angle
+            and abs(start.velocity) <= self.velocity
+            and omega <= self.frequency
+        )
+
+
+def _limits(evidence: Evidence) -> _Limits:
+    """Return what ``[rig]`` says of the rig's limits, else a little more than the records show."""
+    known = evidence.experiment.known
+    runs = evidence.fitted
+    shown = _Limits(
+        max(float(np.nanmax(np.abs(run.theta))) for run in runs),
+        max(float(np.nanquantile(_speeds(run), FASTEST)) for run in runs),
+        max((float(r.drive.get("Omega") or 0.0) for r in runs if r.drive is not None), default=0.0),
+    )
+    return _Limits(
+        float(known.get("max_angle", min(BEYOND * shown.angle, math.pi))),
+        float(known.get("max_velocity", BEYOND * shown.velocity)),
+        float(known.get("max_frequency", BEYOND * shown.frequency)),
+    )
+
+
+def _speeds(run: FitRun) -> NDArray[np.float64]:
+    return np.asarray(np.abs(np.gradient(run.angle, run.time)), np.float64)
 
 
 def _usual_length(evidence: Evidence) -> float:
