@@ -85,7 +85,7 @@ def waving() -> tuple[State, Found]:
     ("change", "verdict"),
     [
         ({}, "partial"),
-        ({"main": 1.1}, "unknown"),
+        ({"closes": 1.1}, "unknown"),
         ({"spread": -1.0}, "unknown"),
         ({"rest": 0.0, "forecast": 0.0}, "partial"),
         # Nothing counts as left: then the drag's rivals, which the wave hides, decide.
