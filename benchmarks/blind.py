@@ -5,9 +5,11 @@
 Of the experiments two in five hide nothing; of the others half hide one effect, a quarter two, and
 in a quarter the true effect is withheld from the search, with all that these records do not tell
 from it. ``--forms`` and ``--nuisances`` add experiments whose form differs from the library's, and
-spoilt ones, which are scored apart. The seed is drawn and recorded; results are appended, and a
-run that was ended goes on where it stood. ``--report`` only prints what a file holds, and
-``--plot`` draws how far probabilities can be believed.
+spoilt ones, which are scored apart. ``--mess`` adds experiments with disturbances that no effect
+has, half to ten times as strong as the noise, three in four of them with one main effect. The seed
+is drawn and recorded; results are appended, and a run that was ended goes on where it stood.
+``--report`` only prints what a file holds, and ``--plot`` draws how far probabilities can be
+believed.
 """
 
 from __future__ import annotations
@@ -38,12 +40,14 @@ KINDS += ["none", "one", "none", "one", "withheld", "none", "one", "none", "two"
 """In turn, so that any part of a run has all of them."""
 
 
-def drawn(count: int, forms: int, nuisances: int, seed: int) -> list[blind_cases.Case]:
+def drawn(
+    count: int, seed: int, forms: int = 0, nuisances: int = 0, mess: int = 0
+) -> list[blind_cases.Case]:
     """Draw the cases, each from a seed of its own: more of them change none."""
     kinds = [KINDS[k % len(KINDS)] for k in range(count)]
     cases = []
     for stream, (what, number) in enumerate(
-        (("", count), ("form", forms), ("nuisance", nuisances))
+        (("", count), ("form", forms), ("nuisance", nuisances), ("mess", mess))
     ):
         for k in range(number):
             rng = np.random.default_rng((seed, stream, k))
@@ -67,6 +71,7 @@ def main() -> None:
     parser.add_argument("--experiments", type=int, default=1000)
     parser.add_argument("--forms", type=int, default=0)
     parser.add_argument("--nuisances", type=int, default=0)
+    parser.add_argument("--mess", type=int, default=0)
     parser.add_argument("--seed", type=int, default=None, help="drawn if none is given")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("blind.jsonl"))
@@ -78,7 +83,7 @@ def main() -> None:
     seed = drawn_before if given.seed is None else given.seed
     if not given.report:
         known = {_key(row) for row in rows}
-        cases = drawn(given.experiments, given.forms, given.nuisances, seed)
+        cases = drawn(given.experiments, seed, given.forms, given.nuisances, given.mess)
         left = [case for case in cases if _key(dataclasses.asdict(case)) not in known]
         with (
             ProcessPoolExecutor(given.workers) as pool,

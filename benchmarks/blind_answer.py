@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import tempfile
 import time
 import tomllib
@@ -34,6 +35,14 @@ FAMILIES = {
 """Of effects that only the rig has, by the rig's groups; those of the library it says itself."""
 
 
+STRONG = 100.0
+"""Score that a main effect beside disturbances has at least."""
+
+TRIES, GREATEST = 3, 4.0
+"""Times that it is made stronger until it has, and the greatest size; what does not show counts
+for nothing."""
+
+
 def family(effect: str) -> str:
     """Return the family of an effect."""
     return str(library()[effect]["family"])
@@ -53,36 +62,43 @@ def families(effect: str) -> set[str]:
 
 def run(case: Case) -> dict[str, Any]:
     """Make, diagnose and judge one case."""
-    result: dict[str, Any] = dataclasses.asdict(case)
     hidden = [effect for effect in case.effects if effect != "none"]
-    result["families"] = sorted({f for effect in hidden for f in families(effect)})
+    kin = {"families": sorted({f for effect in hidden for f in families(effect)})}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        # How hard it is does not count what spoils the records.
-        plain = dataclasses.replace(case, **SOUND)
         try:
-            asked = folder / "asked"
-            asked.mkdir()
-            experiment, _ = record(case, asked)
             hard: dict[str, Any] = {"G": [], "s": 1.0, "equals": [], "beyond": 0.0}
             without: list[str] = []
-            if case.effects != ("none",):
-                base = baseline(
-                    evidence_of(record(plain, folder)[0] if plain != case else experiment)
-                )
-                hard, alike = difficulty(plain, folder, base)
+            if hidden:
+                hard, alike = _difficulty(case, folder)
+                for _ in range(TRIES if case.what == "mess" else 0):
+                    if min(hard["G"]) >= STRONG:
+                        break
+                    more = 1.2 * math.sqrt(STRONG / max(min(hard["G"]), 1.0))
+                    case = dataclasses.replace(case, size=min(more * case.size, GREATEST))
+                    hard, alike = _difficulty(case, folder)
                 if case.what == "withheld":
                     own = [effect.split(":")[0] for effect in case.effects]
                     without = [n for n in (*own, *alike) if n in library()]
+            asked = folder / "asked"
+            asked.mkdir()
+            experiment, _ = record(case, asked)
             begin = time.process_time()
             found = diagnose(experiment, without=without)
             seconds = time.process_time() - begin
             truth = _parameters(asked / "noisy.truth.toml")
         except InputError as error:
-            return result | {"error": str(error)}
+            return dataclasses.asdict(case) | kin | {"error": str(error)}
     samples = sum(r.time.size for r in experiment.runs)
     said = {"without": without, "truth": truth, "seconds": seconds, "samples": samples}
-    return result | hard | said | answer(found)
+    return dataclasses.asdict(case) | kin | hard | said | answer(found)
+
+
+def _difficulty(case: Case, folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return how hard a case is; what spoils its records does not count."""
+    plain = dataclasses.replace(case, **SOUND)
+    base, _ = baseline(evidence_of(record(plain, folder)[0]))
+    return difficulty(plain, folder, base)
 
 
 def answer(found: Discrepancy) -> dict[str, Any]:

@@ -33,7 +33,13 @@ on between two runs does nothing that one does which is there all along."""
 SPOILT = {"correlation": 0.5, "dropouts": 0.02, "outliers": 0.003, "jitter": 0.0005}
 """What records are spoilt with, one thing in each experiment that is."""
 
-SOUND = dict.fromkeys(SPOILT, 0.0)
+SOUND = dict.fromkeys((*SPOILT, "mess"), 0.0)
+
+MESS = (0.5, 10.0)
+"""Least and greatest disturbance, in multiples of the sensor's noise."""
+
+MAIN = 0.75
+"""Share of experiments with disturbances that have a main effect."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,10 +58,11 @@ class Case:
     dropouts: float = 0.0
     outliers: float = 0.0
     jitter: float = 0.0
+    mess: float = 0.0
 
 
 def draw(what: str, rng: np.random.Generator) -> Case:
-    """Draw a case: ``none``, ``one``, ``two``, ``withheld``, ``form`` or ``nuisance``."""
+    """Draw a case: ``none``, ``one``, ``two``, ``withheld``, ``form``, ``nuisance`` or ``mess``."""
     kind = str(rng.choice(list(KINDS), p=(0.6, 0.25, 0.15)))
     counts = int(rng.choice(COUNTS))
     noise = max(float(np.exp(rng.uniform(math.log(0.05), math.log(0.5)))), 0.3 * 360 / counts)
@@ -68,6 +75,8 @@ def draw(what: str, rng: np.random.Generator) -> Case:
     effects: tuple[str, ...] = ("none",)
     if what in {"one", "nuisance"} and (what == "one" or rng.random() < 0.5):  # noqa: PLR2004
         effects = (str(rng.choice(usable)),)
+    elif what == "mess":
+        effects = (str(rng.choice(usable)),) if rng.random() < MAIN else ("none",)
     elif what == "two":
         effects = tuple(str(e) for e in rng.choice(usable, 2, replace=False))
     elif what == "withheld":
@@ -92,6 +101,8 @@ def draw(what: str, rng: np.random.Generator) -> Case:
         counts,
         float(rng.choice(SAMPLES)),
     )
+    if what == "mess":
+        return dataclasses.replace(case, mess=float(np.exp(rng.uniform(*np.log(MESS)))))
     if what != "nuisance":
         return case
     name = list(SPOILT)[int(rng.integers(len(SPOILT)))]
@@ -115,6 +126,7 @@ def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment
         dropouts=0.0 if clean else case.dropouts,
         outliers=0.0 if clean else case.outliers,
         jitter=0.0 if clean else case.jitter,
+        mess=0.0 if clean else case.mess,
     )
     where = virtual_rig.places(folder / ("clean" if clean else "noisy"), replace=True)
     virtual_rig.write(virtual_rig.make(request), where)

@@ -16,9 +16,10 @@ from blind_cases import record
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
 from pendmap.diagnosis.data import Evidence, evidence_of
-from pendmap.diagnosis.refit import Refits
-from pendmap.diagnosis.scores import scores_of
 from pendmap.diagnosis.fitted_model import fitted
+from pendmap.diagnosis.refit import refitted
+from pendmap.diagnosis.scores import scores_of
+from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from blind_cases import Case
     from pendmap.diagnosis.fitted_model import Trial, Windows
+    from pendmap.diagnosis.scores import Scores
 
 CLEAR = 25.0
 """Separation times score from which names are told apart nearly always."""
@@ -57,7 +59,7 @@ def difficulty(
         begin = fitted(evidence, base.fit.model, base.free, start=base.start, windows=windows)
         if not begin.fit.converged or len(case.effects) > 1:
             # What the other effect of a pair did to the windows may lead astray.
-            begin = min((begin, baseline(evidence)), key=lambda trial: trial.chi2)
+            begin = min((begin, baseline(evidence)[0]), key=lambda trial: trial.chi2)
         gains.append(begin.chi2)
         own = effect.split(":")[0]
         reached, own_equals = _impostors(evidence, begin, own, without)
@@ -80,8 +82,13 @@ def _left(evidence: Evidence, begin: Trial, own: str) -> float:
     scores = scores_of(
         evidence, begin, [c for c in candidates({"Tr"}, driven=True) if c[0].name == own]
     )
-    found = Refits(evidence).refit(begin, scores, [scores.best()[0]])
-    return begin.chi2 if found is None else found.trial.chi2
+    found = _refitted(evidence, begin, scores, scores.best()[0])
+    return begin.chi2 if found is None else found.chi2
+
+
+def _refitted(evidence: Evidence, begin: Trial, scores: Scores, place: int) -> Trial | None:
+    """Return a model with a candidate; a reading here counts as one, since its noise is known."""
+    return refitted(evidence, Thresholds(), begin, scores, [place], 1.0)
 
 
 def _impostors(
@@ -92,7 +99,6 @@ def _impostors(
     gains, equals = {}, set()
     places = scores.best()
     at = next((k for k in places if scores.scores[k].candidate.name == own), None)
-    refits = Refits(evidence)
     for k in places:
         score = scores.scores[k]
         name, gain = score.candidate.name, score.gain
@@ -105,8 +111,8 @@ def _impostors(
         near = begin.chi2 - gain < CLEAR and not more
         if len(gains) < REFITTED and gain > WORTH * begin.chi2 and not near:
             # To first order an effect gains less than it may: its shape was only scanned.
-            found = refits.refit(begin, scores, [k])
-            gain = max(gain, begin.chi2 - found.trial.chi2) if found else gain
+            found = _refitted(evidence, begin, scores, k)
+            gain = max(gain, begin.chi2 - found.chi2) if found else gain
             if more and begin.chi2 - gain < max(CONTAINED * begin.chi2, 1.0):
                 equals.add(name)
                 continue

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blind_answer import family
+from blind_answer import STRONG, family
 from blind_difficulty import CLEAR
 from pendmap.model.effects import library
 
@@ -28,8 +28,8 @@ BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
 ENLARGED = 0.84
 """From which probability on the picture is drawn larger: most names have one near 1."""
 
-STRONG, SEEN = 100.0, 60.0
-"""Scores from which figures count."""
+SEEN = 60.0
+"""Score from which figures count, beside ``STRONG``."""
 
 
 def share_of(hits: int, of: int) -> tuple[float, float, float]:
@@ -133,6 +133,7 @@ def figures(rows: list[Row]) -> list[list[str]]:
     hidden = [r for r in kind("nuisance") if true_names(r)]
     bent = kind("form", STRONG)
     seen = [r for r in hidden if strength(r) >= SEEN]
+    main = [r for r in kind("mess", STRONG) if true_names(r)]
     return [
         ["false alarms, nothing hidden", "at most 1 %", share(kind("none"), found)],
         ["right, G >= 100 and s G >= 25", "98 %", share(clear, right)],
@@ -192,12 +193,36 @@ def figures(rows: list[Row]) -> list[list[str]]:
             "loss at most 5 points",
             share(told([r for r in hidden if strength(r) >= STRONG]), right),
         ],
+        ["mess: main effect named or first", "90 %", share(main, first)],
+        ["mess: another name without reserve", "at most 5 %", share(main, another)],
+        [
+            "mess without a main effect: a name without reserve",
+            "at most 5 %",
+            share((r for r in kind("mess") if not true_names(r)), unreserved),
+        ],
         [
             "seconds of one thread for 9 runs of 2,500 samples, median",
             "",
             f"{np.median([22500 * r['seconds'] / r['samples'] for r in rows]):.1f}" if rows else "",
         ],
     ]
+
+
+def first(row: Row) -> bool:
+    """Whether the first effect that is claimed is the main one, by its name or in its class."""
+    return bool(row["named"]) and bool(classes(row)[0] & {*row["equals"], *true_names(row)})
+
+
+def another(row: Row) -> bool:
+    """Whether a name is given without reserve that the main effect cannot have."""
+    hidden = {*row["equals"], *true_names(row)}
+    pairs = zip(classes(row), row["approximate"], strict=True)
+    return any(not nearly and not own & hidden for own, nearly in pairs)
+
+
+def unreserved(row: Row) -> bool:
+    """Whether any name is given without reserve."""
+    return not all(row["approximate"])
 
 
 def reserved(row: Row) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 
 import decays
 import pendmap
-from pendmap import discrepancy, figures, identification, viewer
+from pendmap import diagnosis, figures, identification, viewer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,7 +64,7 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
     both = pendmap.read_experiment(folder)
     report = identification.identify_experiment(free)
     model = identification.identified_model(report)
-    found = discrepancy.diagnose(free, max_effects=0)
+    found = diagnosis.diagnose(free, max_effects=0)
     peaks = identification.find_peaks(time, theta)
     methods = identification.identify(time, theta)
     pendulum = pendmap.Pendulum(p=0.6)
@@ -83,8 +83,8 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "basins_of": lambda: pendmap.basins_of(pendulum, starts, starts),
         "bifurcation": lambda: pendmap.bifurcation(pendulum, {"p": (0.6, 0.8, 3)}),
         "compare": lambda: identification.compare(model, both, ensemble=few),
-        "diagnose": lambda: discrepancy.diagnose(free, max_effects=1),
-        "diagnosed_model": lambda: discrepancy.diagnosed_model(found),
+        "diagnose": lambda: diagnosis.diagnose(free, max_effects=1),
+        "diagnosed_model": lambda: diagnosis.diagnosed_model(found),
         "effects": pendmap.effects,
         "find_peaks": lambda: identification.find_peaks(time, theta),
         "global_start": lambda: identification.global_start(peaks),

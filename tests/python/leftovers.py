@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import pendmap
-from pendmap.diagnosis.noise import Remainder, remainder_of
+from pendmap.diagnosis.fitted_model import Trial
 from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from pendmap.diagnosis.noise import Remainder
 
     Floats = NDArray[np.float64]
 
@@ -53,17 +55,24 @@ def remainder(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> 
 
     ``floor`` is the variance of rounding, in the residuals' units squared.
     """
-    samples = residuals.shape[1]
-    basis = swing(samples)
     if fitted:
+        basis = swing(residuals.shape[1])
         residuals = residuals - residuals @ basis.T @ basis
+    return trial(residuals, floor).remainder
+
+
+def trial(residuals: Floats, floor: float = 0.0) -> Trial:
+    """Return a fit that leaves these residuals, each run's along a row."""
+    count, samples = residuals.shape
     runs = [FitRun(INTERVAL * np.arange(samples), np.zeros(samples), 1.0) for _ in residuals]
-    curve = np.vstack([np.zeros(samples), W0 * basis[0]])
+    curve = np.vstack([np.zeros(samples), W0 * swing(samples)[0]])
     fit = SimpleNamespace(
         white=residuals,
-        curves=[curve] * len(runs),
-        windows=[(k, 0, samples, 0.0, 0.0) for k in range(len(runs))],
+        chi2=float(np.sum(residuals**2)),
+        names=(),
+        curves=[curve] * count,
+        windows=[(k, 0, samples, 0.0, 0.0) for k in range(count)],
         estimates={},
         model=pendmap.Rig(w0=W0),
     )
-    return remainder_of(fit, runs, 0, [floor] * len(runs))  # type: ignore[arg-type]
+    return Trial(fit, (), (), tuple(runs), (floor,) * count)  # type: ignore[arg-type]

@@ -222,7 +222,7 @@ def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: R
     assert found["effects"]
     assert all(effect["approximate"] for effect in found["effects"])
     # Such a spring feeds the motion of every run that could be proposed.
-    assert found["next_experiment"] is None
+    assert found["proposals"] is None
     assert "range of numbers" in found["not_computed"]["proposals"]
 
 

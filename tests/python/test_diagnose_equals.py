@@ -24,7 +24,7 @@ def scored(folder: Path, names: list[str | Candidate], *, forced: int) -> Scores
     virtual_rig.write(virtual_rig.make(request), where)
     evidence = evidence_of(read_experiment(where.experiment))
     pool = [[Candidate(n) if isinstance(n, str) else n] for n in names]
-    return scores_of(evidence, baseline(evidence), pool)
+    return scores_of(evidence, baseline(evidence)[0], pool)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from hidden import diagnosed
-from pendmap.diagnosis.sides import better_side
 from pendmap.diagnosis.fitted_model import fitted
+from pendmap.diagnosis.sides import better_side
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -178,7 +178,7 @@ def clean(folder: Path, effect: str) -> tuple[Evidence, dict[str, float]]:
 )
 def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path) -> None:
     evidence, truth = clean(tmp_path, name)
-    base = baseline(evidence)
+    base, _ = baseline(evidence)
     size, *shape = truth
     unit = Candidate(name, {n: truth[n] for n in shape if n != "psi"})
     start = base.start | {f"{name}.{size}": 0.5 * truth[size]}

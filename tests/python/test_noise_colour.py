@@ -9,12 +9,13 @@ import pytest
 
 from hidden import diagnosed
 from leftovers import COUNT, INTERVAL, SAMPLES, W0, coloured, counted, remainder, swing
-from pendmap.diagnosis.verdict import CHANCE
+from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 COLOURS = (0.0, 0.3, 0.5, 0.7, 0.9)
+CHANCE = Thresholds().rest
 
 
 def density(correlation: float, phase: float = W0 * INTERVAL) -> float:

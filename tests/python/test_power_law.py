@@ -15,8 +15,8 @@ from pendmap import virtual_rig
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
 from pendmap.diagnosis.data import evidence_of
-from pendmap.diagnosis.named import diagnosed_model
 from pendmap.diagnosis.fitted_model import with_candidates
+from pendmap.diagnosis.named import diagnosed_model
 from pendmap.identification.fitting import FitRun, fit_runs, score
 from pendmap.identification.sensitivity import sensitivities, window_slopes
 from pendmap.model import Formula, Rig, load_model, save_model
@@ -135,9 +135,11 @@ def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[Trial]]:
     where = virtual_rig.places(folder / str(seed), replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
     evidence = evidence_of(read_experiment(where.experiment))
-    base = baseline(evidence)
+    base, _ = baseline(evidence)
     (shapes,) = (each for each in candidates((), driven=False) if each[0].name == "power_law_drag")
-    trials = [with_candidates(evidence, base, [shape], {Q: 1e-5}) for shape in shapes[1:3]]
+    trials = [
+        with_candidates(evidence, base, [shape], {Q: 1e-5}, level=1.0) for shape in shapes[1:3]
+    ]
     truth = tomllib.loads(where.truth.read_text(encoding="utf-8"))
     (drag,) = (e for e in truth["effect"] if e["name"] == "power_law_drag")
     return drag["parameters"], trials

@@ -77,7 +77,7 @@ def of_verdict(verdict: str) -> Discrepancy:
     if verdict == "none":
         return once("none")
     if verdict == "unknown":
-        return once("base_sway", seed=1)
+        return once("base_sway", seed=1, max_effects=0)
     if verdict == "ambiguous":
         return once("quadratic_drag", size=0.1)
     named = once("quadratic_drag")

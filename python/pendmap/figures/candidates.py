@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.diagnosis.search import GATE
 from pendmap.figures import blocks, style
 from pendmap.figures.gap import AFTER, name_runs
 from pendmap.pictures.names import unit_of
@@ -47,7 +46,6 @@ def draw_ranking(axes: Axes, found: Discrepancy) -> None:
     places = np.arange(len(best))[::-1]
     colours = [_colour(score.candidate.name, found) for score in best]
     axes.barh(places, values, color=colours, height=0.7)
-    axes.axvline(GATE, color=style.INK, lw=0.9, ls="--")
     axes.set_xscale("log")
     axes.set_xlim(1, max(30.0, 2 * max(values, default=1.0)))
     axes.set_yticks(places, [score.candidate.name for score in best])
@@ -68,10 +66,7 @@ def ranking_handles(found: Discrepancy) -> list[Artist]:
     names = [found.scores.scores[k].candidate.name for k in found.scores.best()[:RANKED]]
     drawn = {_colour(name, found) for name in names}
     said = {AFTER: "found", ALIKE: "not told apart from it", OTHER: "not taken"}
-    return [
-        *(Patch(color=c, lw=0, label=text) for c, text in said.items() if c in drawn),
-        Line2D([], [], color=style.INK, lw=0.9, ls="--", label=f"{GATE:g}, least for a refit"),
-    ]
+    return [Patch(color=c, lw=0, label=text) for c, text in said.items() if c in drawn]
 
 
 def shown_coefficients(found: Discrepancy) -> list[str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.diagnosis.summary import PLACES
 from pendmap.diagnosis.residual_torque import STANDS_OUT
-from pendmap.diagnosis.verdict import CHANCE, FAINT, FORECAST
+from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
 from pendmap.report.noise import worth
 from pendmap.report.wording import chance, compared, joined, mrad, number, stated, values
@@ -85,18 +85,14 @@ def _rests(found: Discrepancy) -> Iterator[Text]:
     for key, words in left.items():
         chance_of = _rare(form.chances[key])
         yield ("Noise alone would leave ", *words, f" with a probability {chance_of}.")
-    # What an effect of the library would take up counts only beside others that are strong.
-    strong = sum(standing.gain for standing in judged.standings) >= FAINT
-    together = form.chance if strong else form.unnamed
-    count = len(form.chances) - (not strong)
-    those = f"these {count} probabilities" if strong else f"the first {count} of these"
+    limits, count = Thresholds(), len(form.chances)
     yield (
-        f"The least of {those}, times {count} because so many were looked at, is "
-        f"{number(together, 2) if together > RARE else f'below {number(RARE, 1)}'}. Below "
-        f"{CHANCE:g} it counts as no chance: something is left."
+        f"The least of these {count} probabilities, times {count} because so many were looked at, "
+        f"is {number(form.chance, 2) if form.chance > RARE else f'below {number(RARE, 1)}'}. Below "
+        f"{limits.rest:g} it counts as no chance: something is left."
     )
     if judged.standings:
-        most = max(FORECAST, judged.ratio_allowed)
+        most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
         yield (
             "Something is left, too, where chi-squared over degrees of freedom on what was held "
             f"out is above {number(most, 3)}."

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.search import GATE
 from pendmap.diagnosis.summary import ranking_table
+from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Name, Paragraph, Picture, Section, Table
 from pendmap.report.wording import gained, number, stated
 
@@ -29,9 +29,9 @@ def ranked(found: Discrepancy) -> Section:
     blocks: list[Block] = [
         Paragraph(
             "Every effect of the library, scored at the baseline's fit: the score G is what it "
-            f"would take off the sum of squares by itself, in units of the noise. {GATE:g} is the "
-            "least for a refit; without a missing effect none gets there. Those refitted have the "
-            "fall of the BIC and of the sum of squares on what was held out."
+            "would take off the sum of squares by itself, in units of the noise. The best were "
+            "fitted with all other parameters: they have the fall of the sum of squares with "
+            "Schwarz's penalty, and the least one on a held-out set."
         ),
         Table(
             tuple(head),
@@ -104,5 +104,5 @@ def _why(rival: Rival) -> str:
     if rival.contains:
         return "does the same with more parameters and gains no more"
     if rival.alike:
-        return f"not told apart: behind by less than {rival.margin:.3g}"
+        return f"not told apart: behind by less than {Thresholds().alike:g}, or by one run alone"
     return "refitted, explains less" if rival.refitted else "scored, explains less"

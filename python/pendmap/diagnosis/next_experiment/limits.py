@@ -46,7 +46,7 @@ class Limit:
 
 
 def detection_limits(
-    scores: Scores, level: float, samples: int, found: Collection[str], units: Units
+    scores: Scores, level: float, found: Collection[str], units: Units
 ) -> dict[str, Limit]:
     """Return the smallest size of each effect that would have been found with 95 % probability.
 

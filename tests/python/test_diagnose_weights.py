@@ -1,0 +1,119 @@
+"""What a reading counts for: the error of the model beside the noise, independent readings."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.fft import idct
+
+from driven_decays import motion
+from leftovers import RUNS, SAMPLES, coloured, trial
+from pendmap.diagnosis.data import Evidence, evidence_of
+from pendmap.diagnosis.model_error import model_errors, weighted
+from pendmap.identification.runs import FitRun
+from pendmap.records import Experiment, Run
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.diagnosis.fitted_model import Trial
+
+    Floats = NDArray[np.float64]
+
+N = 800
+SIGMA = np.where(np.arange(N) < N // 2, 1.0, 2.0)
+SIGNS = np.where(np.arange(N) % 2, 1.0, -1.0)
+
+
+def evidence(*runs: FitRun, doubt: float = 0.0) -> Evidence:
+    """Return runs, each of them a record of its own; the first is held back too."""
+    time = np.arange(N) * 0.01
+    angle = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.05, friction=0.03)
+    good = np.ones(N, bool)
+    records = tuple(Run(f"{k}", f"{k}.csv", "free", time, angle, good) for k in range(len(runs)))
+    found = evidence_of(Experiment(Path("there"), records))
+    readings = tuple(dataclasses.replace(r, doubt=doubt) for r in found.readings)
+    return dataclasses.replace(
+        found,
+        readings=readings,
+        fitted=runs,
+        fitted_of=tuple(range(len(runs))),
+        held=runs[:1],
+        held_of=(0,),
+    )
+
+
+def run(sigma: Floats | float, **given: object) -> FitRun:
+    return FitRun(np.arange(N) * 0.01, np.zeros(N), sigma, **given)  # type: ignore[arg-type]
+
+
+def leaving(*residuals: Floats) -> Trial:
+    return SimpleNamespace(fit=SimpleNamespace(residuals=residuals))  # type: ignore[return-value]
+
+
+def test_the_error_of_a_model_makes_squares_as_great_as_their_variance() -> None:
+    # Half of them sqrt(5) at sigma = 1, half sqrt(8) at 2: 5 / (1 + 4) + 8 / (4 + 4) = 2.
+    left = SIGNS * np.where(SIGMA == 1, math.sqrt(5), math.sqrt(8))
+    # White noise as strong as it is said to be leaves no error.
+    errors = model_errors(evidence(run(SIGMA), run(SIGMA)), leaving(left, SIGNS * SIGMA))
+    assert errors == pytest.approx((2.0, 0.0), abs=1e-9)
+
+
+def test_what_is_not_trusted_and_what_counts_hide_are_no_error() -> None:
+    trusted = np.arange(N) != 7
+    # Rounding of a count of sqrt(12) has the variance 1: 6 = 1 + 1 + s^2.
+    counted = run(1.0, count=math.sqrt(12), trusted=trusted)
+    left = SIGNS * math.sqrt(6)
+    left[7] = 1e3
+    assert model_errors(evidence(counted), leaving(left)) == pytest.approx((2.0,), abs=1e-9)
+
+
+@pytest.mark.parametrize(("doubt", "error"), [(0.0, math.sqrt(0.5)), (0.1, 0.0)])
+def test_noise_that_is_hardly_known_may_leave_more(doubt: float, error: float) -> None:
+    # 1 + 4 sqrt(2 / 800 + 4 doubt^2) is 1.2 or 1.8; 1.5 is left.
+    left = SIGNS * math.sqrt(1.5)
+    found = model_errors(evidence(run(1.0), doubt=doubt), leaving(left))
+    assert found == pytest.approx((error,), abs=1e-9)
+
+
+def test_an_error_widens_each_reading_of_its_run() -> None:
+    records = evidence(run(SIGMA), run(3.0, count=math.sqrt(12)), run(1.0))
+    found = weighted(records, (2.0, 4.0, 0.0))
+    one, two, three = found.fitted
+    assert np.square(one.sigma) == pytest.approx(np.where(SIGMA == 1, 5.0, 8.0))
+    # 9 of the noise, 1 of the counts, 16: the counts are in it and are no intervals any more.
+    assert np.square(two.sigma) == pytest.approx(26.0)
+    assert two.count is None
+    assert three is records.fitted[2]
+    (held,) = found.held
+    assert np.square(held.sigma) == pytest.approx(np.where(SIGMA == 1, 5.0, 8.0))
+    # A whole run held back has the mean square of all.
+    apart = dataclasses.replace(records, held=(run(1.0),), held_of=(9,))
+    (held,) = weighted(apart, (2.0, 4.0, 0.0)).held
+    assert np.square(held.sigma) == pytest.approx(1 + 20 / 3)
+
+
+def test_each_reading_of_white_noise_is_independent() -> None:
+    rng = np.random.default_rng(4)
+    found = [trial(coloured(rng, 0.0)) for _ in range(20)]
+    assert np.mean([one.remainder.independent for one in found]) == pytest.approx(
+        RUNS * SAMPLES, rel=0.03
+    )
+    assert np.mean([one.level for one in found]) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_residuals_that_oscillate_are_a_few_readings(count: int) -> None:
+    # Cosines of the transform itself, equally strong: 3 (count P)^2 / (count P^2) readings.
+    amplitudes = np.zeros((1, SAMPLES))
+    amplitudes[0, 40 : 40 + count] = math.sqrt(SAMPLES / count)
+    found = trial(idct(amplitudes, type=2, norm="ortho"))
+    assert found.chi2 == pytest.approx(SAMPLES)
+    assert found.remainder.independent == pytest.approx(3 * count)
+    assert found.level == pytest.approx(SAMPLES / (3 * count))
