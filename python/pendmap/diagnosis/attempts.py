@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.state import State
 
-__all__ = ["Attempt", "attempt_of"]
+__all__ = ["Attempt", "attempt_of", "core_attempt"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +43,19 @@ class Attempt:
     held_gain: float | None
     accepted: bool
     stage: int
+
+
+def core_attempt(state: State, core: Trial, *, accepted: bool) -> Attempt:
+    """Return the attempt to add the physical core's effects to the given model."""
+    return Attempt(
+        core.names,
+        {},
+        (state.base.chi2 - core.chi2) / state.level,
+        state.cost(state.base) - state.cost(core),
+        None,
+        accepted,
+        0,
+    )
 
 
 def attempt_of(  # noqa: PLR0913 (a model, another, and what is between them)

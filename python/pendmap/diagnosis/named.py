@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap.diagnosis.calibration import complete
 from pendmap.diagnosis.candidates import own_name
 from pendmap.diagnosis.further import Reasons, attempted
 from pendmap.diagnosis.intervals import Z95, profiles
@@ -42,8 +43,8 @@ class NamedEffect:
     ci95 : mapping of str to (float, float)
         Intervals of 95 % of what was fitted; a shape that was scanned has none.
     probability : float
-        That this name is right: its share among its rivals, times the probability that one of
-        them is.
+        That this name is right, given that the effect is in the library: its share among its
+        rivals, times the probability that one of them is.
     approximate : bool
         Whether its form may be only nearly right.
     formula : Formula, optional
@@ -101,8 +102,10 @@ def named_effects(
     profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)
     others = elsewhere(evidence, best.trial)
     named = []
-    for standing in judgement.standings:
+    for k, standing in enumerate(judgement.standings):
         candidate = standing.candidate
+        # Weaker effects may be wrong names, and this one right.
+        sure = complete(judgement.form.chance, [s.gain for s in judgement.standings[: k + 1]])
         if candidate.name not in best.trial.names:
             continue
         parameters, errors = values_of(best, candidate)
@@ -120,7 +123,7 @@ def named_effects(
                 candidate.name,
                 parameters,
                 ci95,
-                standing.share * judgement.complete,
+                standing.share * sure,
                 judgement.approximate or doubted(evidence.experiment, *evidence.runs),
                 candidate.formula,
                 others.get(candidate.name, {}),

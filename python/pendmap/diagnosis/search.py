@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pendmap.diagnosis.attempts import attempt_of
+from pendmap.diagnosis.attempts import attempt_of, core_attempt
 from pendmap.diagnosis.baseline import follows
 from pendmap.diagnosis.prune import pruned
 
@@ -45,7 +45,10 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
         Called with the number of accepted effects.
     """
     best = state.weigh(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
-    best = pruned(state, beginnings(state, best)[0])
+    core = best
+    best = pruned(state, beginnings(state, core)[0])
+    if core.chosen:
+        state.attempts.append(core_attempt(state, core, accepted=bool(best.chosen)))
     # What takes the place of the core's effects starts without them.
     rests = [state.rest(best, candidate) for candidate in best.chosen]
     starts = [rest for rest in rests if rest is not None and follows(state.evidence, rest)]

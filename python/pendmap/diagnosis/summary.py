@@ -231,7 +231,7 @@ def _ranking(found: Discrepancy) -> list[dict[str, Any]]:
 
 def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of candidates at the baseline."""
-    refitted = {a.names[0]: a for a in found.attempts if a.stage == 0 and len(a.names) == 1}
+    refitted = {a.names[0]: a for a in reversed(found.attempts) if a.stage == 0}
     rows = []
     for row in _ranking(found)[:RANKED]:
         tried = refitted.get(row["name"])
