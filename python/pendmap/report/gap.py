@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.diagnosis.summary import PLACES
 from pendmap.diagnosis.residual_torque import STANDS_OUT
+from pendmap.diagnosis.summary import PLACES
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
 from pendmap.report.noise import worth
