@@ -22,7 +22,16 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
     from pendmap.model.units import Units
 
-__all__ = ["CORE", "ZERO", "Candidate", "candidates", "checked_own", "commonness", "own_name", "placed"]
+__all__ = [
+    "CORE",
+    "ZERO",
+    "Candidate",
+    "candidates",
+    "checked_own",
+    "commonness",
+    "own_name",
+    "placed",
+]
 
 ZERO: Final = "encoder_offset"
 """The sensor's zero: it says nothing of the pendulum, and does not count among the effects."""

@@ -7,24 +7,24 @@ import dataclasses
 import functools
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.diagnosis.next_experiment.advice import Advice, advice_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.below_zero import below_zero
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.cycles import Cycles, cycles_of
 from pendmap.diagnosis.data import Evidence, evidence_of
+from pendmap.diagnosis.forecast import Forecast, forecasts_of
 from pendmap.diagnosis.functions import FunctionScore, call_once, divided, function_scores
 from pendmap.diagnosis.further import Reasons, attempted
 from pendmap.diagnosis.gap import Gap, gap_of
-from pendmap.diagnosis.forecast import Forecast, forecasts_of
 from pendmap.diagnosis.named import NamedEffect, named_effects
+from pendmap.diagnosis.next_experiment.advice import Advice, advice_of
 from pendmap.diagnosis.physical import within_physics
+from pendmap.diagnosis.residual_torque import Torque, residual_torque, standing_out
 from pendmap.diagnosis.runs import RunByRun, run_by_run
 from pendmap.diagnosis.scores import Scores
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.diagnosis.residual_torque import Torque, residual_torque, standing_out
 from pendmap.diagnosis.verdict import Judgement, judge
 from pendmap.errors import InputError
 from pendmap.identification.astray import refuse_astray

@@ -209,9 +209,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         growth=growth,
         target=target,
     )
-    return Trial(
-        fit, tuple(free), tuple(chosen), evidence.fitted, evidence.floors, tuple(zeroed)
-    )
+    return Trial(fit, tuple(free), tuple(chosen), evidence.fitted, evidence.floors, tuple(zeroed))
 
 
 def settled(evidence: Evidence, trial: Trial, level: float) -> Trial:

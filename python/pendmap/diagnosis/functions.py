@@ -2,9 +2,10 @@
 
 A function that looks up a table, or asks a trained model, is nothing that the kernel can step
 with. But sampled along a fitted motion its torque ``u`` moves the readings, to first order, by the
-integral that :mod:`pendmap.diagnosis.residual_torque` has for any torque; with ``x`` that response over
-the standard errors, what the fitted parameters and initial states can follow taken off, and ``r``
-the residuals, the size is ``x' r / x' x`` and the sum of squares falls by ``(x' r)^2 / x' x``.
+integral that :mod:`pendmap.diagnosis.residual_torque` has for any torque; with ``x`` that response
+over the standard errors, what the fitted parameters and initial states can follow taken off, and
+``r`` the residuals, the size is ``x' r / x' x`` and the sum of squares falls by
+``(x' r)^2 / x' x``.
 """
 
 from __future__ import annotations

@@ -111,7 +111,7 @@ def predictive(evidence: Evidence, trial: Trial, held: Held, level: float) -> tu
         both = (*evidence.fitted, *evidence.held)
         whole = _chi2(both, trial, (*trial.fit.windows, *shifted), level, phases)
         return (whole - trial.chi2,)
-    back = {of: run for of, run in zip(evidence.held_of, evidence.held, strict=True)}
+    back = dict(zip(evidence.held_of, evidence.held, strict=True))
     runs = tuple(
         dataclasses.replace(run, trusted=_good(run) | _good(back[of])) if of in back else run
         for run, of in zip(evidence.fitted, evidence.fitted_of, strict=True)

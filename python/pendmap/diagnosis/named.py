@@ -19,10 +19,10 @@ from pendmap.records.summary import doubted
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.diagnose import Discrepancy
     from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.state import Found
+    from pendmap.diagnosis.diagnose import Discrepancy
     from pendmap.diagnosis.runs import RunByRun
+    from pendmap.diagnosis.state import Found
     from pendmap.diagnosis.verdict import Judgement
     from pendmap.model import Formula, Rig
 
@@ -155,9 +155,9 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """Return the model of a diagnosis with the notes of its file.
 
     Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
-    fitted, widened as those intervals are, and ``between_runs`` in it the standard deviation of each
-    parameter that differs between runs by more than its error; ``[provenance]`` the records with their SHA-256, the
-    version, the command and the verdict, and which coefficients are held at 0.
+    fitted, widened as those intervals are, and ``between_runs`` in it the standard deviation of
+    each parameter that differs between runs by more than its error; ``[provenance]`` the records
+    with their SHA-256, the version, the command, the verdict and which coefficients are held at 0.
 
     Parameters
     ----------
@@ -185,9 +185,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
                 if "[" not in name and (between := found.runs.between(name)) > 0
             },
         },
-        "provenance": provenance(
-            files, command, rms=found.gap.after, noise=found.gap.noise_floor
-        )
+        "provenance": provenance(files, command, rms=found.gap.after, noise=found.gap.noise_floor)
         | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
     }
     if found.best.trial.zeroed:

@@ -128,7 +128,14 @@ def remainder_of(
     spectra = spectra_of(fit, runs)
     if not spectra.quick_sizes.any() or spectra.mean < ARITHMETIC:
         return Remainder(
-            1.0, 0.0, 0.0, 0.0, (0.0,) * len(runs), 1.0, np.ones((2, 1)), FOR_SURE,
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            (0.0,) * len(runs),
+            1.0,
+            np.ones((2, 1)),
+            FOR_SURE,
             spectra.independent,
         )
     laws = laws_of(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))

@@ -52,7 +52,7 @@ def best_of(*trials: Trial | None) -> Trial | None:
     return min((t for t in trials if t is not None), key=lambda t: t.chi2, default=None)
 
 
-def refitted(  # noqa: PLR0913 (what is fitted, and what decides)
+def refitted(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     evidence: Evidence,
     thresholds: Thresholds,
     trial: Trial,
@@ -126,9 +126,7 @@ def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds)
     return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: thresholds.shapes - 1]
 
 
-def without(
-    evidence: Evidence, trial: Trial, dropped: Candidate, level: float
-) -> Trial | None:
+def without(evidence: Evidence, trial: Trial, dropped: Candidate, level: float) -> Trial | None:
     """Return a trial's model without one of its effects, fitted from the trial's motion."""
     model, free, start = _without(trial, dropped)
     chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
@@ -147,7 +145,7 @@ def without(
     return within_physics(evidence, rest)
 
 
-def replaced(  # noqa: PLR0913 (what is fitted, and what decides)
+def replaced(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     evidence: Evidence,
     trial: Trial,
     dropped: Candidate,

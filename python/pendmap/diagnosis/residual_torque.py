@@ -9,8 +9,8 @@ fit has anyhow (variation of constants). A torque that is constant while the pen
 of the angle, say, so has a column like any parameter, at the price of two running integrals; the
 torques of all bins are fitted together, with what the parameters and the initial states can follow
 taken off. Since an error adds up over a record, this sees torques far below what second differences
-of the readings show. The bins of angle, velocity, amplitude, phase and time are fitted together too: what one
-of them explains is no artefact of another.
+of the readings show. The bins of angle, velocity, amplitude, phase and time are fitted together
+too: what one of them explains is no artefact of another.
 
 What is shown is therefore the torque beyond what the model's own terms could take up.
 """
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.noise import Remainder
     from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.noise import Remainder
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
 

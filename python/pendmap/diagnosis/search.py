@@ -23,7 +23,6 @@ from pendmap.diagnosis.attempts import attempt_of
 from pendmap.diagnosis.baseline import follows
 from pendmap.diagnosis.prune import pruned
 from pendmap.diagnosis.refit import key_of
-from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -80,12 +79,14 @@ def _step(state: State, best: Trial, starts: Sequence[Trial]) -> Trial | None:
     """Return the cheapest model with more, or other, effects that is accepted."""
     found: list[tuple[Trial, Trial, list[int]]] = []
     for rest in [best, *(s for s in starts if s is not best)]:
-        for places in _promising(state, rest):
-            try:
-                trial = state.refit(rest, places)
-            except InputError:
+        singles, pairs = _promising(state, rest)
+        fits = 0
+        for places in [*singles, *pairs]:
+            if len(places) == 1 and fits == state.thresholds.singles:
                 continue
+            trial = state.refit(rest, places)
             if trial is not None:
+                fits += 1
                 found.append((trial, rest, places))
     if not found:
         return None
@@ -100,23 +101,24 @@ def _step(state: State, best: Trial, starts: Sequence[Trial]) -> Trial | None:
     return None
 
 
-def _promising(state: State, rest: Trial) -> list[list[int]]:
-    """Return the candidates, and the pairs of them, with the greatest scores at a model."""
+def _promising(state: State, rest: Trial) -> tuple[list[list[int]], list[list[int]]]:
+    """Return the candidates, and the pairs of them, with the greatest scores at a model.
+
+    Twice as many candidates as are wanted: not each has a fit within physics.
+    """
     limits = state.thresholds
     scores = state.scores(rest)
     ranked = scores.best()
     chosen: list[list[int]] = []
     for k in ranked:
-        if not any(scores.same(j, k) for [j] in chosen) and scores.scores[k].gain > 0:
+        if scores.scores[k].gain > 0 and not any(scores.same(j, k) for [j] in chosen):
             chosen.append([k])
-        if len(chosen) == limits.singles:
-            break
     if state.room(rest) < 2 or len(ranked) < 2:  # noqa: PLR2004 (a pair)
-        return chosen
-    alone = max(scores.scores[k].gain for k in ranked)
+        return chosen[: 2 * limits.singles], []
+    alone = scores.scores[ranked[0]].gain
     pairs = [
         pair
         for pair in scores.best_pairs(ranked, limits.pairs)
         if scores.together(pair) - alone > limits.alike * state.level
     ]
-    return [*chosen, *pairs]
+    return chosen[: 2 * limits.singles], pairs

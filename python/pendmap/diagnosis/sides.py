@@ -10,8 +10,8 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.intervals import Z95
 from pendmap.diagnosis.fitted_model import fitted
+from pendmap.diagnosis.intervals import Z95
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:

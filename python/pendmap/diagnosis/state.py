@@ -163,9 +163,7 @@ class State:
         scores = self.scores(trial)
         key = key_of(trial.chosen), key_of([scores.scores[k].candidate for k in places])
         if key not in self._refits:
-            found = refitted(
-                self.evidence, self.thresholds, trial, scores, places, self.level
-            )
+            found = refitted(self.evidence, self.thresholds, trial, scores, places, self.level)
             self._refits[key] = self.keep(found)
         return self._refits[key]
 

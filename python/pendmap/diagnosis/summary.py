@@ -267,9 +267,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         nearly = (
             ", with reserve: what is missing may only resemble it" if effect.approximate else ""
         )
-        share = next(
-            100 * s.closed for s in judgement.standings if s.candidate.name == effect.name
-        )
+        share = next(100 * s.closed for s in judgement.standings if s.candidate.name == effect.name)
         yield (
             f"  {effect.name}: {values}; closes {share:.0f} % of the squared gap that the others "
             f"leave; probability {effect.probability:.3f}, given that the effect is in the "

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from pendmap.diagnosis.alternatives import Standing, standing_of
 from pendmap.diagnosis.calibration import complete
 from pendmap.diagnosis.form import Form, form_of
-from pendmap.diagnosis.alternatives import Standing, standing_of
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate

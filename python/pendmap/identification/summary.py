@@ -110,6 +110,19 @@ def _method(found: Identification) -> dict[str, Any]:
     }
 
 
+def _drag(report: IdentificationReport) -> Iterator[str]:
+    """Yield what quadratic drag gains, where it was tried."""
+    if report.with_drag is None or report.joint is None:
+        return
+    drag = report.with_drag.fit
+    name = next(n for n in drag.estimates if n.startswith(DRAG))
+    yield (
+        f"With {DRAG} ({name.partition('.')[2]} = {with_error(drag.estimates[name])}) the "
+        f"residual is {drag.rms:.3g} rad, {report.joint.fit.rms:.3g} without: --effect {DRAG} "
+        "fits it, diagnose looks for more"
+    )
+
+
 def as_text(report: IdentificationReport) -> Iterator[str]:
     """Yield the lines beside the tables: intervals, warnings, what was found in the record.
 
@@ -123,14 +136,7 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
         for name, estimate in {**best.estimates, **best.derived}.items():
             if estimate.ci95 is not None:
                 yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
-    if report.with_drag is not None and report.joint is not None:
-        drag = report.with_drag.fit
-        name = next(n for n in drag.estimates if n.startswith(DRAG))
-        yield (
-            f"With {DRAG} ({name.partition('.')[2]} = {with_error(drag.estimates[name])}) the "
-            f"residual is {drag.rms:.3g} rad, {report.joint.fit.rms:.3g} without: --effect {DRAG} "
-            "fits it, diagnose looks for more"
-        )
+    yield from _drag(report)
     if report.table.left_out:
         yield f"{report.run.name}: {report.table.left_out}"
     said = left_out(report.experiment, report.runs)

@@ -71,8 +71,9 @@ def _meaning(outlook: Outlook) -> Text:
     )
     if outlook.aim == "separation":
         return (
-            f"{start}the separation is the part of the gain of one name that the other cannot follow; from "
-            f"{outlook.wanted:g} on a wrong name is improbable. Now it is {gained(outlook.now)}."
+            f"{start}The separation is the part of the gain of one name that the other cannot "
+            f"follow; from {outlook.wanted:g} on a wrong name is improbable. Now it is "
+            f"{gained(outlook.now)}."
         )
     if outlook.aim == "interval":
         return (

@@ -244,7 +244,7 @@ def make(request: Request) -> Experiment:
     others = [effect for effect in effects if not isinstance(effect, ReadingEffect)]
     lab = np.array([plan.lab_time for plan in plans])
     mess = _mess(request, sensor, parameters.w0, plans)
-    bearing = [] if mess is None else [mess.texture]
+    bearing: list[Effect] = [] if mess is None else [mess.texture]
     drive = Drive.harmonic(
         np.array([plan.p for plan in plans]),
         np.array([plan.frequency for plan in plans]),
@@ -282,9 +282,7 @@ def make(request: Request) -> Experiment:
     return Experiment(request, parameters, effects, sensor, runs, mess)
 
 
-def _mess(
-    request: Request, sensor: Sensor, w0: float, plans: Sequence[RunPlan]
-) -> Mess | None:
+def _mess(request: Request, sensor: Sensor, w0: float, plans: Sequence[RunPlan]) -> Mess | None:
     if request.mess == 0:
         return None
     size = request.mess * math.hypot(sensor.noise, sensor.count / math.sqrt(12))

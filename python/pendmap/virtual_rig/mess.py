@@ -1,8 +1,8 @@
 """Weak disturbances that no effect describes: what every rig has beside its main effect.
 
-A texture of the bearing (a torque and a friction that are random series in the angle), a slow drift
-of the sensor's zero, and noise that hangs together over a part of a second to some seconds. Each has
-a random share of the size, a multiple of the sensor's noise.
+A texture of the bearing (a torque and a friction that are random series in the angle), a slow
+drift of the sensor's zero, and noise that hangs together over a part of a second to some seconds.
+Each has a random share of the size, a multiple of the sensor's noise.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.next_experiment.limits import Limit
     from pendmap.diagnosis.next_experiment.outlook import Outlook, Prospect
-    from pendmap.diagnosis.state import Found
     from pendmap.diagnosis.scores import Scores
+    from pendmap.diagnosis.state import Found
     from pendmap.diagnosis.verdict import Judgement
 
 __all__ = ["Advice", "advice_of", "chance_said"]

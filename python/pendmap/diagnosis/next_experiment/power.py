@@ -16,21 +16,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.next_experiment.ahead import Prospects
 from pendmap.diagnosis.candidates import Candidate, candidates
 from pendmap.diagnosis.intervals import Z95
-from pendmap.diagnosis.next_experiment.proposals import menu_of
+from pendmap.diagnosis.next_experiment.ahead import Prospects
 from pendmap.diagnosis.next_experiment.outlook import Outlook, Prospect, one_left, wrong_name
+from pendmap.diagnosis.next_experiment.proposals import menu_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.diagnosis.alternatives import Rival, Standing
     from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.further import Reasons
     from pendmap.diagnosis.next_experiment.information import Information
-    from pendmap.diagnosis.state import Found
-    from pendmap.diagnosis.alternatives import Rival, Standing
     from pendmap.diagnosis.scores import Scores
+    from pendmap.diagnosis.state import Found
 
 __all__ = ["CLEAR", "HALF", "seen", "separated", "tightened"]
 
