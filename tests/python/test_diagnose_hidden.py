@@ -50,13 +50,21 @@ def test_what_is_hidden_is_named_with_its_size(effect: str, parameter: str, tmp_
 
 def test_the_drag_is_named_in_noise_that_hangs_together(tmp_path: Path) -> None:
     found, truth = diagnosed(
-        tmp_path, "quadratic_drag", free=1, forced=0, size=3.0, correlation=0.8
+        tmp_path, "quadratic_drag", free=3, forced=0, size=3.0, correlation=0.8, noise=0.1
     )
     assert "quadratic_drag" in _names(found)
     assert found.verdict in {"named", "ambiguous"}
     low, high = next(e.ci95["q"] for e in found.effects if e.name == "quadratic_drag")
     wide = high - low
     assert low - wide < truth["quadratic_drag"]["q"] < high + wide
+
+
+def test_a_search_ends_that_drops_what_it_accepts(tmp_path: Path) -> None:
+    # One friction is accepted beside nothing, and the drag that stands for it gains too little.
+    found, _ = diagnosed(
+        tmp_path, "quadratic_drag", free=1, forced=0, size=3.0, correlation=0.8, noise=0.1
+    )
+    assert len(found.attempts) < 50
 
 
 def test_a_chirp_of_the_only_forced_run_is_named(

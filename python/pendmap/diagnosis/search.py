@@ -22,11 +22,13 @@ from typing import TYPE_CHECKING
 from pendmap.diagnosis.attempts import attempt_of, core_attempt
 from pendmap.diagnosis.baseline import follows
 from pendmap.diagnosis.prune import pruned
+from pendmap.diagnosis.refit import key_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.refit import Key
     from pendmap.diagnosis.state import State
 
 __all__ = ["beginnings", "search"]
@@ -52,7 +54,10 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
     # What takes the place of the core's effects starts without them.
     rests = [state.rest(best, candidate) for candidate in best.chosen]
     starts = [rest for rest in rests if rest is not None and follows(state.evidence, rest)]
-    while state.room(best) > 0:
+    seen: set[Key] = set()
+    # What is accepted may be dropped again: no set of effects is enlarged twice.
+    while state.room(best) > 0 and key_of(best.chosen) not in seen:
+        seen.add(key_of(best.chosen))
         step = _step(state, best, starts)
         if step is None:
             break
