@@ -1,16 +1,16 @@
-"""What a model leaves, as an error of every reading beside the noise.
+"""What a model leaves, as the error of every reading of a run.
 
 A model that lacks something errs by more than the noise. Fitted with the noise's weights alone, it
-follows the readings with the least noise and misses the others. So each run's standard errors are
-``sqrt(sigma^2 + s^2)``, with the ``s`` at which the mean of the squared residuals over the squared
-standard errors is 1; ``s`` is 0 where the noise explains what is left.
+follows the readings with the least noise and misses the others. So the readings of a run in which
+it leaves more than the noise explains count alike, with the root mean square of what it leaves as
+their standard error.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 __all__ = ["model_errors", "weighted"]
 
-STEPS: Final = 60
-"""Halvings of the interval in which ``s`` is."""
-
 
 def model_errors(records: Evidence, trial: Trial) -> tuple[float, ...]:
-    """Return the error of a model in each fitted run, rad.
+    """Return the root mean square of what a model leaves in each fitted run, rad.
+
+    0 where the noise explains it: where the mean of the squared residuals over the squared standard
+    errors is at most ``1 + 4 sqrt(2 / N + 4 r^2)``, ``r`` the relative error of the noise.
 
     Parameters
     ----------
@@ -50,14 +50,15 @@ def model_errors(records: Evidence, trial: Trial) -> tuple[float, ...]:
         squares = residual[counted] ** 2
         doubt = records.readings[of].doubt
         allowed = 1 + 4 * math.sqrt(2 / max(squares.size, 1) + 4 * doubt**2)
-        errors.append(_error(squares, sigma**2) if _mean(squares, sigma**2) > allowed else 0.0)
+        beyond = squares.size > 0 and float(np.mean(squares / sigma**2)) > allowed
+        errors.append(math.sqrt(float(np.mean(squares))) if beyond else 0.0)
     return tuple(errors)
 
 
 def weighted(records: Evidence, errors: Sequence[float]) -> Evidence:
-    """Return records whose standard errors have the errors of a model.
+    """Return records whose standard errors are the errors of a model, where these are not 0.
 
-    What is held back has those of its run, or of whole runs the mean square.
+    What is held back has the error of its run, or of whole runs the mean square.
     """
     mean = math.sqrt(float(np.mean(np.square(errors))))
     of = dict(zip(records.fitted_of, errors, strict=True))
@@ -71,20 +72,4 @@ def weighted(records: Evidence, errors: Sequence[float]) -> Evidence:
 def _with(run: FitRun, error: float) -> FitRun:
     if error == 0:
         return run
-    sigma = np.asarray(run.sigma, np.float64)
-    if run.count is not None:
-        sigma = np.hypot(sigma, run.count / math.sqrt(12))
-    return dataclasses.replace(run, sigma=np.hypot(sigma, error), count=None)
-
-
-def _mean(squares: np.ndarray, variance: np.ndarray) -> float:
-    return float(np.mean(squares / variance)) if squares.size else 0.0
-
-
-def _error(squares: np.ndarray, variance: np.ndarray) -> float:
-    """Return the ``s`` at which the mean of ``r^2 / (sigma^2 + s^2)`` is 1."""
-    low, high = 0.0, float(squares.max())
-    for _ in range(STEPS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _mean(squares, variance + middle) > 1 else (low, middle)
-    return math.sqrt(high)
+    return dataclasses.replace(run, sigma=np.full(run.time.shape, error), count=None)

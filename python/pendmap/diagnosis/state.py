@@ -189,7 +189,7 @@ class State:
 
         alike = [t for t in self._fits.values() if t.chi2 <= reach and self.room(t) >= 0]
         for trial in sorted((best, *alike), key=order):
-            if trial is best or self.holds(best, trial, self.thresholds.alike):
+            if trial is best or self.foretells(best, trial):
                 return trial
         return best
 
@@ -283,12 +283,24 @@ class State:
         gap = rest.chi2 - noise * rest.fit.degrees
         return (rest.chi2 - full.chi2) / gap if gap > 0 else 1.0
 
-    def holds(self, rest: Trial, full: Trial, loss: float | None = None) -> bool:
-        """Whether a model loses on no held-out set against another one.
+    def holds(self, rest: Trial, full: Trial) -> bool:
+        """Whether further effects lose on no held-out set.
 
-        A loss of less than ``loss`` independent readings, by default that of the thresholds, is
-        none.
+        A set loses by more than what noise makes it lose, or the sum of squares of whole runs, with
+        parameters frozen, rises by more than the factor ``forecast``.
         """
+        before, after = self.held(rest), self.held(full)
+        if before is None or after is None:
+            return False
+        noise = full.remainder.level
         pairs = zip(self.sets(rest), self.sets(full), strict=False)
-        most = (self.thresholds.loss if loss is None else loss) * max(full.level, self.level)
+        most = self.thresholds.forecast * max(before.chi2, noise * after.degrees)
+        if not self.evidence.inside and after.chi2 > most:
+            return False
+        return all(more - less <= self.thresholds.loss * noise for less, more in pairs)
+
+    def foretells(self, best: Trial, other: Trial) -> bool:
+        """Whether held-out sets do not tell a model from the best one."""
+        pairs = zip(self.sets(best), self.sets(other), strict=False)
+        most = self.thresholds.alike * max(best.level, self.level)
         return all(more - less <= most for less, more in pairs)
