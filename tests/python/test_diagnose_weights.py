@@ -57,24 +57,26 @@ def leaving(*residuals: Floats) -> Trial:
     return SimpleNamespace(fit=SimpleNamespace(residuals=residuals))  # type: ignore[return-value]
 
 
-def test_the_error_of_a_model_makes_squares_as_great_as_their_variance() -> None:
-    # Half of them sqrt(5) at sigma = 1, half sqrt(8) at 2: 5 / (1 + 4) + 8 / (4 + 4) = 2.
+def test_the_error_of_a_model_is_the_root_mean_square_of_what_it_leaves() -> None:
+    # Half of them sqrt(5) at sigma = 1, half sqrt(8) at 2: the mean square is 6.5.
     left = SIGNS * np.where(SIGMA == 1, math.sqrt(5), math.sqrt(8))
     # White noise as strong as it is said to be leaves no error.
     errors = model_errors(evidence(run(SIGMA), run(SIGMA)), leaving(left, SIGNS * SIGMA))
-    assert errors == pytest.approx((2.0, 0.0), abs=1e-9)
+    assert errors == pytest.approx((math.sqrt(6.5), 0.0), abs=1e-9)
 
 
 def test_what_is_not_trusted_and_what_counts_hide_are_no_error() -> None:
     trusted = np.arange(N) != 7
-    # Rounding of a count of sqrt(12) has the variance 1: 6 = 1 + 1 + s^2.
+    # Rounding of a count of sqrt(12) has the variance 1: 2 is noise, 6 is more.
     counted = run(1.0, count=math.sqrt(12), trusted=trusted)
-    left = SIGNS * math.sqrt(6)
-    left[7] = 1e3
-    assert model_errors(evidence(counted), leaving(left)) == pytest.approx((2.0,), abs=1e-9)
+    for square, error in ((2.0, 0.0), (6.0, math.sqrt(6))):
+        left = SIGNS * math.sqrt(square)
+        left[7] = 1e3
+        found = model_errors(evidence(counted), leaving(left))
+        assert found == pytest.approx((error,), abs=1e-9)
 
 
-@pytest.mark.parametrize(("doubt", "error"), [(0.0, math.sqrt(0.5)), (0.1, 0.0)])
+@pytest.mark.parametrize(("doubt", "error"), [(0.0, math.sqrt(1.5)), (0.1, 0.0)])
 def test_noise_that_is_hardly_known_may_leave_more(doubt: float, error: float) -> None:
     # 1 + 4 sqrt(2 / 800 + 4 doubt^2) is 1.2 or 1.8; 1.5 is left.
     left = SIGNS * math.sqrt(1.5)
@@ -82,21 +84,21 @@ def test_noise_that_is_hardly_known_may_leave_more(doubt: float, error: float) -
     assert found == pytest.approx((error,), abs=1e-9)
 
 
-def test_an_error_widens_each_reading_of_its_run() -> None:
+def test_readings_of_a_run_that_a_model_misses_count_alike() -> None:
     records = evidence(run(SIGMA), run(3.0, count=math.sqrt(12)), run(1.0))
     found = weighted(records, (2.0, 4.0, 0.0))
     one, two, three = found.fitted
-    assert np.square(one.sigma) == pytest.approx(np.where(SIGMA == 1, 5.0, 8.0))
-    # 9 of the noise, 1 of the counts, 16: the counts are in it and are no intervals any more.
-    assert np.square(two.sigma) == pytest.approx(26.0)
+    assert one.sigma == pytest.approx(np.full(N, 2.0))
+    # The counts are in it and are no intervals any more.
+    assert two.sigma == pytest.approx(np.full(N, 4.0))
     assert two.count is None
     assert three is records.fitted[2]
     (held,) = found.held
-    assert np.square(held.sigma) == pytest.approx(np.where(SIGMA == 1, 5.0, 8.0))
+    assert held.sigma == pytest.approx(np.full(N, 2.0))
     # A whole run held back has the mean square of all.
     apart = dataclasses.replace(records, held=(run(1.0),), held_of=(9,))
     (held,) = weighted(apart, (2.0, 4.0, 0.0)).held
-    assert np.square(held.sigma) == pytest.approx(1 + 20 / 3)
+    assert np.square(held.sigma) == pytest.approx(20 / 3)
 
 
 def test_each_reading_of_white_noise_is_independent() -> None:
