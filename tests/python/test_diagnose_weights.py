@@ -95,10 +95,11 @@ def test_readings_of_a_run_that_a_model_misses_count_alike() -> None:
     assert three is records.fitted[2]
     (held,) = found.held
     assert held.sigma == pytest.approx(np.full(N, 2.0))
-    # A whole run held back has the mean square of all.
+    # A whole run held back has its noise, and what the others have beyond theirs: 4 - 2.5, 16 - 10
+    # and nothing.
     apart = dataclasses.replace(records, held=(run(1.0),), held_of=(9,))
     (held,) = weighted(apart, (2.0, 4.0, 0.0)).held
-    assert np.square(held.sigma) == pytest.approx(20 / 3)
+    assert np.square(held.sigma) == pytest.approx(1 + (1.5 + 6.0) / 3)
 
 
 def test_each_reading_of_white_noise_is_independent() -> None:

@@ -58,15 +58,23 @@ def model_errors(records: Evidence, trial: Trial) -> tuple[float, ...]:
 def weighted(records: Evidence, errors: Sequence[float]) -> Evidence:
     """Return records whose standard errors are the errors of a model, where these are not 0.
 
-    What is held back has the error of its run, or of whole runs the mean square.
+    What is held back has the error of its run; a whole run held back its own noise, and the mean
+    square of what the errors of the others exceed theirs by.
     """
-    mean = math.sqrt(float(np.mean(np.square(errors))))
     of = dict(zip(records.fitted_of, errors, strict=True))
-    fitted = (_with(run, error) for run, error in zip(records.fitted, errors, strict=True))
+    pairs = list(zip(records.fitted, errors, strict=True))
+    excess = float(np.mean([max(error**2 - _variance(run), 0.0) for run, error in pairs]))
     held = (
-        _with(run, of.get(k, mean)) for run, k in zip(records.held, records.held_of, strict=True)
+        _with(run, of[k] if k in of else math.sqrt(_variance(run) + excess) if excess > 0 else 0.0)
+        for run, k in zip(records.held, records.held_of, strict=True)
     )
+    fitted = (_with(run, error) for run, error in pairs)
     return dataclasses.replace(records, fitted=tuple(fitted), held=tuple(held))
+
+
+def _variance(run: FitRun) -> float:
+    """Return the mean square of the standard errors of a run, its counts included."""
+    return float(np.mean(np.square(run.sigma))) + (run.count or 0.0) ** 2 / 12
 
 
 def _with(run: FitRun, error: float) -> FitRun:
