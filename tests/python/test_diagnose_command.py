@@ -104,7 +104,9 @@ def test_the_verdict_comes_first(hidden: str, pendmap_command: Run) -> None:
     assert "Written: found.toml" in run.stdout
     # Numbers have the units that the report gives them.
     assert re.search(
-        r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]; probability", run.stdout, re.MULTILINE
+        r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]; closes \d+ % of .*; probability 0\.\d+",
+        run.stdout,
+        re.MULTILINE,
     )
     ranked = run.stdout.partition("candidate")[2].splitlines()
     shapes = [line for line in ranked if " w = " in line]
