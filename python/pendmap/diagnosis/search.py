@@ -63,7 +63,7 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
             break
         best, starts = pruned(state, state.weigh(state.settled(step))), []
         progress(len(best.chosen))
-    return best
+    return state.weigh(best)
 
 
 def beginnings(state: State, core: Trial) -> list[Trial]:
