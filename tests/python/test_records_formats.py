@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import pendmap
-from pendmap.records import excel
+from pendmap.records import text as reading
 from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, noisy, read, text
 
@@ -303,7 +303,7 @@ def test_a_workbook_is_read_as_its_text_would_be(
 def test_a_workbook_that_unpacks_to_too_much_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(excel, "MOST_BYTES", 1000)
+    monkeypatch.setattr(reading, "MOST_BYTES", 1000)
     with zipfile.ZipFile(tmp_path / "book.xlsx", "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("xl/workbook.xml", bytes(10_000))
     with pytest.raises(pendmap.InputError, match="unpacks to"):

@@ -60,7 +60,7 @@ def varied_model_options(function: Command) -> Command:
         frequency = next((n for n in ("omega", "Omega", "frequency_hz") if n in ranges), None)
         if frequency is not None and given["stroke_mm"] is not None:
             raise click.UsageError(
-                f"--stroke-mm beside {frequency} that varies: allowed is --p, which is kept"
+                f"--stroke-mm must not stand beside {frequency} that varies, got both: --p is kept"
             )
         typed = {name for name in ("p", "omega", "frequency_hz") if given[name] is not None}
         if frequency is not None and typed == {"p"}:

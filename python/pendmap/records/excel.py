@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
 from pendmap.records.experiment import Finding
-from pendmap.records.text import MOST_COLUMNS, Table, parsed
+from pendmap.records.text import Table, parsed, refuse_large
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,8 +21,6 @@ __all__ = ["ENGINES", "read_workbook"]
 
 ENGINES: Final = {b"PK\x03\x04": "openpyxl", b"\xd0\xcf\x11\xe0": "xlrd"}
 """What reads a workbook, by how it begins: .xlsx and .xls."""
-
-MOST_BYTES: Final = 2**30
 
 
 def read_workbook(data: bytes, reader: Reader, where: str) -> Table:
@@ -51,12 +49,10 @@ def read_workbook(data: bytes, reader: Reader, where: str) -> Table:
         raise InputError(f"{where}: is no Excel file that can be read: {said}") from None
     numbers = {name: _numbers(frame) for name, frame in sheets.items()}
     if not any(numbers.values()):
-        raise InputError(f"{where}: has no rows of numbers: allowed is a sheet with some")
+        raise InputError(f"{where}: a sheet must have rows of numbers, got none")
     name = max(numbers, key=lambda each: numbers[each])
     frame = sheets[name].dropna(axis="columns", how="all")
-    if frame.shape[1] > MOST_COLUMNS:
-        count = frame.shape[1]
-        raise InputError(f"{where}: has {count} columns: allowed are up to {MOST_COLUMNS}")
+    refuse_large(where, columns=frame.shape[1])
     lines = ("\t".join(map(_cell, row)) for row in frame.itertuples(index=False, name=None))
     tabs = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
     table = parsed("\n".join(lines) + "\n", tabs, where)
@@ -70,9 +66,7 @@ def _check_size(data: bytes, where: str) -> None:
     """Refuse what unpacks to more than a record can be."""
     if ENGINES[data[:4]] == "openpyxl":
         with zipfile.ZipFile(io.BytesIO(data)) as packed:
-            size = sum(part.file_size for part in packed.infolist())
-        if size > MOST_BYTES:
-            raise InputError(f"{where}: unpacks to {size / 2**20:.0f} MiB: allowed are 1024 MiB")
+            refuse_large(where, size=sum(part.file_size for part in packed.infolist()))
 
 
 def _numbers(frame: pd.DataFrame) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.records.excel import ENGINES, read_workbook
-from pendmap.records.text import MOST_COLUMNS, Table, decoded, parsed
+from pendmap.records.text import MOST_BYTES, Table, decoded, parsed, refuse_large
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from pendmap.records.description import Reader
 
 __all__ = ["read_table"]
-
-MOST_BYTES: Final = 2**30
-"""Largest file that is read, and bytes that its numbers may take: an hour at 10 kHz."""
 
 HUGEST: Final = 1e18
 """Largest number that can be a reading: nanoseconds since 1970 are 2e18, all else is less."""
@@ -93,11 +90,7 @@ def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.
     # What the groups say of themselves: to ask a damaged column ends the process.
     groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
     size = sum(max(8 * g.num_rows * g.num_columns, g.total_byte_size) for g in groups)
-    if file.metadata.num_columns > MOST_COLUMNS:
-        count = file.metadata.num_columns
-        raise InputError(f"{where}: has {count} columns: allowed are up to {MOST_COLUMNS}")
-    if size > MOST_BYTES:
-        raise InputError(f"{where}: unpacks to {size / 2**20:.0f} MiB: allowed are 1024 MiB")
+    refuse_large(where, columns=file.metadata.num_columns, size=size)
     # A text is unpacked once, however many rows have it.
     kinds = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary)
     fields = list(file.schema_arrow)

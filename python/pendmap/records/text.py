@@ -20,10 +20,13 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import Reader
 
-__all__ = ["MOST_COLUMNS", "Table", "decoded", "parsed"]
+__all__ = ["MOST_BYTES", "MOST_COLUMNS", "Table", "decoded", "parsed", "refuse_large"]
 
 MOST_COLUMNS: Final = 1000
 """Columns that a table may have: a logger of a hundred channels with ten numbers each."""
+
+MOST_BYTES: Final = 2**30
+"""Largest file that is read, and bytes that its numbers may take: an hour at 10 kHz."""
 
 LONGEST: Final = 40 * MOST_COLUMNS
 """Characters of the longest line that may be a row of so many numbers."""
@@ -115,6 +118,21 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
     if len(_CONTROLS.findall(text)) > MOST_CONTROLS * len(text):
         raise InputError(f"{where}: is no text: allowed are CSV (or other text) and Parquet")
     return text, findings
+
+
+def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:
+    """Refuse a table with too many columns, or that unpacks to too many bytes.
+
+    Raises
+    ------
+    InputError
+        If one is more than a record can have.
+    """
+    if columns > MOST_COLUMNS:
+        raise InputError(f"{where}: must have at most {MOST_COLUMNS} columns, got {columns}")
+    if size > MOST_BYTES:
+        most, got = (f"{value / 2**20:.0f} MiB" for value in (MOST_BYTES, size))
+        raise InputError(f"{where}: unpacks to {got}: must be at most {most}")
 
 
 def parsed(text: str, reader: Reader, where: str) -> Table:

@@ -37,7 +37,7 @@ TORQUE: Final = 0.1
 """Torque of a texture, in units of w0^2, that moves readings by about 1 rad."""
 
 FRICTION: Final = 0.005
-"""The same of its friction."""
+"""Friction of a texture, in units of w0^2, that moves readings by about 1 rad."""
 
 
 @dataclasses.dataclass(frozen=True)
