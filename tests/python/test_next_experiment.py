@@ -70,8 +70,8 @@ def test_what_is_recommended_leaves_one_name() -> None:
     """Drifts that are alike within minutes: the rig does what was recommended."""
     request, records, before = hidden(1000018, "viscous_drift", size=0.08, free=3)
     assert before.verdict == "ambiguous"
-    drifts = ["viscous_drift", "coulomb_drift", "natural_frequency_drift"]
-    assert before.equivalent == [drifts]
+    (alike,) = before.equivalent
+    assert {"viscous_drift", "coulomb_drift", "natural_frequency_drift"} <= set(alike)
     outlook, best = before.advice.outlook, before.advice.best
     assert outlook is not None
     assert best is not None
@@ -83,7 +83,7 @@ def test_what_is_recommended_leaves_one_name() -> None:
     assert [effect.name for effect in after.effects] == ["viscous_drift"]
     assert after.verdict == "named"
     rivals = after.judgement.standings[0].rivals
-    power = next(r.behind for r in rivals if r.candidate.name == "coulomb_drift")
+    power = min(r.behind for r in rivals if r.candidate.name in alike and not r.contains)
     # Its scatter, and that of the size from which it was predicted.
     doubt = 2 / math.sqrt(best.value) + 2 / math.sqrt(before.judgement.standings[0].gain)
     assert power == pytest.approx(best.value, rel=3 * doubt)
@@ -113,14 +113,18 @@ def test_an_interval_becomes_as_narrow_as_predicted() -> None:
 def test_a_proposal_says_what_its_record_says(what: str) -> None:
     """The information predicted, from thinned samples, is that of the record once it is there."""
     request, _, found = hidden(8, free=2, noise=0.2, counts=8192)
-    evidence = found.evidence
+    known = {"max_velocity": 8 * found.base.trial.fit.model.w0}
+    experiment = dataclasses.replace(found.evidence.experiment, known=known)
+    evidence = dataclasses.replace(found.evidence, experiment=experiment)
     menu = menu_of(evidence, found.base.trial.fit.model.w0)
     proposal = next(p for p in menu if len(p.runs) == 1 and what in p.what)
     ahead = Prospects(evidence, found.base, [proposal], [], {})
     predicted = ahead.after(proposal).matrix - ahead.old.matrix
     (run,) = done(request, proposal)
     reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
-    alone = dataclasses.replace(evidence, fitted=(as_fit_run(run, reading),))
+    alone = dataclasses.replace(
+        evidence, fitted=(as_fit_run(run, reading),), readings=(reading,), fitted_of=(0,)
+    )
     trial = found.base.trial
     fit = fitted(alone, trial.fit.model, trial.free, start=trial.start).fit
     recorded_ = Columns.of(fit, alone.fitted, []).information(0, len(run.time), hold=True)
@@ -231,7 +235,7 @@ def test_what_is_not_enough_is_said_to_be_so() -> None:
     assert outlook is not None
     assert best is not None
     assert best.value == max(p.value for p in outlook.prospects) < outlook.wanted
-    said = re.search(r"for 25 about (\d+) such runs are needed", found.advice.next_experiment)
+    said = re.search(r"25 wanted; about (\d+) such runs are needed", found.advice.next_experiment)
     assert said is not None
     ratio = (25 - outlook.now) / (best.value - outlook.now)
     assert int(said[1]) == math.ceil(ratio * len(best.proposal.runs))

@@ -112,7 +112,7 @@ def test_every_verdict_has_its_report(verdict: str, tmp_path: Path) -> None:
     if verdict == "ambiguous":
         (names,) = found.equivalent
         assert all(f"`{name}`" in markdown.split("\n")[2] for name in names)
-        assert "predicted s G" in markdown
+        assert "The separation is the part of the gain" in markdown
         assert "| wrong name | one name left |" in markdown
 
 

@@ -3,8 +3,8 @@
 A sum of squares tells little of a form that is nearly right: what is left of it lies in one
 direction among hundreds. So each direction that has a name is tried by itself: every other effect
 of the library in every shape (Rao's score at the best model), the torque over angle, velocity,
-amplitude, drive phase and time, the slow part of the residuals, and whether all runs would have the
-same parameters. Each says how probable it is that noise alone leaves so much.
+amplitude, drive phase and time, the slow part of the residuals, whether all runs would have the
+same parameters, and the residuals of what was held back. Each says how probable it is that noise alone leaves so much.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Form:
     ----------
     chances : mapping of str to float
         By what was looked at, that noise alone leaves as much: ``effects`` of the library that are
-        not in the model, ``torque``, ``slow`` residuals, ``runs``.
+        not in the model, ``torque``, ``slow`` residuals, ``runs``, ``held_out`` sets.
     further : str or None
         The effect that would take up most of what is left.
     """
@@ -56,6 +56,7 @@ def form_of(
     torque: float,
     slow: float,
     runs: float,
+    held_out: float,
 ) -> Form:
     """Return what is left.
 
@@ -71,6 +72,8 @@ def form_of(
         Chance that noise leaves as much in the slow part of the residuals.
     runs : float
         Chance that noise makes the runs' parameters differ so much.
+    held_out : float
+        Chance that noise leaves as much on what was held back.
     """
     shapes = Counter(score.candidate.name for score in scores.scores)
     best = scores.best()
@@ -86,5 +89,6 @@ def form_of(
         "torque": torque,
         "slow": slow,
         "runs": runs,
+        "held_out": held_out,
     }
     return Form(chances, further)

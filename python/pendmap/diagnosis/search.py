@@ -49,7 +49,7 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
     best = state.weigh(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
     core = best
     best = pruned(state, beginnings(state, core)[0])
-    if core.chosen:
+    if core.chosen and state.most > 0:
         state.attempts.append(core_attempt(state, core, accepted=bool(best.chosen)))
     # What takes the place of the core's effects starts without them.
     rests = [state.rest(best, candidate) for candidate in best.chosen]

@@ -106,10 +106,9 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
         torque=chance,
         slow=trial.remainder.chance,
         runs=runs.chance,
+        held_out=_foretold(best, limits.forecast * max(ratio, allowed)) if trial.chosen else 1.0,
     )
-    held = best.held.chi2 / max(best.held.degrees, 1)
-    missed = bool(trial.chosen) and held > limits.forecast * max(ratio, allowed)
-    rest = missed or form.chance < limits.rest
+    rest = form.chance < limits.rest
     closed = _closed(state, best)
     standings = tuple(
         sorted(
@@ -134,7 +133,7 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
         left,
         ratio,
         allowed,
-        held,
+        best.held.chi2 / max(best.held.degrees, 1),
         closed,
         runs.uneven,
         spread,
@@ -143,6 +142,22 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
         sure,
         verdict == "partial" or sure < limits.sure,
     )
+
+
+def _foretold(best: Found, ratio: float) -> float:
+    """Return the chance that noise alone leaves as much on what was held back.
+
+    Parameters
+    ----------
+    best : Found
+        The model.
+    ratio : float
+        Sum of squares per reading that counts as noise.
+    """
+    from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
+
+    readings = max(best.held.degrees / best.trial.level, 1.0)
+    return float(chdtrc(readings, best.held.chi2 / ratio / best.trial.level))
 
 
 def _spread(trial: Trial, runs: RunByRun, candidate: Candidate) -> float:

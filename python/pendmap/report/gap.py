@@ -76,27 +76,24 @@ def _rests(found: Discrepancy) -> Iterator[Text]:
         f"held out it is {number(judged.ratio_held, 4)}."
     )
     further = () if form.further is None else (" (", Name(form.further), " would take up most)")
+    limits, count = Thresholds(), len(form.chances)
     left: dict[str, tuple[str | Name, ...]] = {
         "slow": ("as much in the slow part of the residuals",),
         "torque": ("as much torque over angle, velocity, amplitude, phase or time",),
         "runs": ("the parameters of the runs as far apart",),
         "effects": ("as much for an effect that is not in the model to explain", *further),
     }
+    if judged.standings:
+        most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
+        left["held_out"] = (f"{number(most, 3)} of chi-squared over degrees of freedom held out",)
     for key, words in left.items():
         chance_of = _rare(form.chances[key])
         yield ("Noise alone would leave ", *words, f" with a probability {chance_of}.")
-    limits, count = Thresholds(), len(form.chances)
     yield (
         f"The least of these {count} probabilities, times {count} because so many were looked at, "
         f"is {number(form.chance, 2) if form.chance > RARE else f'below {number(RARE, 1)}'}. Below "
         f"{limits.rest:g} it counts as no chance: something is left."
     )
-    if judged.standings:
-        most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
-        yield (
-            "Something is left, too, where chi-squared over degrees of freedom on what was held "
-            f"out is above {number(most, 3)}."
-        )
 
 
 def _rare(probability: float) -> str:

@@ -82,7 +82,7 @@ def separated(
         _Pair(standing.candidate, rival, _shapes(rival.candidate))
         for standing in standings
         for rival in standing.rivals
-        if rival.alike
+        if rival.alike and not rival.contains
     ]
     shapes = {shape.title: shape for pair in pairs for shape in pair.shapes}
     w0 = found.trial.fit.model.w0
