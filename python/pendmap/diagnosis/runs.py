@@ -45,6 +45,10 @@ class RunByRun:
     uneven: float
     chance: float
 
+    def shown(self, name: str) -> list[tuple[float, float]]:
+        """Return values and standard errors of a parameter in the runs that show it, SI."""
+        return [(v, e) for v, e in self.coefficients.get(name, []) if math.isfinite(e) and e > 0]
+
     def between(self, name: str) -> float:
         """Return the standard deviation of a parameter between the runs beyond its errors, SI.
 
@@ -53,7 +57,7 @@ class RunByRun:
         """
         from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
 
-        shown = [(v, e) for v, e in self.coefficients.get(name, []) if math.isfinite(e) and e > 0]
+        shown = self.shown(name)
         if len(shown) < 2:  # noqa: PLR2004 (nothing to compare)
             return 0.0
         values = np.array([value for value, _ in shown])

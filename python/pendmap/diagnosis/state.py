@@ -286,7 +286,7 @@ class State:
     def holds(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects lose on no held-out set.
 
-        A set loses by more than what noise makes it lose, or the sum of squares of whole runs, with
+        A set loses by more than a few independent readings, or the sum of squares of whole runs, with
         parameters frozen, rises by more than the factor ``forecast``.
         """
         before, after = self.held(rest), self.held(full)
@@ -297,7 +297,7 @@ class State:
         most = self.thresholds.forecast * max(before.chi2, noise * after.degrees)
         if not self.evidence.inside and after.chi2 > most:
             return False
-        return all(more - less <= self.thresholds.loss * noise for less, more in pairs)
+        return all(more - less <= self.thresholds.loss * full.level for less, more in pairs)
 
     def foretells(self, best: Trial, other: Trial) -> bool:
         """Whether held-out sets do not tell a model from the best one."""

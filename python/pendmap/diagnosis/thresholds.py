@@ -29,7 +29,7 @@ class Thresholds:
         Share of the squared gap above the noise that effects close at least where the model with
         them still lacks something: each to be accepted, all together to be named ``partial``.
     loss : float
-        Rise of the sum of squares on a held-out set, in units of the noise, up to which an effect
+        Rise of the sum of squares on a held-out set, in independent readings, up to which an effect
         is accepted.
     singles, pairs : int
         Candidates, and pairs of candidates, that are fitted at each step of the search.
@@ -46,8 +46,8 @@ class Thresholds:
         Sum of squares per reading held out, over that per reading fitted or over that of the model
         without an effect, above which a model does not foretell what it was not fitted to.
     spread : float
-        Standard deviation of an effect's size between the runs, over the size, up to which the runs
-        agree.
+        Standard error of an effect's size by its scatter between the runs, over the size, up to
+        which the runs agree on it.
     sure : float
         Probability of a name below which it is given with reserve.
     """

@@ -52,8 +52,8 @@ class Judgement:
         How differently the runs would have the parameters, over the standard error of that
         (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
     spread : float
-        How much sizes differ from run to run beyond noise, over their size: the greatest of the
-        effects that close the gap.
+        Standard error of the first effect's size by its scatter between the runs beyond noise,
+        over the size.
     chance : float
         That noise alone would show such a torque over angle, velocity, amplitude, drive phase or
         time as is left.
@@ -161,9 +161,10 @@ def _foretold(best: Found, ratio: float) -> float:
 
 
 def _spread(trial: Trial, runs: RunByRun, candidate: Candidate) -> float:
-    """Return the standard deviation of an effect's size between the runs, over the size."""
+    """Return the standard error of an effect's size by its scatter between runs, over the size."""
     size = candidate.free[0]
-    return runs.between(size) / max(abs(trial.fit[size]), 1e-300)
+    error = runs.between(size) / math.sqrt(max(len(runs.shown(size)), 1))
+    return error / max(abs(trial.fit[size]), 1e-300)
 
 
 def _closed(state: State, best: Found) -> float:
