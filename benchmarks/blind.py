@@ -6,10 +6,10 @@ Of the experiments two in five hide nothing; of the others half hide one effect,
 in a quarter the true effect is withheld from the search, with all that these records do not tell
 from it. ``--forms`` and ``--nuisances`` add experiments whose form differs from the library's, and
 spoilt ones, which are scored apart. ``--mess`` adds experiments with disturbances that no effect
-has, half to ten times as strong as the noise, three in four of them with one main effect. The seed
-is drawn and recorded; results are appended, and a run that was ended goes on where it stood.
-``--report`` only prints what a file holds, and ``--plot`` draws how far probabilities can be
-believed.
+has, half to ten times as strong as the noise, three in four of them with one main effect that does
+to the readings what they do or more. The seed is drawn and recorded; results are appended, and a
+run that was ended goes on where it stood. ``--report`` only prints what a file holds, and
+``--plot`` draws how far probabilities can be believed.
 """
 
 from __future__ import annotations

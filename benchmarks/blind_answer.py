@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from blind_cases import SOUND, Case, record
-from blind_difficulty import difficulty
+from blind_difficulty import difficulty, disturbance
 from pendmap import virtual_rig
 from pendmap.diagnosis import diagnose
 from pendmap.diagnosis.baseline import baseline
@@ -36,9 +36,9 @@ FAMILIES = {
 
 
 STRONG = 100.0
-"""Score that a main effect beside disturbances has at least."""
+"""Score that a main effect beside disturbances has at least; nor is it below their own."""
 
-TRIES, GREATEST = 3, 4.0
+TRIES, GREATEST = 4, 20.0
 """Times that it is made stronger until it has, and the greatest size; what does not show counts
 for nothing."""
 
@@ -67,16 +67,26 @@ def run(case: Case) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         try:
-            hard: dict[str, Any] = {"G": [], "s": 1.0, "equals": [], "beyond": 0.0}
+            hard: dict[str, Any] = {
+                "G": [],
+                "s": 1.0,
+                "equals": [],
+                "beyond": 0.0,
+                "disturbance": 0.0,
+            }
             without: list[str] = []
             if hidden:
                 hard, alike = _difficulty(case, folder)
-                for _ in range(TRIES if case.what == "mess" else 0):
-                    if min(hard["G"]) >= STRONG:
+                main = case.what == "mess"
+                hard["disturbance"] = disturbance(case, folder) if main else 0.0
+                least = max(STRONG, hard["disturbance"])
+                for _ in range(TRIES if main else 0):
+                    if min(hard["G"]) >= least:
                         break
-                    more = 1.2 * math.sqrt(STRONG / max(min(hard["G"]), 1.0))
+                    more = 1.2 * math.sqrt(least / max(min(hard["G"]), 1.0))
                     case = dataclasses.replace(case, size=min(more * case.size, GREATEST))
-                    hard, alike = _difficulty(case, folder)
+                    easier, alike = _difficulty(case, folder)
+                    hard |= easier
                 if case.what == "withheld":
                     own = [effect.split(":")[0] for effect in case.effects]
                     without = [n for n in (*own, *alike) if n in library()]

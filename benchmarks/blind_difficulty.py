@@ -77,6 +77,13 @@ def difficulty(
     return hard, sorted(alike)
 
 
+def disturbance(case: Case, folder: Path) -> float:
+    """Return what a perfect model of a case's disturbances alone would gain."""
+    experiment, sigma = record(dataclasses.replace(case, effects=("none",), size=1.0), folder)
+    base, _ = baseline(_with_noise(evidence_of(experiment), sigma))
+    return base.chi2 - base.fit.degrees
+
+
 def _left(evidence: Evidence, begin: Trial, own: str) -> float:
     """Return what the library's effect of a name leaves of a form that differs from its own."""
     scores = scores_of(

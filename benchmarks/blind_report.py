@@ -133,7 +133,7 @@ def figures(rows: list[Row]) -> list[list[str]]:
     hidden = [r for r in kind("nuisance") if true_names(r)]
     bent = kind("form", STRONG)
     seen = [r for r in hidden if strength(r) >= SEEN]
-    main = [r for r in kind("mess", STRONG) if true_names(r)]
+    main = [r for r in kind("mess", STRONG) if true_names(r) and min(r["G"]) >= r["disturbance"]]
     return [
         ["false alarms, nothing hidden", "at most 1 %", share(kind("none"), found)],
         ["right, G >= 100 and s G >= 25", "98 %", share(clear, right)],

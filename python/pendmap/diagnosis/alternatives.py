@@ -22,6 +22,9 @@ CONTAINS: float = 0.99
 """Cosine between what two effects do to the readings from which the one with more parameters has
 the other one as a special case."""
 
+THIRDS: int = 3
+"""Parts of a single run, each of which a name must survive without."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
@@ -45,7 +48,7 @@ class Rival:
         Whether it has the accepted effect as a special case and gains no more than chance by it.
     alike : bool
         Whether the records do not tell it from the accepted effect: it is behind by less than the
-        threshold, or by the readings of a single run alone.
+        threshold, or by the readings of one run alone, of a single run by those of a third.
     """
 
     candidate: Candidate
@@ -139,7 +142,7 @@ def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
         contains = more and likeness > CONTAINS and behind > -state.thresholds.alike
         alike = behind < state.thresholds.alike
         if fit is not None and not alike:
-            alike = _of_one_run(best, fit)
+            alike = _of_one_part(best, fit)
         rivals.append(
             Rival(
                 score.candidate,
@@ -156,20 +159,19 @@ def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
     return Standing(candidate, gain, state.closed(rest, best), tuple(rivals))
 
 
-def _of_one_run(best: Trial, other: Trial) -> bool:
-    """Whether a model is better than another by the readings of a single run alone."""
-    if len(best.runs) < 2:  # noqa: PLR2004 (a run alone says all)
-        return False
-    behind = _by_run(other) - _by_run(best)
+def _of_one_part(best: Trial, other: Trial) -> bool:
+    """Whether a model is better than another by one run alone, or by a third of a single one."""
+    behind = _by_part(other) - _by_part(best)
     return bool(behind.sum() - behind.max() < 0)
 
 
-def _by_run(trial: Trial) -> np.ndarray:
-    """Return the sum of squares of each run."""
+def _by_part(trial: Trial) -> np.ndarray:
+    """Return the sum of squares of each run, of a single one of each third."""
     sums = []
     for run, white in zip(trial.runs, trial.fit.white, strict=True):
         counted = np.isfinite(white)
         if run.trusted is not None:
             counted &= run.trusted
-        sums.append(float(np.sum(white[counted] ** 2)))
-    return np.array(sums)
+        sums.append(white[counted] ** 2)
+    parts = sums if len(sums) > 1 else np.array_split(sums[0], THIRDS)
+    return np.array([float(np.sum(part)) for part in parts])

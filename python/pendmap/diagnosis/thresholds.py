@@ -55,7 +55,7 @@ class Thresholds:
     chance: float = 1e-3
     rest: float = 1e-3
     alike: float = 10.0
-    closes: float = 0.25
+    closes: float = 1 / 3
     loss: float = 4.0
     singles: int = 4
     pairs: int = 2
