@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
 __all__ = ["COEFFICIENTS", "complete", "features"]
 
-COEFFICIENTS: Final = (3.12, 0.59, -2.4, 0.29, 0.79)
-"""``b0`` to ``b4`` from 282 sets of the seeds 601 to 604, of which 254 were right. None had three
-effects hidden: how three count is drawn on from one and two."""
+COEFFICIENTS: Final = (3.0, 0.59, -2.89, 0.57, 1.1)
+"""``b0`` to ``b4`` from 174 sets of names, of which 119 were right: of 240 experiments of the seed
+7001, 40 of them of forms that the library lacks, and of 120 with disturbances of the seeds 7001 and
+7002. None had three effects hidden: how three count is drawn on from one and two."""
 
 LEAST_CHANCE: Final = 1e-6
 """Below this a chance says no more."""
