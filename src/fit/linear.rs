@@ -13,7 +13,7 @@ use crate::integrate::tangent::{Number, Tangent};
 use crate::lanes::dispatch::Register;
 use crate::lanes::pack::Bundle;
 use crate::lanes::{Lane, Real};
-use crate::model::{Observation, Pendulum};
+use crate::model::{Kind, Observation, Pendulum};
 
 /// The most derivatives that one pass carries.
 const WIDEST: usize = 16;
@@ -181,10 +181,9 @@ impl Follow<'_> {
     fn read(&self, motion: Motion) -> Linear {
         let Motion { states, heard, slopes, stride } = motion;
         let record = &self.problem.records[self.window.record];
-        let sensor = match self.shaped.rod_sensor {
-            None => Some(Sensor::new(&self.shaped.pendulum, self.columns)),
-            Some(_) => None,
-        };
+        // Of a sensor on the rod only what multiplies its readings acts.
+        let rod = self.shaped.rod_sensor.is_some();
+        let sensor = Sensor::new(&self.shaped.pendulum, self.columns, rod);
         let (moving, reading) = (self.columns.motion.len(), self.columns.reading.len());
         let width = moving + reading + 2;
         let mut residuals = Vec::with_capacity(states.len());
@@ -205,9 +204,7 @@ impl Follow<'_> {
             let (of_angle, of_velocity) =
                 slopes[2 * k * stride..2 * (k + 1) * stride].split_at(stride);
             let lab = self.shaped.pendulum.lab_time + record.times[sample];
-            let read = sensor
-                .as_ref()
-                .map_or_else(|| Tangent::seeded(given[0], 0), |sensor| sensor.read(*given, lab));
+            let read = sensor.read(*given, lab);
             let away = record.readings[sample] - read.value;
             let (weight, residual) = match &record.counts {
                 None => {
@@ -238,12 +235,13 @@ impl Follow<'_> {
     }
 }
 
-/// The sensor of the angle, with derivatives by angle, velocity and its free parameters.
+/// The sensor, with derivatives by angle, velocity and its free parameters.
 struct Sensor(Observation<Tangent<f64, READINGS>>);
 
 impl Sensor {
-    fn new(pendulum: &Pendulum, columns: &Columns) -> Self {
-        Self(Observation::lift(pendulum, |index, value| {
+    fn new(pendulum: &Pendulum, columns: &Columns, rod: bool) -> Self {
+        let acts = |kind: Kind| !rod || kind.scales();
+        Self(Observation::lift(pendulum, acts, |index, value| {
             let place = columns.reading.iter().position(|(_, own)| *own == index);
             Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 2))
         }))

@@ -11,13 +11,18 @@ pub struct Observation<R> {
 }
 
 impl<R: Real> Observation<R> {
-    /// Of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
-    /// them) and its value, as for [`Equation::lift`](super::Equation::lift).
-    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
+    /// Of `pendulum`, of whose effects on the reading those count that `acts` is true of; `number`
+    /// makes a number of parameter `index` ([`Pendulum::parameters`] lists them) and its value, as
+    /// for [`Equation::lift`](super::Equation::lift).
+    pub fn lift(
+        pendulum: &Pendulum,
+        acts: impl Fn(Kind) -> bool,
+        mut number: impl FnMut(usize, f64) -> R,
+    ) -> Self {
         let mut first = Pendulum::OWN_PARAMETERS;
         let mut readings = Vec::new();
         for effect in &pendulum.effects {
-            if effect.is(&[Action::Reading]) {
+            if effect.is(&[Action::Reading]) && acts(effect.kind) {
                 let mut index = first;
                 let parameters = effect.lift(|value| {
                     index += 1;

@@ -77,15 +77,18 @@ def test_what_cannot_be_computed_is_null_with_its_reason(
     assert all(name in report for name in unknown)
 
 
-def test_records_of_another_law_get_no_name(tmp_path: Path) -> None:
-    # Of a spring: its period does not grow with the swing.
+def test_the_torque_of_a_spring_is_called_elastic_with_reserve(tmp_path: Path) -> None:
+    # Its period does not grow with the swing: no pendulum, but one with a spring as strong.
     t = np.arange(0, 30, 0.02)
     record = tmp_path / "spring.csv"
     rows = np.c_[t, 3.1 * np.exp(-0.5 * t) * np.cos(6 * t)]
     np.savetxt(record, rows, "%.6f", ",", header="t_s,theta_rad", comments="")
     found = pendmap.diagnosis.diagnose(pendmap.read_experiment(record))
-    assert found.verdict == "unknown"
-    assert found.effects == ()
+    (effect,) = found.effects
+    assert effect.name == "elastic_restoring"
+    assert effect.approximate
+    assert effect.parameters["k"] == pytest.approx(36.25, rel=1e-3)
+    assert found.best.trial.fit.model.w0 < 0.1
 
 
 def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Path) -> None:

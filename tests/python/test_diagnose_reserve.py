@@ -87,9 +87,8 @@ def waving() -> tuple[State, Found]:
         ({}, "partial"),
         ({"closes": 1.1}, "unknown"),
         ({"spread": -1.0}, "unknown"),
-        ({"rest": 0.0, "forecast": 0.0}, "partial"),
         # Nothing counts as left: then the drag's rivals, which the wave hides, decide.
-        ({"rest": 0.0, "forecast": math.inf}, "ambiguous"),
+        ({"rest": 0.0}, "ambiguous"),
     ],
 )
 def test_what_is_partial(

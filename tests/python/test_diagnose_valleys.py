@@ -111,7 +111,9 @@ def test_held_out_runs_that_say_little_do_not_take_an_effect_away(tmp_path: Path
     assert {"drive_frequency", "timebase"} <= set(classed)
 
 
-def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(tmp_path: Path) -> None:
+def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(
+    tmp_path: Path,
+) -> None:
     # What was fitted is explained by one drift of friction; the run held out has chi^2/N 1.9.
     found, _ = diagnosed(
         tmp_path,

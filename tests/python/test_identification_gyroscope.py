@@ -90,6 +90,17 @@ def test_a_large_bias(tmp_path: Path, bias: float) -> None:
     agrees(fitted(run), TRUTH | {"bias": bias})
 
 
+def test_a_gain_is_fitted_on_demand(tmp_path: Path) -> None:
+    # A phone's rate that reads three quarters of the true one, bias and all.
+    time, rate = rates()
+    run = read(tmp_path, time, 0.75 * rate)
+    (said,) = [each.text for each in run.findings if each.what == "angle-scale"]
+    assert "--effect encoder_gain fits it" in said
+    experiment = Experiment(Path(), (run,))
+    best = identify_experiment(experiment, methods=["trajectory"], effects=["encoder_gain"]).best
+    agrees(best, {**TRUTH, "encoder_gain.e": -0.25, "bias": 0.01})
+
+
 def test_intervals_hold_the_truth(tmp_path: Path) -> None:
     """Forty short decays; 95 % of 120 intervals are 114 +- 2.4."""
     held = 0

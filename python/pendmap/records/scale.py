@@ -215,7 +215,8 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
         flat = share < 0.1
         degrees = " (degrees?)" if flat else ""
         channel = "velocity" if work.integrated else "angle"
-        taken = "" if flat else f"; a scale as much larger for the {channel} in [columns] mends it"
+        mended = f"--effect encoder_gain fits it, or scale the {channel} in [columns]"
+        taken = "" if flat else f"; {mended}"
         text = (
             f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
             f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is"

@@ -24,6 +24,8 @@ impl Law for EncoderGain {
         mappable: Mappable::Yes,
     };
 
+    const SCALES: bool = true;
+
     fn reading<R: Real>([e, ..]: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {
         theta + *e * theta
     }

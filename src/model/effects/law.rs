@@ -306,6 +306,9 @@ pub trait Law {
         at.constant(0.0)
     }
 
+    /// Whether it multiplies a reading, so that it acts on a velocity or a force as on an angle.
+    const SCALES: bool = false;
+
     /// What a sensor reads at the angle `theta`, passing it at `velocity` at the laboratory's time
     /// `lab`.
     #[inline(always)]

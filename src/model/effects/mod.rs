@@ -129,6 +129,15 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::SCALES`].
+            #[must_use]
+            pub const fn scales(self) -> bool {
+                match self {
+                    $(Self::$law => <$module::$law as Law>::SCALES,)*
+                    Self::Formula(_) => false,
+                }
+            }
+
             /// [`Law::keeps_mirror`].
             #[must_use]
             pub fn keeps_mirror(self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
