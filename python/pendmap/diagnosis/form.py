@@ -4,7 +4,8 @@ A sum of squares tells little of a form that is nearly right: what is left of it
 direction among hundreds. So each direction that has a name is tried by itself: every other effect
 of the library in every shape (Rao's score at the best model), the torque over angle, velocity,
 amplitude, drive phase and time, the slow part of the residuals, whether all runs would have the
-same parameters, and the residuals of what was held back. Each says how probable it is that noise alone leaves so much.
+same parameters, and the residuals of what was held back. Each says how probable it is that noise
+alone leaves so much.
 """
 
 from __future__ import annotations
@@ -50,13 +51,7 @@ class Form:
 
 
 def form_of(
-    scores: Scores,
-    chance_of: Callable[[float, int], float],
-    *,
-    torque: float,
-    slow: float,
-    runs: float,
-    held_out: float,
+    scores: Scores, chance_of: Callable[[float, int], float], others: Mapping[str, float]
 ) -> Form:
     """Return what is left.
 
@@ -66,14 +61,8 @@ def form_of(
         Of all candidates at the best model.
     chance_of : callable
         Of a gain and how many numbers were adapted for it, the chance that noise alone makes it.
-    torque : float
-        Chance that noise leaves as much torque in bins.
-    slow : float
-        Chance that noise leaves as much in the slow part of the residuals.
-    runs : float
-        Chance that noise makes the runs' parameters differ so much.
-    held_out : float
-        Chance that noise leaves as much on what was held back.
+    others : mapping of str to float
+        Chances that noise alone leaves as much of all else that was looked at.
     """
     shapes = Counter(score.candidate.name for score in scores.scores)
     best = scores.best()
@@ -84,11 +73,5 @@ def form_of(
         if scores.scores[k].gain > 0
     }
     further = min(tails, key=lambda name: tails[name], default=None)
-    chances = {
-        "effects": 1.0 if further is None else min(tails[further] * len(tails), 1.0),
-        "torque": torque,
-        "slow": slow,
-        "runs": runs,
-        "held_out": held_out,
-    }
-    return Form(chances, further)
+    effects = 1.0 if further is None else min(tails[further] * len(tails), 1.0)
+    return Form({"effects": effects, **others}, further)

@@ -286,8 +286,8 @@ class State:
     def holds(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects lose on no held-out set.
 
-        A set loses by more than a few independent readings, or the sum of squares of whole runs, with
-        parameters frozen, rises by more than the factor ``forecast``.
+        A set loses by more than a few independent readings, or the sum of squares of whole runs,
+        with parameters frozen, rises by more than the factor ``forecast``.
         """
         before, after = self.held(rest), self.held(full)
         if before is None or after is None:

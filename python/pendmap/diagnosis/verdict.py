@@ -100,14 +100,14 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
     ratio = trial.chi2 / degrees
     # The greatest of several runs is greater by chance.
     left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
-    form = form_of(
-        state.scores(trial),
-        trial.remainder.chance_of,
-        torque=chance,
-        slow=trial.remainder.chance,
-        runs=runs.chance,
-        held_out=_foretold(best, limits.forecast * max(ratio, allowed)) if trial.chosen else 1.0,
-    )
+    held_out = limits.forecast * max(ratio, allowed)
+    others = {
+        "torque": chance,
+        "slow": trial.remainder.chance,
+        "runs": runs.chance,
+        "held_out": _foretold(best, held_out) if trial.chosen else 1.0,
+    }
+    form = form_of(state.scores(trial), trial.remainder.chance_of, others)
     rest = form.chance < limits.rest
     closed = _closed(state, best)
     standings = tuple(
