@@ -13,7 +13,7 @@ use crate::integrate::tangent::{Number, Tangent};
 use crate::lanes::dispatch::Register;
 use crate::lanes::pack::Bundle;
 use crate::lanes::{Lane, Real};
-use crate::model::{Kind, Observation, Pendulum};
+use crate::model::{Observation, Pendulum};
 
 /// The most derivatives that one pass carries.
 const WIDEST: usize = 16;
@@ -240,11 +240,11 @@ struct Sensor(Observation<Tangent<f64, READINGS>>);
 
 impl Sensor {
     fn new(pendulum: &Pendulum, columns: &Columns, rod: bool) -> Self {
-        let acts = |kind: Kind| !rod || kind.scales();
-        Self(Observation::lift(pendulum, acts, |index, value| {
+        let all = Observation::lift(pendulum, |index, value| {
             let place = columns.reading.iter().position(|(_, own)| *own == index);
             Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 2))
-        }))
+        });
+        Self(if rod { all.scaling() } else { all })
     }
 
     fn read(&self, state: State, lab: f64) -> Tangent<f64, READINGS> {

@@ -33,7 +33,7 @@ pub fn replay(
     }
     let pendulum = &record.pendulum;
     let rate = greatest_rate(pendulum);
-    let observation = Observation::lift(pendulum, |_| true, |_, value| value);
+    let observation = Observation::lift(pendulum, |_, value| value);
     let begin = times.first().copied().unwrap_or(0.0);
     let goes_on = || !cancel.load(Ordering::Relaxed);
     let one = |start: &State| {

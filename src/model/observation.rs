@@ -11,18 +11,13 @@ pub struct Observation<R> {
 }
 
 impl<R: Real> Observation<R> {
-    /// Of `pendulum`, of whose effects on the reading those count that `acts` is true of; `number`
-    /// makes a number of parameter `index` ([`Pendulum::parameters`] lists them) and its value, as
-    /// for [`Equation::lift`](super::Equation::lift).
-    pub fn lift(
-        pendulum: &Pendulum,
-        acts: impl Fn(Kind) -> bool,
-        mut number: impl FnMut(usize, f64) -> R,
-    ) -> Self {
+    /// Of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
+    /// them) and its value, as for [`Equation::lift`](super::Equation::lift).
+    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
         let mut first = Pendulum::OWN_PARAMETERS;
         let mut readings = Vec::new();
         for effect in &pendulum.effects {
-            if effect.is(&[Action::Reading]) && acts(effect.kind) {
+            if effect.is(&[Action::Reading]) {
                 let mut index = first;
                 let parameters = effect.lift(|value| {
                     index += 1;
@@ -33,6 +28,13 @@ impl<R: Real> Observation<R> {
             first += effect.values().len();
         }
         Self { readings }
+    }
+
+    /// The same with only what multiplies a reading: of a sensor that reads no angle.
+    #[must_use]
+    pub fn scaling(mut self) -> Self {
+        self.readings.retain(|(kind, _)| kind.scales());
+        self
     }
 
     /// The reading at the angle `theta`, rad and not wrapped, passed at `velocity` at the laboratory's

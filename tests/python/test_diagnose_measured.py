@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pendmap.diagnosis import diagnose
+from pendmap.diagnosis.physical import within_physics
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
@@ -66,7 +67,8 @@ def check_named(diagnosis: Discrepancy) -> None:
     estimates = diagnosis.best.trial.fit.estimates
     for name in ("c_over_m", "Tr", "quadratic_drag.q"):
         assert name not in estimates or estimates[name].value >= 0
-    assert diagnosis.below_zero == {}
+    trial = diagnosis.best.trial
+    assert within_physics(diagnosis.evidence, trial) is trial
     # Far more is left than noise: what is named is not all.
     assert diagnosis.verdict == "partial"
     assert all(effect.approximate for effect in diagnosis.effects)

@@ -100,17 +100,7 @@ class Standing:
 
 
 def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
-    """Return an effect of the best model among those that might stand in its place.
-
-    Parameters
-    ----------
-    state : State
-        With the fits that were made.
-    best : Trial
-        The best model.
-    candidate : Candidate
-        One of its effects.
-    """
+    """Return an effect of the best model among those that might stand in its place."""
     level = best.level
     rest = state.rest(best, candidate)
     if rest is None:

@@ -65,17 +65,7 @@ class Cycles:
 
 
 def cycles_of(evidence: Evidence, base: Found, best: Found, reasons: Reasons) -> tuple[Cycles, ...]:
-    """Return figure 7 of every free run that has a full cycle, those held out first.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    base, best : Found
-        The baseline, and the model found.
-    reasons : dict of str to str
-        Where it is kept which model could not be run from the first peak of which run, and why.
-    """
+    """Return figure 7 of every free run that has a full cycle, those held out first."""
     found = []
     for k, (run, reading) in enumerate(zip(evidence.runs, evidence.readings, strict=True)):
         if run.kind != "free" or run.accelerometer is not None:  # that angle is only roughly made

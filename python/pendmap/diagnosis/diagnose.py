@@ -8,7 +8,6 @@ import functools
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.below_zero import below_zero
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.cycles import Cycles, cycles_of
 from pendmap.diagnosis.data import Evidence, evidence_of
@@ -152,14 +151,9 @@ class Discrepancy(Readable):
     @functools.cached_property
     def not_computed(self) -> Reasons:
         """Why a part beside the verdict could not be computed, by its field in the JSON object."""
-        for part in (self.below_zero, self.forecasts, self.advice, self.cycles):
+        for part in (self.forecasts, self.advice, self.cycles):
             del part
         return self.reasons
-
-    @functools.cached_property
-    def below_zero(self) -> dict[str, float]:
-        """From which time in the laboratory on, s, damping or friction are below 0 by a drift."""
-        return below_zero(self.evidence, self.best, self.reasons)
 
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:

@@ -147,17 +147,6 @@ class Trial:
         bare = {e.name: e.bare(model.units).parameters for e in model.effects}
         return {name: bare[candidate.name][name] for name in candidate.shape}
 
-    def bic(self, level: float) -> float:
-        """The sum of squares with Schwarz's penalty for each number that was adapted.
-
-        Parameters
-        ----------
-        level : float
-            By which sums of squares are divided, so that noise that is coloured or stronger than
-            stated counts as noise.
-        """
-        return self.chi2 / level + self.adapted * math.log(max(self.fit.samples / level, 2.0))
-
     @property
     def adapted(self) -> int:
         """How many numbers were adapted to the records, shapes that were scanned among them."""

@@ -87,17 +87,7 @@ class _Stretch:
 def forecasts_of(
     evidence: Evidence, base: Found, best: Found, reasons: Reasons
 ) -> tuple[Forecast, ...]:
-    """Return the error of forecasts, of free runs and of forced ones.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        What was held back.
-    base, best : Found
-        The baseline, and the model found.
-    reasons : dict of str to str
-        Where it is kept of which kind of runs there is no forecast, and why.
-    """
+    """Return the error of forecasts, of free runs and of forced ones."""
     swing = math.tau / base.trial.fit.model.w0
     every = [s for place in range(len(evidence.held)) for s in _stretches(evidence, place, swing)]
     kinds = (("free", False), ("forced", True))

@@ -28,19 +28,7 @@ LOST: Final = (InputError, ArithmeticError, np.linalg.LinAlgError)
 
 
 def attempted(reasons: Reasons, field: str, compute: Callable[[], Part], otherwise: Part) -> Part:
-    """Return a part of a diagnosis, or ``otherwise`` with the reason kept.
-
-    Parameters
-    ----------
-    reasons : dict of str to str
-        Where the reason is kept.
-    field : str
-        The field of the JSON object.
-    compute : callable
-        Computes the part.
-    otherwise : object
-        Stands for it where it cannot be computed.
-    """
+    """Return a part of a diagnosis, or ``otherwise`` with the reason kept."""
     try:
         return compute()
     except LOST as error:

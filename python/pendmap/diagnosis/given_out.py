@@ -35,11 +35,6 @@ def confined(found: Discrepancy) -> Iterator[str]:
 
 
 def zeroed(found: Discrepancy) -> Iterator[str]:
-    """Yield which coefficients are held at 0, and which a drift takes below it."""
+    """Yield which coefficients are held at 0."""
     for name in found.best.trial.zeroed:
         yield f"{name} is held at 0: the fit would make it negative, and no pendulum drives itself"
-    for name, since in found.below_zero.items():
-        yield (
-            f"{name} is below 0 from {since:.3g} s in the laboratory on, by what drifts: "
-            "unphysical, the drift stands for something else"
-        )

@@ -49,13 +49,6 @@ def tried(evidence: Evidence, trial: Trial) -> Held:
 
     Whole runs have fresh initial states; stretches within a fitted run are passed through by the
     motion that was fitted to the rest of it.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        The model.
     """
     model = trial.fit.model
     known = {name: value for name, value in trial.start.items() if "[" not in name}
@@ -93,17 +86,6 @@ def predictive(evidence: Evidence, trial: Trial, held: Held, level: float) -> tu
     ``chi2(fitted and set) - chi2(fitted)``: the set of runs held back. Where stretches of single
     runs are held back, the sum over five rotated folds of such stretches, and the first and the
     last third of the runs, which ask for a forecast across amplitudes.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        A model, fitted to what is not held back.
-    held : Held
-        The same on what is.
-    level : float
-        Sum of squares that counts as one independent reading.
     """
     if not evidence.inside:
         shifted = tuple((w[0] + len(evidence.fitted), *w[1:]) for w in held.fit.windows)

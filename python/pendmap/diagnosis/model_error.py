@@ -29,13 +29,6 @@ def model_errors(records: Evidence, trial: Trial) -> tuple[float, ...]:
 
     0 where the noise explains it: where the mean of the squared residuals over the squared standard
     errors is at most ``1 + 4 sqrt(2 / N + 4 r^2)``, ``r`` the relative error of the noise.
-
-    Parameters
-    ----------
-    records : Evidence
-        With the noise's own standard errors.
-    trial : Trial
-        A model fitted to them, with any weights.
     """
     errors = []
     for run, residual, of in zip(

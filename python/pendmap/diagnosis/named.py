@@ -82,21 +82,7 @@ class NamedEffect:
 def named_effects(
     evidence: Evidence, best: Found, judgement: Judgement, runs: RunByRun, reasons: Reasons
 ) -> tuple[NamedEffect, ...]:
-    """Return the effects of the best model.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records, for intervals from the profile of the likelihood.
-    best : Found
-        The model.
-    judgement : Judgement
-        Its standing. Of effects that the model does not have nothing is returned.
-    runs : RunByRun
-        Parameters run by run: what differs between them widens the intervals.
-    reasons : dict of str to str
-        Where it is kept why intervals are those of the covariance where a profile is wanted.
-    """
+    """Return the effects of the best model."""
     widening = best.trial.widening
     none: dict[str, dict[str, tuple[float, float]]] = {}
     profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)

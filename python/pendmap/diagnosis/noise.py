@@ -112,19 +112,7 @@ class Remainder:
 def remainder_of(
     fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int, floors: Sequence[float]
 ) -> Remainder:
-    """Return what a fit leaves.
-
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        With its windows.
-    runs : sequence of FitRun
-        Its records.
-    adapted : int
-        How many parameters were adapted to them.
-    floors : sequence of float
-        Share of rounding in the variance of each run's noise; 0 where there are no counts.
-    """
+    """Return what a fit leaves."""
     spectra = spectra_of(fit, runs)
     if not spectra.quick_sizes.any() or spectra.mean < ARITHMETIC:
         return Remainder(

@@ -33,13 +33,6 @@ def within_physics(evidence: Evidence, trial: Trial) -> Trial | None:
     effect must oppose the motion where its kind does, must not drive the motion by a drift or an
     asymmetry greater than what drifts, must take longer than a swing and no longer than the record,
     and must have a width near its typical range.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        A fit without limits.
     """
     while negative := [n for n in OPPOSING if n in trial.fit.estimates and trial.fit[n] < 0]:
         zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)

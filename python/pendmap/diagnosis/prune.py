@@ -20,13 +20,6 @@ def pruned(state: State, best: Trial) -> Trial:
 
     Of all fits that the records do not tell from the best, the simplest and commonest stands. No
     set of effects is looked at twice.
-
-    Parameters
-    ----------
-    state : State
-        With the fits that were made.
-    best : Trial
-        An accepted model.
     """
     seen: set[Key] = set()
     following: Trial | None = best
@@ -60,19 +53,7 @@ def _following(state: State, best: Trial) -> Trial | None:
 def rivals_of(
     state: State, best: Trial, candidate: Candidate, rest: Trial
 ) -> list[tuple[int, Trial | None]]:
-    """Return the candidates that promise most in an effect's place, and their fits.
-
-    Parameters
-    ----------
-    state : State
-        With the fits that were made.
-    best : Trial
-        The model.
-    candidate : Candidate
-        One of its effects.
-    rest : Trial
-        The model without it.
-    """
+    """Return the candidates that promise most in an effect's place, and their fits."""
     limits = state.thresholds
     scores = state.scores(rest)
     gain = rest.chi2 - best.chi2

@@ -64,21 +64,6 @@ def refitted(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
 
     The fit starts at the trial's motion with sizes of nearly 0, in the best shapes by their scores,
     and where it gains far less than promised again at the sizes of the score.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    thresholds : Thresholds
-        ``shapes``, ``worth`` and ``short`` decide.
-    trial : Trial
-        The model without the candidates.
-    scores : Scores
-        At that model.
-    places : sequence of int
-        Which of the scores.
-    level : float
-        Sum of squares that counts as one independent reading.
     """
     own = [scores.scores[k] for k in places]
     added = [score.candidate for score in own]

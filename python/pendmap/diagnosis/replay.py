@@ -98,15 +98,6 @@ def settled(
 ) -> list[tuple[float, float]]:
     """Return the states at the runs' first times from which a model comes nearest to readings.
 
-    Parameters
-    ----------
-    motion : Motion
-        The model; its parameters stay.
-    runs : sequence of FitRun
-        The readings.
-    states : sequence of (float, float)
-        Where the search begins.
-
     Raises
     ------
     InputError
@@ -117,17 +108,7 @@ def settled(
 
 
 def drives(found: Found, run: FitRun, place: int) -> Mapping[str, float | None] | None:
-    """Return the drive of a run held back, its phase as the model has it where no one knows it.
-
-    Parameters
-    ----------
-    found : Found
-        The model on what was held back.
-    run : FitRun
-        The run.
-    place : int
-        Which of those held back it is.
-    """
+    """Return the drive of a run held back, its phase as the model has it where no one knows it."""
     if run.drive is None or run.drive.get("phi") is not None:
         return run.drive
     known = found.held.fit.estimates

@@ -101,15 +101,7 @@ class Torque:
 
 
 def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
-    """Return the torque that a fitted model lacks in the runs that it was fitted to.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        The model.
-    """
+    """Return the torque that a fitted model lacks in the runs that it was fitted to."""
     windows, places = windows_of(evidence, trial)
     names = [name for name in OVER if any(np.isfinite(p[name]).any() for p in places)]
     edges = {

@@ -73,13 +73,6 @@ class RunByRun:
 def run_by_run(evidence: Evidence, trial: Trial) -> RunByRun:
     """Return what each run would have, to first order from the fit of all.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        The fit.
-
     References
     ----------
     Cochran (1954), Biometrics 10, 101.

@@ -35,17 +35,7 @@ __all__ = ["beginnings", "search"]
 
 
 def search(state: State, core: Trial | None, progress: Callable[[int], None]) -> Trial:
-    """Return the best model.
-
-    Parameters
-    ----------
-    state : State
-        The records, the given model and the candidates.
-    core : Trial, optional
-        The physical core fitted to the records; none where the given model has its effects.
-    progress : callable
-        Called with the number of accepted effects.
-    """
+    """Return the best model."""
     best = state.weigh(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
     core = best
     best = pruned(state, beginnings(state, core)[0])

@@ -82,15 +82,7 @@ class Spectra:
 
 
 def spectra_of(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:
-    """Return the spectra of what a fit leaves.
-
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        With its windows; those with fewer than :data:`LEAST` samples are passed over.
-    runs : sequence of FitRun
-        Its records.
-    """
+    """Return the spectra of what a fit leaves."""
     from scipy.fft import dct  # noqa: PLC0415 (where it is needed)
 
     slow, quick, slow_sizes, quick_sizes, motion = np.zeros((5, len(runs), BINS))

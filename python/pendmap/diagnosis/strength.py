@@ -51,15 +51,6 @@ class Strength:
 def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength:
     """Return how strong an effect of a model is, from the motion with it and without it.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    best : Found
-        The model.
-    effect : str
-        One of its effects.
-
     Raises
     ------
     InputError

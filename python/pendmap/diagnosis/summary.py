@@ -139,7 +139,6 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         },
         "baseline": {name: e.value for name, e in base.estimates.items()},
         "set_to_zero": list(found.best.trial.zeroed),
-        "below_zero": found.below_zero,
         "model_file": {"rms": fit.rms, "parameters": given_out(found.best)},
         "parameters": {
             name: {"value": e.value, "stderr": e.stderr and wider * e.stderr}

@@ -80,19 +80,7 @@ class Judgement:
 
 
 def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement:
-    """Return the verdict on a search.
-
-    Parameters
-    ----------
-    state : State
-        After the search.
-    best : Found
-        The best model.
-    runs : RunByRun
-        Its parameters run by run.
-    chance : float
-        Probability that noise alone shows such a torque over angle, velocity, ... as is left.
-    """
+    """Return the verdict on a search."""
     limits, trial = state.thresholds, best.trial
     degrees = max(trial.fit.degrees, 1)
     # The doubt about the noise as it is seen without a model, run by run.

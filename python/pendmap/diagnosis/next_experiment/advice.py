@@ -66,21 +66,6 @@ def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     Names that are alike are to be told apart (``s G`` of 25), named or leading explanations of what
     is unknown; of effects that are told apart the widest interval is to be halved; where nothing is
     found, more is to be seen.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    best, nearest : Found
-        The model that is claimed, and the best that candidates can do.
-    judgement : Judgement
-        The verdict.
-    scores : Scores
-        Of all others at the best model.
-    level : float
-        Of the noise.
-    reasons : dict of str to str
-        Where it is kept why there are no proposals.
     """
     limits = detection_limits(scores, level, best.trial.names, best.trial.fit.model.units)
 

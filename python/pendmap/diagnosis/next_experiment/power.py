@@ -63,21 +63,7 @@ def separated(
     level: float,
     reasons: Reasons,
 ) -> Outlook:
-    """Return what each proposal would add to the separation of names that are alike.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    found : Found
-        The best model.
-    standings : sequence of Standing
-        Its effects among their rivals.
-    level : float
-        Of the noise.
-    reasons : dict of str to str
-        Where it is kept why a proposal is left out.
-    """
+    """Return what each proposal would add to the separation of names that are alike."""
     pairs = [
         _Pair(standing.candidate, rival, _shapes(rival.candidate))
         for standing in standings
@@ -145,13 +131,7 @@ def _separation(ahead: Prospects, total: Information, found: Found, pair: _Pair)
 
 
 def tightened(evidence: Evidence, found: Found, level: float, reasons: Reasons) -> Outlook | None:
-    """Return what each proposal would do to the widest interval of an effect's size.
-
-    Parameters
-    ----------
-    evidence, found, level, reasons
-        As of :func:`separated`.
-    """
+    """Return what each proposal would do to the widest interval of an effect's size."""
     w0 = found.trial.fit.model.w0
     ahead = Prospects(evidence, found, menu_of(evidence, w0), (), reasons)
     shared = ahead.now.shared
@@ -172,17 +152,7 @@ def tightened(evidence: Evidence, found: Found, level: float, reasons: Reasons) 
 
 
 def seen(evidence: Evidence, found: Found, scores: Scores, reasons: Reasons) -> Outlook | None:
-    """Return what each proposal would do to the smallest sizes that would be seen.
-
-    Parameters
-    ----------
-    evidence, found
-        As of :func:`separated`.
-    scores : Scores
-        At that model: each effect's shape that shows least is what is looked at.
-    reasons : dict of str to str
-        As of :func:`separated`.
-    """
+    """Return what each proposal would do to the smallest sizes that would be seen."""
     faintest: dict[str, Candidate] = {}
     least: dict[str, float] = {}
     for score in scores.scores:

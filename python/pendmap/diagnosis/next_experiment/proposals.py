@@ -154,13 +154,6 @@ def menu_of(evidence: Evidence, w0: float) -> tuple[Proposal, ...]:
     and after pauses; with a harmonic drive among the records forced runs at other frequencies, half
     as strong, swinging and turning; of all these what the rig can do: ``max_angle``,
     ``max_velocity`` and ``max_frequency`` of ``[rig]``, else a little more than the records show.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    w0 : float
-        Natural frequency, rad/s.
     """
     usual = _usual_length(evidence)
     most = max(usual, LONGEST_S)
