@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from blind_report import sound
-from pendmap.diagnosis.calibration import COEFFICIENTS, features
+from pendmap.diagnosis.verdict import COEFFICIENTS, features
 
 WIDTH = 1.0
 """Standard deviation of the prior."""

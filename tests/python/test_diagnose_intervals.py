@@ -9,7 +9,7 @@ import pytest
 
 from hidden import diagnosed
 from pendmap.diagnosis.fitted_model import fitted
-from pendmap.diagnosis.sides import better_side
+from pendmap.diagnosis.refit import better_side
 
 if TYPE_CHECKING:
     from pathlib import Path

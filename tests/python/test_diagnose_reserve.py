@@ -14,14 +14,13 @@ from driven_decays import motion
 from hidden import diagnosed
 from pendmap.diagnosis.alternatives import Rival, Standing
 from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.calibration import complete
 from pendmap.diagnosis.candidates import candidates
 from pendmap.diagnosis.data import evidence_of
 from pendmap.diagnosis.runs import run_by_run
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import Found, State
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.diagnosis.verdict import judge
+from pendmap.diagnosis.verdict import complete, judge
 from pendmap.records import Experiment, Run
 
 CHANCE, SURE = Thresholds().rest, Thresholds().sure

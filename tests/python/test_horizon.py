@@ -12,8 +12,7 @@ from hidden import once
 from pendmap import Rig
 from pendmap.diagnosis import diagnosed_model
 from pendmap.diagnosis.forecast import forecasts_of
-from pendmap.diagnosis.replay import Motion, replayed
-from pendmap.diagnosis.strength import strength_of
+from pendmap.diagnosis.replay import Motion, replayed, strength_of
 from pendmap.identification import compare
 from pendmap.identification.runs import FitRun
 

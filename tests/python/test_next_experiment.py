@@ -17,10 +17,9 @@ from hidden import once
 from pendmap import virtual_rig
 from pendmap.diagnosis import Discrepancy, diagnose
 from pendmap.diagnosis.fitted_model import fitted
-from pendmap.diagnosis.next_experiment.ahead import Prospects
-from pendmap.diagnosis.next_experiment.information import Columns, Information
+from pendmap.diagnosis.next_experiment.information import Columns, Information, Prospects
 from pendmap.diagnosis.next_experiment.limits import needed
-from pendmap.diagnosis.next_experiment.outlook import one_left, wrong_name
+from pendmap.diagnosis.next_experiment.power import one_left, wrong_name
 from pendmap.diagnosis.next_experiment.proposals import menu_of
 from pendmap.diagnosis.summary import as_json
 from pendmap.errors import InputError

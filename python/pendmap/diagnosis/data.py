@@ -1,15 +1,13 @@
-"""What a diagnosis has to go by: records to fit, records held back, and what their readings are
-worth.
-"""  # noqa: D205 (one sentence)
+"""The records of a diagnosis: those that are fitted, and those that are held back."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.blocks import in_blocks
 from pendmap.errors import InputError
 from pendmap.identification.joint import as_fit_run
 from pendmap.identification.reading import Reading, reading_of
@@ -22,7 +20,9 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
 
-__all__ = ["Evidence", "evidence_of", "held_parts"]
+    Floats = NDArray[np.float64]
+
+__all__ = ["Evidence", "evidence_of", "held_parts", "in_blocks"]
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Parts of a run that are held back where no whole run is: a fifth, at large and small swings."""
@@ -59,7 +59,7 @@ class Evidence:
         What the readings of each are worth.
     fitted, held : tuple of FitRun
         What models are fitted to, and what they are tried on; readings far denser than the motion
-        are means over blocks, :func:`pendmap.diagnosis.blocks.in_blocks`.
+        are means over blocks, :func:`pendmap.diagnosis.data.in_blocks`.
     fitted_of, held_of : tuple of int
         Which of ``runs`` each belongs to.
     inside : bool
@@ -255,3 +255,90 @@ def _part(run: FitRun, good: NDArray[np.bool_], a: int, b: int) -> FitRun:
     return dataclasses.replace(
         run, time=run.time[a:b], theta=run.theta[a:b], sigma=sigma[a:b], trusted=good[a:b]
     )
+
+
+BLOCKS: Final = 50
+"""So many blocks at least a swing, or a turn, is divided into: noise still stands apart from the
+motion in their spectrum, and a window has enough of them."""
+
+FEWEST_BLOCKS: Final = 1000
+"""Blocks that a record has at least: below, the integrator's own steps are what takes time."""
+
+LEAST_OF_BLOCK: Final = 3
+"""Readings of a block at least: pairs save little."""
+
+NEIGHBOURS: Final = 2
+"""Blocks on either side through which a parabola is laid."""
+
+
+def in_blocks(run: FitRun) -> FitRun:
+    """Return a run with its readings put together, or as it is where they are not dense.
+
+    The mean of readings over a block is a reading at the mean of their times, with weights ``w``
+    one over their squared errors: ``sum(w x)/sum(w)`` has the error ``sum(w)^(-1/2)``. It exceeds
+    the angle there by the curvature, ``var(t) a/2`` with the acceleration ``a`` of the parabola
+    through five blocks, which is taken off; the rest, of the order of ``T^4/60`` times the fourth
+    derivative in a block of length ``T``, is ``1e-6`` of a swing. A run whose readings are
+    intervals stays as it is: their mean is none.
+    """
+    if run.count is not None:
+        return run
+    weights = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape) ** -2.0
+    if run.trusted is not None:
+        weights = np.where(run.trusted, weights, 0.0)
+    for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
+        found = _divided(run.time, run.theta, weights, size)
+        if _dense(*found[:3]):
+            break
+    else:
+        return run
+    time, theta, weight, variance = found
+    counted = weight > 0
+    # What does not count may be anything, and bends no parabola of its neighbours.
+    known = np.where(counted, theta, np.interp(time, time[counted], theta[counted]))
+    theta = theta - 0.5 * variance * _curvature(time, known)
+    # One that does not count has any error.
+    sigma = np.where(counted, weight, np.median(weight[counted])) ** -0.5
+    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=counted)
+
+
+def _divided(
+    time: Floats, theta: Floats, weights: Floats, size: int
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return mean time, mean reading, weight and variance of the times of each block.
+
+    A block without a reading that counts has the plain means. What is left at the end joins none.
+    """
+    count = time.size // size
+    t, x, w = (values[: count * size].reshape(count, size) for values in (time, theta, weights))
+    total = w.sum(axis=1)
+    share = np.where(total[:, None] > 0, w, 1.0)
+    share /= share.sum(axis=1, keepdims=True)
+    middle = (share * t).sum(axis=1)
+    variance = (share * (t - middle[:, None]) ** 2).sum(axis=1)
+    return middle, (share * x).sum(axis=1), total, variance
+
+
+def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
+    """Whether blocks are short against the quickest swing, or turn, of what counts."""
+    counted = weight > 0
+    time, theta = time[counted], theta[counted]
+    if time.size < FEWEST_BLOCKS:
+        return False
+    steps = np.diff(time)
+    velocity = np.diff(theta) / steps
+    # Of a swing the one is its frequency, of a rotation the other.
+    rate = max(float(np.std(velocity) / np.std(theta)), float(np.quantile(np.abs(velocity), 0.99)))
+    return float(np.median(steps)) * rate < math.tau / BLOCKS
+
+
+def _curvature(time: Floats, theta: Floats) -> Floats:
+    """Return the second derivative of the parabola through each block and its neighbours."""
+    span = 2 * NEIGHBOURS + 1
+    first = np.clip(np.arange(time.size) - NEIGHBOURS, 0, time.size - span)
+    places = first[:, None] + np.arange(span)
+    t = time[places] - time[:, None]
+    scale = np.abs(t).max(axis=1)
+    basis = (t / scale[:, None])[..., None] ** np.arange(3)
+    fitted = np.linalg.pinv(basis) @ theta[places][..., None]
+    return np.asarray(2 * fitted[:, 2, 0] / scale**2, np.float64)

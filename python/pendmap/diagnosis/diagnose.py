@@ -11,10 +11,9 @@ from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.cycles import Cycles, cycles_of
 from pendmap.diagnosis.data import Evidence, evidence_of
-from pendmap.diagnosis.forecast import Forecast, forecasts_of
+from pendmap.diagnosis.forecast import Forecast, Gap, forecasts_of, gap_of
 from pendmap.diagnosis.functions import FunctionScore, call_once, divided, function_scores
 from pendmap.diagnosis.further import Reasons, attempted
-from pendmap.diagnosis.gap import Gap, gap_of
 from pendmap.diagnosis.named import NamedEffect, named_effects
 from pendmap.diagnosis.next_experiment.advice import Advice, advice_of
 from pendmap.diagnosis.physical import within_physics

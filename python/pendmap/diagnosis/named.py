@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.diagnosis.calibration import complete
 from pendmap.diagnosis.candidates import own_name
 from pendmap.diagnosis.further import Reasons, attempted
 from pendmap.diagnosis.intervals import Z95, profiles
-from pendmap.diagnosis.sides import elsewhere
+from pendmap.diagnosis.refit import elsewhere
+from pendmap.diagnosis.verdict import complete
 from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect

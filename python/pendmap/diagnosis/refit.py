@@ -16,8 +16,8 @@ from pendmap.diagnosis.fitted_model import (
     fitted,
     with_candidates,
 )
+from pendmap.diagnosis.intervals import Z95
 from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.sides import better_side
 from pendmap.diagnosis.valley import exponents
 from pendmap.errors import InputError
 
@@ -26,11 +26,21 @@ if TYPE_CHECKING:
 
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.data import Evidence
+    from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.thresholds import Thresholds
     from pendmap.model import Rig
 
-__all__ = ["Key", "best_of", "key_of", "refitted", "replaced", "without"]
+__all__ = [
+    "Key",
+    "best_of",
+    "better_side",
+    "elsewhere",
+    "key_of",
+    "refitted",
+    "replaced",
+    "without",
+]
 
 KICK: Final = 1e-3
 """Part of the score's step from which a candidate's size starts: far from the fit the step of all
@@ -192,3 +202,67 @@ def _faint(trial: Trial, dropped: Candidate) -> int | None:
     if not math.isfinite(error) or abs(trial.start[size]) > FAINT * error:
         return None
     return trial.fit.names.index(size)
+
+
+BACK_STEPS: Final = 6
+"""Steps of a fit from the other side that is to be better: there nearly all is as it was."""
+
+ALIKE_STEPS: Final = 25
+"""Steps of one that is to be as good."""
+
+
+def better_side(evidence: Evidence, trial: Trial) -> Trial:
+    """Return a fit with places on the other side of the rest, where that is better.
+
+    A pendulum that swings about its rest passes ``th0`` and ``-th0`` alike: a fit that begins on
+    the wrong side does not change over.
+    """
+    for candidate in trial.chosen:
+        for place in candidate.places:
+            other = _beyond(evidence, trial, candidate, place, BACK_STEPS)
+            if other is not None and other.chi2 < trial.chi2:
+                trial = other
+    return trial
+
+
+def elsewhere(evidence: Evidence, trial: Trial) -> dict[str, dict[str, float]]:
+    """Return places on the other side of the rest where effects would do as well."""
+    found: dict[str, dict[str, float]] = {}
+    for candidate in trial.chosen:
+        for place in candidate.places:
+            other = _beyond(evidence, trial, candidate, place, ALIKE_STEPS)
+            if other is None:
+                continue
+            key = f"{candidate.name}.{place}"
+            here, there = (t.fit.estimates[key].value for t in (trial, other))
+            apart = abs(math.remainder(there - here, math.tau))
+            as_good = other.chi2 - trial.chi2 < Z95**2 * trial.widening
+            if as_good and apart > abs(here):
+                found.setdefault(candidate.name, {})[place] = there
+    return found
+
+
+def _beyond(
+    evidence: Evidence, trial: Trial, candidate: Candidate, place: str, steps: int
+) -> Trial | None:
+    """Return the fit from the other side of the rest; none where the motion is lost."""
+    key = f"{candidate.name}.{place}"
+    there = -trial.fit.estimates[key].value
+    effects = tuple(
+        dataclasses.replace(e, parameters={**e.parameters, place: there})
+        if e.name == candidate.name
+        else e
+        for e in trial.fit.model.effects
+    )
+    try:
+        return fitted(
+            evidence,
+            dataclasses.replace(trial.fit.model, effects=effects),
+            trial.free,
+            trial.chosen,
+            start=trial.start | {key: there},
+            windows=trial.fit.windows,
+            steps=steps,
+        )
+    except InputError:
+        return None

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.diagnosis.further import Reasons, attempted
-from pendmap.diagnosis.given_out import zeroed
-from pendmap.diagnosis.strength import strength_of
+from pendmap.diagnosis.replay import strength_of
+from pendmap.diagnosis.summary import zeroed
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Formula, Items, Name, Paragraph, Picture, Section, Table
 from pendmap.report.wording import (

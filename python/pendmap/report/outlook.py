@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.next_experiment.limits import Limit
-    from pendmap.diagnosis.next_experiment.outlook import Outlook
+    from pendmap.diagnosis.next_experiment.power import Outlook
     from pendmap.report.document import Block, Text
 
 __all__ = ["following", "set_aside"]

@@ -13,7 +13,7 @@ from pendmap.diagnosis.next_experiment.power import seen, separated, tightened
 if TYPE_CHECKING:
     from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.next_experiment.limits import Limit
-    from pendmap.diagnosis.next_experiment.outlook import Outlook, Prospect
+    from pendmap.diagnosis.next_experiment.power import Outlook, Prospect
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Found
     from pendmap.diagnosis.verdict import Judgement
