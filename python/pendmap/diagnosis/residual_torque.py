@@ -119,7 +119,8 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
     joint = _solved(further, residual)
-    wide = math.sqrt(trial.level)
+    # Errors are those of what the bins together leave.
+    wide = math.sqrt(max(trial.remainder.level, _level(residual - further @ joint.torque)))
     first = 0
     for name in names:
         last = first + edges[name].size - 1
@@ -141,6 +142,15 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
         ]
         first = last
     return Torque(found, gains, trial.remainder)
+
+
+def _level(residual: Floats) -> float:
+    """Return the sum of squares over the number of independent readings among residuals."""
+    from scipy.fft import dct  # noqa: PLC0415 (where it is needed)
+
+    power = dct(residual, norm="ortho") ** 2
+    total = float(power.sum())
+    return float(np.sum(power**2)) / (3 * total) if total > 0 else 0.0
 
 
 def windows_of(
