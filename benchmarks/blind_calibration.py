@@ -2,7 +2,7 @@
 
     python benchmarks/blind_calibration.py blind.jsonl [more.jsonl ...]
 
-A set of effects that was claimed is right where each is hidden, by its name or in its class.
+A name is right where it is hidden, by itself or in its class.
 Logistic regression; each number is drawn towards the one that stands there by a normal prior of
 width 1, so that few experiments change little. Experiments that calibrate are not those that the
 probabilities are judged by: use another seed.
@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from blind_report import sound
+from blind_report import classes, true_names
 from pendmap.diagnosis.verdict import COEFFICIENTS, features
 
 WIDTH = 1.0
@@ -34,17 +34,21 @@ def main() -> None:
         for line in file.read_text(encoding="utf-8").splitlines()
     ]
     rows = [row for row in map(json.loads, lines) if row.get("named")]
-    x = np.array([features(r["form"][0], [s["gain"] for s in r["standings"]]) for r in rows])
-    y = np.array([sound(row) for row in rows])
+    x, y = [], []
+    for row in rows:
+        gains = {s["name"]: s["gain"] for s in row["standings"]}
+        x += features(row["form"][0], [gains[name] for name in row["named"]])
+        hidden = {*true_names(row), *(row["equals"] if row["what"] == "mess" else ())}
+        y += [bool(own & hidden) for own in classes(row)]
     prior = np.array(COEFFICIENTS)
 
     def loss(b: np.ndarray) -> float:
         sign = np.where(y, 1.0, -1.0)
-        fit = np.sum(np.logaddexp(0.0, -sign * (x @ b)))
+        fit = np.sum(np.logaddexp(0.0, -sign * (np.array(x) @ b)))
         return float(fit + 0.5 * np.sum(((b - prior) / WIDTH) ** 2))
 
     found = minimize(loss, prior)
-    print(f"{len(rows)} sets, {int(np.sum(y))} right")
+    print(f"{len(y)} names, {int(np.sum(y))} right")
     print("COEFFICIENTS =", tuple(round(float(b), 2) for b in found.x))
 
 

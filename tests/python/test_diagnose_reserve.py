@@ -20,21 +20,24 @@ from pendmap.diagnosis.runs import run_by_run
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import Found, State
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.diagnosis.verdict import complete, judge
+from pendmap.diagnosis.verdict import judge, probabilities
 from pendmap.records import Experiment, Run
 
 CHANCE, SURE = Thresholds().rest, Thresholds().sure
 
 
 def test_probability_falls_with_what_is_left_and_with_how_many_effects_it_took() -> None:
-    by_chance = [complete(chance, [500.0]) for chance in (1.0, 0.1, 1e-2, 1e-3)]
+    by_chance = [probabilities(chance, [1000.0])[0] for chance in (1.0, 0.1, 1e-2, 1e-3)]
     assert by_chance == sorted(by_chance, reverse=True)
     assert by_chance[0] > SURE > by_chance[-1]
-    by_count = [complete(0.5, [500.0] * count) for count in (1, 2, 3)]
+    by_count = [min(probabilities(0.5, [500.0] * count)) for count in (1, 2, 3)]
     assert by_count == sorted(by_count, reverse=True)
     # One that mops up what a stronger one of the wrong form leaves.
-    assert complete(0.5, [2000.0, 1500.0]) > complete(0.5, [2000.0, 20.0])
-    assert complete(0.0, [1e300, 0.0]) > 0
+    strong, weak = probabilities(0.5, [2000.0, 20.0])
+    assert strong > weak
+    assert probabilities(0.5, [2000.0, 1500.0])[1] > weak
+    assert min(probabilities(0.0, [1e300, 0.0])) > 0
+    assert probabilities(0.5, []) == ()
 
 
 def test_nothing_left_is_chance(tmp_path: Path) -> None:
@@ -60,7 +63,7 @@ def test_what_two_others_do_together_is_given_with_reserve(seed: int, tmp_path: 
         tmp_path, "quadratic_drag", seed=seed, size=3.0, free=3, forced=0, without=own
     )
     assert found.effects == () or all(effect.approximate for effect in found.effects)
-    assert found.judgement.complete < SURE
+    assert min(found.judgement.probabilities) < SURE
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +102,7 @@ def test_what_is_partial(
     judged = judge(state, best, run_by_run(state.evidence, best.trial), 1.0)
     assert judged.closed > 0.5
     assert judged.verdict == verdict
-    assert judged.approximate is (verdict == "partial" or judged.complete < 0.9)
+    assert judged.approximate is (verdict == "partial" or min(judged.probabilities) < SURE)
 
 
 def test_the_effect_that_closes_most_comes_first(waving: tuple[State, Found]) -> None:

@@ -12,7 +12,6 @@ from pendmap.diagnosis.candidates import own_name
 from pendmap.diagnosis.further import Reasons, attempted
 from pendmap.diagnosis.intervals import Z95, profiles
 from pendmap.diagnosis.refit import elsewhere
-from pendmap.diagnosis.verdict import complete
 from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
@@ -88,10 +87,8 @@ def named_effects(
     profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)
     others = elsewhere(evidence, best.trial)
     named = []
-    for k, standing in enumerate(judgement.standings):
+    for standing, sure in zip(judgement.standings, judgement.probabilities, strict=True):
         candidate = standing.candidate
-        # Weaker effects may be wrong names, and this one right.
-        sure = complete(judgement.form.chance, [s.gain for s in judgement.standings[: k + 1]])
         if candidate.name not in best.trial.names:
             continue
         parameters, errors = values_of(best, candidate)

@@ -65,4 +65,4 @@ class Thresholds:
     short: float = 0.8
     forecast: float = 1.3
     spread: float = 0.5
-    sure: float = 0.95
+    sure: float = 0.9

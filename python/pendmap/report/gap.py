@@ -52,19 +52,13 @@ def verdict(found: Discrepancy) -> Section:
 
 def _meant(found: Discrepancy) -> str:
     """Return what the probability of a name says."""
-    all_of_it = "and is" if len(found.effects) == 1 else "and the others here are"
     said = (
-        f"The probability of a name is that it is right {all_of_it} all that is missing. Blind "
-        "experiments gave it: it is lower the more is left and the more effects it took."
+        "The probability of a name is that it is right, given that the effect is in the library. "
+        "Blind experiments gave it: it is lower the more is left, the more effects it took and the "
+        "weaker the effect is beside the strongest."
     )
-    if found.verdict == "ambiguous":
-        return f"{said} Names that are not told apart share it."
-    if found.verdict != "partial":
-        return said
-    return (
-        f"{said} Something is left, so that more is missing: a low probability does not say that "
-        "the effect is not there."
-    )
+    shared = " Names that are not told apart share it."
+    return said + shared if found.verdict == "ambiguous" else said
 
 
 def _rests(found: Discrepancy) -> Iterator[Text]:
