@@ -30,7 +30,7 @@ impl<R: Real> Observation<R> {
         Self { readings }
     }
 
-    /// The same with only what multiplies a reading: of a sensor that reads no angle.
+    /// Keeps only the effects that multiply a reading, for a sensor that reads no angle.
     #[must_use]
     pub fn scaling(mut self) -> Self {
         self.readings.retain(|(kind, _)| kind.scales());

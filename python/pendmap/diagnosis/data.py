@@ -258,8 +258,8 @@ def _part(run: FitRun, good: NDArray[np.bool_], a: int, b: int) -> FitRun:
 
 
 BLOCKS: Final = 50
-"""So many blocks at least a swing, or a turn, is divided into: noise still stands apart from the
-motion in their spectrum, and a window has enough of them."""
+"""Least number of blocks in a swing or a turn: noise stands apart from the motion in their
+spectrum, and a window has enough of them."""
 
 FEWEST_BLOCKS: Final = 1000
 """Blocks that a record has at least: below, the integrator's own steps are what takes time."""

@@ -200,12 +200,6 @@ class Form:
         """The least of all chances, times how many there are (Bonferroni)."""
         return min(min(self.chances.values()) * len(self.chances), 1.0)
 
-    @property
-    def unnamed(self) -> float:
-        """The same without the library's effects: what one of them takes up is not unknown."""
-        others = [chance for name, chance in self.chances.items() if name != "effects"]
-        return min(min(others) * len(others), 1.0)
-
 
 def form_of(
     scores: Scores, chance_of: Callable[[float, int], float], others: Mapping[str, float]
