@@ -26,9 +26,9 @@ BASE = ("viscous_damping", "coulomb_friction")
 AGEING = {name for name, e in library().items() if "time in the laboratory" in e["formula"]}
 """What changes from run to run."""
 
-FOREIGN = {"added_mass:late"}
+FOREIGN = {"added_mass:late", "impulses:train"}
 """Variants that are no form of the library's effect of their name, but another effect: a mass put
-on between two runs does nothing that one does which is there all along."""
+on between two runs does nothing that one does which is there all along, one knock is not ten."""
 
 SPOILT = {"correlation": 0.5, "dropouts": 0.02, "outliers": 0.003, "jitter": 0.0005}
 """What records are spoilt with, one thing in each experiment that is."""

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::alone::alone;
+use super::alone::{Alone, alone};
 use super::descent::{Limit, Outcome, Point, descend};
 use super::problem::Problem;
 use super::window::{Window, cut, guess, halves};
@@ -187,16 +187,30 @@ fn split(problem: &Problem, point: &Point, cancel: &AtomicBool) -> Result<Option
 }
 
 /// The windows with the initial states that fit best at fixed parameters, each by itself: a motion
-/// that goes over the top the wrong way would hold up all others.
+/// that goes over the top the wrong way would hold up all others. The first of a record is tried at
+/// rest too, where friction may hold the pendulum: a fit from any other start stays at another one.
 fn settled(
     problem: &Problem,
     values: &[f64],
     windows: Vec<Window>,
     cancel: &AtomicBool,
 ) -> Result<Vec<Window>, Error> {
+    let begins = |window: &Window| {
+        let weights = &problem.records[window.record].weights;
+        weights[..window.from].iter().all(|weight| *weight == 0.0)
+    };
     let settle = |window: Window| {
-        let found = alone(problem, values, window, SETTLED, cancel)?;
-        Ok(found.map_or(window, |found| found.point.windows[0]))
+        let mut best = alone(problem, values, window, SETTLED, cancel)?;
+        if begins(&window) {
+            let resting = Window { start: [window.start[0], 0.0], ..window };
+            let other = alone(problem, values, resting, SETTLED, cancel)?;
+            let chi2 =
+                |one: &Option<Alone>| one.as_ref().map_or(f64::INFINITY, |a| a.point.normal.chi2);
+            if chi2(&other) < chi2(&best) {
+                best = other;
+            }
+        }
+        Ok(best.map_or(window, |found| found.point.windows[0]))
     };
     windows.into_par_iter().map(settle).collect()
 }

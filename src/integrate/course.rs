@@ -87,7 +87,7 @@ impl<N: Number> Course<N> {
             jumps,
             harmonic,
             period: (!changes).then(|| pendulum.period()),
-            look: pendulum.period(),
+            look: pendulum.time_scale(),
             longest: LONGEST_STEP.0 * tolerance.powf(LONGEST_STEP.1) / rate,
             tolerance,
         }

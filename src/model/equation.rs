@@ -144,7 +144,7 @@ impl<R: Real> Equation<R> {
                 Action::Position | Action::Velocity | Action::Kinked => {
                     torques.push((effect.kind, parameters));
                 }
-                Action::Driven => {
+                Action::Driven | Action::Timed => {
                     torques.push((effect.kind, parameters));
                     plain = false;
                 }

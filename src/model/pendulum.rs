@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::angle::Angle;
 use super::drive::{HarmonicDrive, Motion};
 use super::effects::law::NOT_PERIODIC;
-use super::effects::{Action, Effect, Kind, Mappable};
+use super::effects::{Action, Effect, Kind, Mappable, Role};
 use super::equation::Equation;
 use crate::error::Error;
 
@@ -294,7 +294,8 @@ impl Pendulum {
     /// friction.
     #[must_use]
     pub fn has_extra_load(&self) -> bool {
-        let position = |e: &Effect| e.is(&[Action::Position, Action::Driven, Action::Friction]);
+        let position =
+            |e: &Effect| e.is(&[Action::Position, Action::Driven, Action::Timed, Action::Friction]);
         self.motion().lateral != 0.0 || self.effects.iter().any(position)
     }
 
@@ -327,9 +328,28 @@ impl Pendulum {
         Ok(())
     }
 
+    /// The shortest time scale on which what loads the pendulum at rest changes.
+    #[must_use]
+    pub fn time_scale(&self) -> f64 {
+        let mut shortest = self.period();
+        for effect in &self.effects {
+            for (value, parameter) in
+                effect.values().iter().zip(effect.kind.definition().parameters)
+            {
+                shortest = match parameter.role {
+                    Role::Frequency => shortest.min(TAU / value.abs()),
+                    Role::Instant => shortest.min(TAU),
+                    _ => shortest,
+                };
+            }
+        }
+        shortest
+    }
+
     /// Whether an effect changes with the time in the laboratory.
     #[must_use]
     pub fn drifts(&self) -> bool {
-        self.effects.iter().any(|e| e.kind.definition().mappable == Mappable::Frozen)
+        let frozen = |e: &Effect| e.kind.definition().mappable == Mappable::Frozen;
+        self.effects.iter().any(|e| frozen(e) || e.is(&[Action::Timed]))
     }
 }

@@ -76,7 +76,11 @@ def test_coloured_noise_dropouts_outliers_and_jitter() -> None:
 def test_each_effect_changes_the_record_by_what_the_truth_states(name: str) -> None:
     # Runs of a second are not set back on the true motion: the gap is the plain difference.
     given = {"free": 4, "forced": 3, "duration": 1.0, "counts": 0, "seed": 11}
-    seen_so_soon = {"added_mass:late": ",t0=20", "impulses": ",every=0.2"}
+    seen_so_soon = {
+        "added_mass:late": ",t0=20",
+        "impulses": ",t0=0.3",
+        "impulses:train": ",every=0.2",
+    }
     changed = short(effects=(name + seen_so_soon.get(name, ""),), **given)
     clean = short(**given)
     rms = [

@@ -14,7 +14,7 @@ from pendmap.virtual_rig.drive import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
 from pendmap.virtual_rig.readings import SensorLag
-from pendmap.virtual_rig.stands import Impulses, PivotCompliance
+from pendmap.virtual_rig.stands import Impulses, ImpulseTrain, PivotCompliance
 from pendmap.virtual_rig.torques import InertiaRipple, Magnet
 
 if TYPE_CHECKING:
@@ -230,13 +230,13 @@ def test_dahl_friction_yields_before_it_slips() -> None:
 
 
 def test_impulses_are_jumps_of_the_velocity() -> None:
-    effect = Impulses(J=0.05, every=2.0, pattern=7)
-    path = run(Parameters(6.2, 0.1, 0.1), (0, 1, 0), 1.0, 0, 10, [effect])
-    kicks = effect.kicks(0, 10)
-    assert len(kicks) >= 3
-    for time, jump in kicks:
-        before, after = path.velocity(np.array([time - 1e-9, time + 1e-9]))
-        assert after - before == pytest.approx(jump, abs=1e-6)
+    train = ImpulseTrain(J=0.05, every=2.0, pattern=7)
+    assert len(train.kicks(0, 10)) >= 3
+    for effect in (train, Impulses(J=0.05, t0=4.3)):
+        path = run(Parameters(6.2, 0.1, 0.1), (0, 1, 0), 1.0, 0, 10, [effect])
+        for time, jump in effect.kicks(0, 10):
+            before, after = path.velocity(np.array([time - 1e-9, time + 1e-9]))
+            assert after - before == pytest.approx(jump, abs=1e-6)
 
 
 def test_a_lag_against_its_differential_equation() -> None:

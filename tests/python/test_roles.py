@@ -17,11 +17,14 @@ from pendmap.model import Effect, effects
 from pendmap.model.units import Units
 
 ROLES = {"size", "width", "place", "power", "order", "time constant", "phase"}
+ROLES |= {"frequency", "instant"}
 SHAPES = {
+    "base_sway": {"ws": "frequency"},
     "bearing_harmonic": {"n": "order"},
     "coulomb_warm_up": {"tau": "time constant"},
     "dahl_friction": {"zc": "width"},
     "eddy_brake": {"vc": "width"},
+    "impulses": {"t0": "instant"},
     "inertia_ripple": {"n": "order"},
     "magnet": {"width": "width"},
     "power_law_drag": {"n": "power"},

@@ -79,7 +79,7 @@ fn definitions_are_whole() {
             | Action::LoadedFriction => Group::Damping,
             // A constant torque, forth and back alike, is what it comes to.
             Action::Position if *kind == Kind::AsymmetricCoulomb => Group::Damping,
-            Action::Position | Action::Driven | Action::Inertia => Group::Torque,
+            Action::Position | Action::Driven | Action::Timed | Action::Inertia => Group::Torque,
             Action::Drive | Action::FurtherDrive => Group::Drive,
             Action::Reading | Action::Play => Group::Reading,
         };
@@ -151,6 +151,13 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
         ("lateral_drive", [e, psi]) => {
             side = e * p * (omega * t + phase + psi).cos();
         }
+        ("base_sway", [amplitude, ws, psi]) => {
+            own = -w0 * w0 * amplitude * (ws * lab + psi).cos() * theta.cos();
+        }
+        ("impulses", [jump, t0]) => {
+            let w = 0.05 / w0;
+            own = jump * (-0.5 * ((lab - t0) / w).powi(2)).exp() / (w * (2.0 * PI).sqrt());
+        }
         ("asymmetric_coulomb", [d]) => own = -d * sign.abs(),
         ("rough_spot", [f, th0, w]) => {
             own = -f * (-(1.0 - (theta - th0).cos()) / (w * w)).exp() * sign;
@@ -178,7 +185,10 @@ fn formulas_and_powers_of_w0_are_right() {
     let mut draws = Draws(2);
     for kind in Kind::ALL {
         for _ in 0..200 {
-            let effect = draws.effect(*kind);
+            let mut effect = draws.effect(*kind);
+            if *kind == Kind::Impulses {
+                effect.parameters[1] = 250.0 + draws.between([-0.1, 0.1]);
+            }
             let pendulum = alone(effect);
             let w0 = draws.between([0.5, 8.0]);
             let [theta, velocity] = [draws.between([-9.0, 9.0]), draws.between([-3.0, 3.0])];
@@ -335,7 +345,10 @@ fn what_keeps_the_mirror_image_says_so() {
     all.extend([psi(0.0), psi(PI), psi(-PI), psi(0.4)]);
     all.push(Effect::new(Kind::LateralDrive, &[0.0, 0.3]).expect("in range"));
     all.push(Effect::new(Kind::AsymmetricViscous, &[0.0]).expect("in range"));
-    for effect in all {
+    for mut effect in all {
+        if effect.kind == Kind::Impulses {
+            effect.parameters[1] = 250.0;
+        }
         let pendulum = alone(effect);
         let mut worst = 0_f64;
         for state in spread(100, 9.0, 3.0) {

@@ -37,7 +37,8 @@ class Rival:
     gain : float
         Fall of the sum of squares with it, in independent readings.
     behind : float
-        Gain of the accepted effect less its own: twice the difference of log-likelihoods.
+        Gain of the accepted effect less its own, each less what chance gains by a choice among
+        many values: twice the difference of log-likelihoods.
     separation : float
         ``s = 1 - gain / gain of the accepted effect``.
     likeness : float
@@ -48,7 +49,8 @@ class Rival:
         Whether it has the accepted effect as a special case and gains no more than chance by it.
     alike : bool
         Whether the records do not tell it from the accepted effect: it is behind by less than the
-        threshold, or by the readings of one run alone, of a single run by those of a third.
+        threshold, or by the readings of one run alone, of a single run by those of a third, unless
+        the accepted effect happens once.
     """
 
     candidate: Candidate
@@ -128,10 +130,10 @@ def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
             reached = (rest.chi2 - fit.chi2) / level
         likeness = scores.likeness(own, k)
         more = score.candidate.count > candidate.count
-        behind = gain - reached
+        behind = gain - reached + score.candidate.looks - candidate.looks
         contains = more and likeness > CONTAINS and behind > -state.thresholds.alike
         alike = behind < state.thresholds.alike
-        if fit is not None and not alike:
+        if fit is not None and not alike and not candidate.once:
             alike = _of_one_part(best, fit)
         rivals.append(
             Rival(

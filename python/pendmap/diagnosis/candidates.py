@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -46,6 +47,10 @@ SCANNED: Final = 6
 """Values of a shape parameter at which a candidate is scored, from the least typical one to the
 greatest in equal ratios: neighbouring shapes are then alike to a few percent. Where 0 is typical
 too there are no ratios: the middles of as many equal parts."""
+
+SOUGHT: Final = 1000
+"""The same of a frequency or an instant, each of which chance may hit; residuals say which of them
+are scored."""
 
 PLACES: Final = 9
 """The same of a place on the circle, in equal steps."""
@@ -111,6 +116,22 @@ class Candidate:
         """The parameters of its shape that are places, on either side of the rest."""
         entries = self.definition["parameters"]
         return [e["name"] for e in entries if e["name"] in self.shape and e["role"] == "place"]
+
+    @property
+    def sought(self) -> dict[str, Any] | None:
+        """The parameter that residuals show before any fit: a frequency or an instant."""
+        entries = self.definition["parameters"]
+        return next((e for e in entries if e["role"] in {"frequency", "instant"}), None)
+
+    @property
+    def looks(self) -> float:
+        """Twice the logarithm of the values among which residuals choose one: what chance gains."""
+        return 2 * math.log(SOUGHT) if self.sought else 0.0
+
+    @property
+    def once(self) -> bool:
+        """Whether it happens once, in one part of the records."""
+        return self.sought is not None and self.sought["role"] == "instant"
 
     @property
     def count(self) -> int:
@@ -244,6 +265,8 @@ def _scan(entry: Mapping[str, Any]) -> NDArray[np.float64]:
         return np.arange(round(low), round(high) + 1.0)
     if entry["role"] == "place":
         return np.linspace(low, high, PLACES)
+    if entry["role"] in {"frequency", "instant"}:
+        return np.linspace(low, high, SOUGHT)
     if low > 0:
         return np.geomspace(low, high, SCANNED)
     width = (high - low) / SCANNED

@@ -263,7 +263,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         best,
         nearest,
         judgement,
-        named_effects(state.evidence, best, judgement, runs, reasons) if claimed else (),
+        named_effects(state, best, judgement, runs, reasons) if claimed else (),
         gap_of(evidence, begin, best),
         before,
         after if claimed else before,

@@ -19,10 +19,11 @@ from pendmap.records.summary import doubted
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.diagnose import Discrepancy
+    from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.runs import RunByRun
-    from pendmap.diagnosis.state import Found
+    from pendmap.diagnosis.scores import Score
+    from pendmap.diagnosis.state import Found, State
     from pendmap.diagnosis.verdict import Judgement
     from pendmap.model import Formula, Rig
 
@@ -49,7 +50,8 @@ class NamedEffect:
     formula : Formula, optional
         Where it is the user's own.
     elsewhere : mapping of str to float
-        Another place, on the other side of the rest, where it would do as well.
+        Another place on the other side of the rest, or another frequency or instant, where it would
+        do as well.
     """
 
     name: str
@@ -79,13 +81,13 @@ class NamedEffect:
 
 
 def named_effects(
-    evidence: Evidence, best: Found, judgement: Judgement, runs: RunByRun, reasons: Reasons
+    state: State, best: Found, judgement: Judgement, runs: RunByRun, reasons: Reasons
 ) -> tuple[NamedEffect, ...]:
     """Return the effects of the best model."""
-    widening = best.trial.widening
+    evidence, widening = state.evidence, best.trial.widening
     none: dict[str, dict[str, tuple[float, float]]] = {}
     profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)
-    others = elsewhere(evidence, best.trial)
+    others = elsewhere(evidence, best.trial, _sought(state, best.trial))
     named = []
     for standing, sure in zip(judgement.standings, judgement.probabilities, strict=True):
         candidate = standing.candidate
@@ -113,6 +115,17 @@ def named_effects(
             )
         )
     return tuple(named)
+
+
+def _sought(state: State, best: Trial) -> dict[str, list[Score]]:
+    """Return, by effect, the frequencies or instants that residuals ask for without it."""
+    found = {}
+    for candidate in best.chosen:
+        rest = state.rest(best, candidate) if candidate.sought else None
+        if rest is not None:
+            scores = state.scores(rest).scores
+            found[candidate.name] = [s for s in scores if s.candidate.name == candidate.name]
+    return found
 
 
 def values_of(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:

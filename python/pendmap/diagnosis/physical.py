@@ -69,21 +69,32 @@ def _possible(evidence: Evidence, trial: Trial, candidate: Candidate) -> bool:
     error = ERRORS * wide * (size.stderr or 0.0)
     if not signed_sizes(candidate) and size.value < -error:
         return False
-    swing = math.tau / trial.fit.model.w0
     for name in candidate.shape:
         estimate = estimates.get(f"{candidate.name}.{name}")
         if estimate is None:
             continue
-        entry = _entry(candidate, name)
-        if entry["role"] == "time constant":
-            if not swing <= estimate.value <= _span(evidence):
-                return False
-        elif entry["role"] == "width":
-            bare = trial.shape_of(candidate)[name]
-            low, high = entry["typical"]
-            if not low / STRETCH <= bare <= high * STRETCH:
-                return False
+        low, high = _limits(evidence, trial, candidate, name)
+        if not low <= estimate.value <= high:
+            return False
     return _drains(evidence, trial, candidate, error)
+
+
+def _limits(
+    evidence: Evidence, trial: Trial, candidate: Candidate, name: str
+) -> tuple[float, float]:
+    """Return the least and the greatest possible value of a shape, SI."""
+    entry, model = _entry(candidate, name), trial.fit.model
+    if entry["role"] == "time constant":
+        return math.tau / model.w0, _span(evidence)
+    if entry["role"] == "instant":
+        return _end(evidence) - _span(evidence), _end(evidence)
+    if entry["role"] == "width":
+        low, high = entry["typical"]
+        unit = (
+            trial.fit.estimates[f"{candidate.name}.{name}"].value / trial.shape_of(candidate)[name]
+        )
+        return low / STRETCH * unit, high * STRETCH * unit
+    return -math.inf, math.inf
 
 
 def _drains(evidence: Evidence, trial: Trial, candidate: Candidate, error: float) -> bool:

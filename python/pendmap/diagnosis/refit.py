@@ -22,12 +22,12 @@ from pendmap.diagnosis.valley import exponents
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial
-    from pendmap.diagnosis.scores import Scores
+    from pendmap.diagnosis.scores import Score, Scores
     from pendmap.diagnosis.thresholds import Thresholds
     from pendmap.model import Rig
 
@@ -218,38 +218,59 @@ def better_side(evidence: Evidence, trial: Trial) -> Trial:
     the wrong side does not change over.
     """
     for candidate in trial.chosen:
-        for place in candidate.places:
-            other = _beyond(evidence, trial, candidate, place, BACK_STEPS)
+        for start in _mirrored(trial, candidate):
+            other = _from(evidence, trial, candidate, start, BACK_STEPS)
             if other is not None and other.chi2 < trial.chi2:
                 trial = other
     return trial
 
 
-def elsewhere(evidence: Evidence, trial: Trial) -> dict[str, dict[str, float]]:
-    """Return places on the other side of the rest where effects would do as well."""
+def elsewhere(
+    evidence: Evidence, trial: Trial, sought: Mapping[str, Sequence[Score]]
+) -> dict[str, dict[str, float]]:
+    """Return shapes where effects would do as well.
+
+    Of a place that on the other side of the rest, of a frequency or an instant the best of those
+    that residuals ask for, as ``sought`` has them by effect.
+    """
     found: dict[str, dict[str, float]] = {}
     for candidate in trial.chosen:
-        for place in candidate.places:
-            other = _beyond(evidence, trial, candidate, place, ALIKE_STEPS)
-            if other is None:
+        starts = _mirrored(trial, candidate)
+        for score in sought.get(candidate.name, ()):
+            effect = score.candidate.effect(trial.fit.model.units)
+            shape = {f"{candidate.name}.{n}": effect.parameters[n] for n in score.candidate.shape}
+            starts.append(shape | score.start)
+        fits = [_from(evidence, trial, candidate, start, ALIKE_STEPS) for start in starts]
+        for other in sorted((f for f in fits if f is not None), key=lambda f: -f.chi2):
+            if other.chi2 - trial.chi2 >= Z95**2 * trial.widening:
                 continue
-            key = f"{candidate.name}.{place}"
-            here, there = (t.fit.estimates[key].value for t in (trial, other))
-            apart = abs(math.remainder(there - here, math.tau))
-            as_good = other.chi2 - trial.chi2 < Z95**2 * trial.widening
-            if as_good and apart > abs(here):
-                found.setdefault(candidate.name, {})[place] = there
+            for key in starts[0]:
+                here, there = trial.fit.estimates[key], other.fit.estimates[key]
+                apart, own = abs(there.value - here.value), key.rpartition(".")[2]
+                if own in candidate.places:
+                    apart = abs(math.remainder(apart, math.tau)) - abs(here.value)
+                elif own in candidate.shape:
+                    apart -= Z95 * math.hypot(here.stderr or 0.0, there.stderr or 0.0)
+                else:
+                    continue
+                if apart > 0:
+                    found.setdefault(candidate.name, {})[own] = there.value
     return found
 
 
-def _beyond(
-    evidence: Evidence, trial: Trial, candidate: Candidate, place: str, steps: int
+def _mirrored(trial: Trial, candidate: Candidate) -> list[dict[str, float]]:
+    """Return an effect's places on the other side of the rest, one at a time."""
+    keys = [f"{candidate.name}.{place}" for place in candidate.places]
+    return [{key: -trial.fit.estimates[key].value} for key in keys]
+
+
+def _from(
+    evidence: Evidence, trial: Trial, candidate: Candidate, start: Mapping[str, float], steps: int
 ) -> Trial | None:
-    """Return the fit from the other side of the rest; none where the motion is lost."""
-    key = f"{candidate.name}.{place}"
-    there = -trial.fit.estimates[key].value
+    """Return the fit from another start of an effect; none where the motion is lost."""
+    own = {key.rpartition(".")[2]: value for key, value in start.items()}
     effects = tuple(
-        dataclasses.replace(e, parameters={**e.parameters, place: there})
+        dataclasses.replace(e, parameters={**e.parameters, **own})
         if e.name == candidate.name
         else e
         for e in trial.fit.model.effects
@@ -260,7 +281,7 @@ def _beyond(
             dataclasses.replace(trial.fit.model, effects=effects),
             trial.free,
             trial.chosen,
-            start=trial.start | {key: there},
+            start=trial.start | dict(start),
             windows=trial.fit.windows,
             steps=steps,
         )

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.diagnosis.candidates import placed
+from pendmap.diagnosis.times import located
 from pendmap.identification.sensitivity import (
     STATE,
     WindowSlopes,
@@ -156,18 +157,24 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
         By effect, each in its shapes; as many are derived together as one pass of the integrator
         carries, one shape of an effect each.
     """
-    fit = trial.fit
-    carried = len({name.partition("[")[0] for name in fit.names}) + STATE
+    room = max(PASS - len({name.partition("[")[0] for name in trial.fit.names}) - STATE, 1)
+    sought = [shapes for shapes in pool if shapes[0].sought]
+    queue = _passes([shapes for shapes in pool if not shapes[0].sought], room)
+    queue = queue or [[]]
     every: list[Candidate] = []
     names: list[str] = []
     passes: list[list[WindowSlopes]] = []
-    for present in _passes(pool, max(PASS - carried, 1)):
+    for present in queue:
         free = [name for candidate in present for name in candidate.free]
-        found, slopes = window_slopes(fit, evidence.fitted, free, placed(fit.model, present))
+        found, slopes = window_slopes(
+            trial.fit, evidence.fitted, free, placed(trial.fit.model, present)
+        )
         wanted = [found.index(name) for name in free]
         if not passes:
-            names = [name for name in found if name in fit.estimates]
+            names = [name for name in found if name in trial.fit.estimates]
             wanted = [found.index(name) for name in names] + wanted
+            # Frequencies and instants are those that the residuals ask for.
+            queue += _passes(located(evidence, sought, slopes, trial.fit.model), room)
         bare = passes[0] if passes else slopes
         passes.append(
             [

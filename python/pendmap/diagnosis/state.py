@@ -244,10 +244,14 @@ class State:
         return set(trial.names) - {ZERO}
 
     def cost(self, trial: Trial, level: float | None = None) -> float:
-        """Return the sum of squares in independent readings with Schwarz's penalty."""
+        """Return the sum of squares in independent readings with Schwarz's penalty.
+
+        What was chosen among many values costs twice the logarithm of their number besides.
+        """
         level = level or self.level
         readings = max(trial.fit.samples / level, self._best.chi2 / level, 3.0)
-        return trial.chi2 / level + trial.adapted * math.log(min(readings, trial.fit.samples))
+        penalty = trial.adapted * math.log(min(readings, trial.fit.samples))
+        return trial.chi2 / level + penalty + sum(c.looks for c in trial.chosen)
 
     def chance(self, rest: Trial, full: Trial) -> float:
         """Return the probability that noise alone gains as much as the further effects of a model.

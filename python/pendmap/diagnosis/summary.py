@@ -275,7 +275,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         )
         for name, value in effect.elsewhere.items():
             said = f"{name} = {value:.4g} {units[name]}".rstrip()
-            yield f"    or {said}, which does as well: the sides are not told apart"
+            yield f"    or {said}, which does as well: the records do not tell which"
     for names in found.equivalent:
         yield f"  not told apart here: {', '.join(names)}"
     if found.without:

@@ -89,7 +89,7 @@ def _elsewhere(effect: NamedEffect) -> Iterator[str]:
     """Yield at which other place an effect would do as well."""
     for name, value in effect.elsewhere.items():
         at = f"{name} = {number(value, 4)}"
-        yield f". With {at} it does as well: the sides are not told apart here"
+        yield f". With {at} it does as well: the records do not tell which"
 
 
 def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:

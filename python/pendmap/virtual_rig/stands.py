@@ -102,9 +102,25 @@ class BaseSway(Effect):
 
 @dataclass(frozen=True)
 class Impulses(Effect):
-    """Knocks against the rig: jumps of the velocity about every ``every`` seconds of lab time."""
+    """A knock against the rig: a jump of the velocity at a lab time."""
 
     name = "impulses"
+    group = "stand"
+    formula = "v jumps by J at lab time t0"
+
+    J: float = size(0.01, 0.04, "rad/s")
+    t0: float = shape(3.0, 12.0, "s", least=0.0)
+
+    def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
+        return [(self.t0, self.J)] if begin < self.t0 < end else []
+
+
+@dataclass(frozen=True)
+class ImpulseTrain(Effect):
+    """Knocks about every ``every`` seconds of lab time, in either sense."""
+
+    name = "impulses"
+    variant = "train"
     group = "stand"
     formula = "v jumps by +J or -J at lab times t_k"
 
@@ -219,6 +235,7 @@ STANDS: tuple[type[Effect], ...] = (
     TwoModePivot,
     BaseSway,
     Impulses,
+    ImpulseTrain,
     DriveAmplitude,
     DrivePhase,
     DriveFrequency,

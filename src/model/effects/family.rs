@@ -68,7 +68,9 @@ impl Kind {
             | Self::DriveFrequency
             | Self::DriveChirp
             | Self::DriveSecondHarmonic
-            | Self::LateralDrive => Family::Drive,
+            | Self::LateralDrive
+            | Self::BaseSway
+            | Self::Impulses => Family::Drive,
             Self::EncoderOffset
             | Self::EncoderDrift
             | Self::EncoderBacklash

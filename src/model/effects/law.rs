@@ -45,6 +45,8 @@ pub enum Action {
     Position,
     /// A torque of the angle and of how the pivot moves.
     Driven,
+    /// A torque of the angle that changes with the time in the laboratory, beside the drive.
+    Timed,
     /// An inertia of the angle, with the torque that comes of it.
     Inertia,
     /// A smooth torque of the velocity.
@@ -120,12 +122,25 @@ pub enum Role {
     Time,
     /// An angle that may be anything within a turn.
     Phase,
+    /// How often it repeats: records tell frequencies apart that differ by less than one in their span.
+    Frequency,
+    /// When it happens.
+    Instant,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Size, Self::Width, Self::Place, Self::Power, Self::Order, Self::Time, Self::Phase];
+    pub const ALL: [Self; 9] = [
+        Self::Size,
+        Self::Width,
+        Self::Place,
+        Self::Power,
+        Self::Order,
+        Self::Time,
+        Self::Phase,
+        Self::Frequency,
+        Self::Instant,
+    ];
 
     /// The words for it.
     #[must_use]
@@ -138,6 +153,8 @@ impl Role {
             Self::Order => "order",
             Self::Time => "time constant",
             Self::Phase => "phase",
+            Self::Frequency => "frequency",
+            Self::Instant => "instant",
         }
     }
 }

@@ -199,6 +199,8 @@ library! {
     drive_chirp::DriveChirp,
     drive_second_harmonic::DriveSecondHarmonic,
     lateral_drive::LateralDrive,
+    base_sway::BaseSway,
+    impulses::Impulses,
     encoder_offset::EncoderOffset,
     encoder_drift::EncoderDrift,
     encoder_backlash::EncoderBacklash,

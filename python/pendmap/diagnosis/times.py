@@ -1,0 +1,227 @@
+"""Frequencies and instants at which residuals ask for a torque.
+
+A torque ``f`` at time ``s`` moves the angle at ``t`` by ``(a(s) b(t) - b(s) a(t))/W(s)`` times
+``f ds``, where ``a`` and ``b`` are the derivatives of the angle by the initial angle and velocity,
+and ``W`` is their Wronskian, ``exp(-c t/m)`` with viscous damping alone. So the products of the
+residuals with what a torque at each time would do, for all times, cost two cumulative sums; a
+torque that repeats has those of their Fourier transform. They are divided by what noise makes of
+them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.data import Evidence
+    from pendmap.identification.sensitivity import WindowSlopes
+    from pendmap.model import Rig
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["located"]
+
+KEPT: Final = 6
+"""Frequencies, or instants, that are kept: as many as other shapes are scored."""
+
+FINE: Final = 4
+"""Frequencies looked at in one over the time that the records span."""
+
+GROWTH: Final = 30.0
+"""Growth of a change of the start, over the least of all windows, up to which a window is calm."""
+
+LOOKED_AT: Final = 4
+"""So many times as many are looked at once more."""
+
+DRAWS: Final = 32
+"""Draws of noise that say what it makes of the products at each frequency."""
+
+
+def located(
+    evidence: Evidence,
+    pool: Sequence[Sequence[Candidate]],
+    windows: Sequence[WindowSlopes],
+    model: Rig,
+) -> list[list[Candidate]]:
+    """Return candidates with a frequency or an instant in the shapes that residuals ask for most.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The records.
+    pool : sequence of sequence of Candidate
+        By effect, each in its shapes.
+    windows : sequence of WindowSlopes
+        Residuals of a model and their derivatives by the initial states.
+    model : Rig
+        The model.
+    """
+    found = []
+    responses = _calm(list(_responses(evidence, windows, model.c_over_m))) if pool else []
+    for one, *_ in pool:
+        scanned = one.sought or {}
+        unit = model.w0 ** scanned["power_of_w0"]
+        look = _frequencies if scanned["role"] == "frequency" else _instants
+        values = look(responses, scanned["typical"][1] * unit)
+        own = [{**one.shape, scanned["name"]: value / unit} for value in values]
+        found.append([dataclasses.replace(one, shape=shape) for shape in own])
+    return found
+
+
+def _calm(responses: list[_Response]) -> list[_Response]:
+    """Return the windows in which a change of the start does not grow far more than in others.
+
+    What a torque does where motions part is great, and to first order wrong.
+    """
+    growth = np.array([np.abs(own.states / own.weight[:, None]).max() for own in responses])
+    return [own for own, by in zip(responses, growth, strict=True) if by <= GROWTH * growth.min()]
+
+
+def _instants(responses: Sequence[_Response], _: float) -> list[float]:
+    """Return the times in the laboratory, s, of the knocks that would gain most."""
+    time, gain = [], []
+    for own in responses:
+        pull, information = own.pull(own.residual), own.information()
+        score = np.divide(pull**2, information, out=np.zeros_like(pull), where=information > 0)
+        peaks = (score[1:-1] > score[:-2]) & (score[1:-1] >= score[2:])
+        time.append(own.time[1:-1][peaks])
+        gain.append(score[1:-1][peaks])
+    return _greatest(np.concatenate(time), np.concatenate(gain), 0.0)
+
+
+def _frequencies(responses: Sequence[_Response], most: float) -> list[float]:
+    """Return the frequencies up to ``most``, rad/s, of the sways that would gain most.
+
+    Each window has its products ``P`` with ``exp(i w t)`` in its own time, and what noise makes of
+    them, ``E |P|^2`` and ``E P^2``; all three turn with the window's place in the laboratory's time
+    and add up.
+    """
+    first = min(own.time[0] for own in responses)
+    span = max(own.time[-1] for own in responses) - first
+    longest = max(float(np.ptp(own.time)) for own in responses)
+    spacing = 0.5 * np.pi / most
+    size = 1 << math.ceil(math.log2(FINE * (longest / spacing + 2)))
+    coarse = 2 * np.pi * np.fft.rfftfreq(size, spacing)
+    # A frequency of less than one in the records is a constant torque or a drift.
+    omega = 2 * np.pi * np.arange(FINE, int(FINE * most * span / (2 * np.pi))) / (FINE * span)
+    rng = np.random.default_rng(0)
+    pull, square, both = (np.zeros(omega.size, complex) for _ in range(3))
+    for own in responses:
+        place = ((own.time - own.time[0]) / spacing).astype(np.int64)
+        step = np.gradient(own.time) * own.cosine
+        values = np.stack([own.residual, *(own.noise(rng) for _ in range(DRAWS))])
+        binned = [np.bincount(place, own.pull(v) * step, place[-1] + 1) for v in values]
+        products = np.conj(np.fft.rfft(binned, size))
+        turn = np.exp(1j * omega * (own.time[0] - first))
+        pull += turn * np.interp(omega, coarse, products[0])
+        square += turn**2 * np.interp(omega, coarse, np.mean(products[1:] ** 2, axis=0))
+        both += np.interp(omega, coarse, np.mean(np.abs(products[1:]) ** 2, axis=0))
+    score = both.real * np.abs(pull) ** 2 - (square.conj() * pull**2).real
+    score /= np.maximum(both.real**2 - np.abs(square) ** 2, 1e-300)
+    peaks = np.flatnonzero((score[1:-1] > score[:-2]) & (score[1:-1] >= score[2:])) + 1
+    peaks = peaks[np.argsort(-score[peaks])][: LOOKED_AT * KEPT]
+    gains = [_gain(responses, float(value)) for value in omega[peaks]]
+    return _greatest(omega[peaks], np.array(gains), np.pi / longest)
+
+
+def _gain(responses: Sequence[_Response], omega: float) -> float:
+    """Return the gain of a sway of one frequency, draws of noise aside."""
+    pull, information = np.zeros(2), np.zeros((2, 2))
+    for own in responses:
+        columns = own.answer(np.exp(1j * omega * own.time) * own.cosine * np.gradient(own.time))
+        pull += columns.T @ own.residual
+        information += columns.T @ columns
+    return float(pull @ np.linalg.pinv(information, hermitian=True) @ pull)
+
+
+def _greatest(values: Floats, gains: Floats, apart: float) -> list[float]:
+    """Return the values with the greatest gains, none nearer to another than ``apart``."""
+    kept: list[float] = []
+    for k in np.argsort(-gains):
+        if len(kept) < KEPT and all(abs(values[k] - other) > apart for other in kept):
+            kept.append(float(values[k]))
+    return kept
+
+
+@dataclasses.dataclass(frozen=True)
+class _Response:
+    """What torques do in a window, by what stands at the head of the file.
+
+    ``time`` is that of the laboratory, ``basis`` spans what the initial state does.
+    """
+
+    time: Floats
+    cosine: Floats
+    residual: Floats
+    states: Floats
+    weight: Floats
+    wronskian: Floats
+    basis: Floats
+
+    @property
+    def _here(self) -> Floats:
+        """``-b/W`` and ``a/W``: by which later ``a`` and ``b`` are multiplied."""
+        a, b = (self.states / self.weight[:, None]).T
+        return np.stack([-b, a], axis=1) / self.wronskian[:, None]
+
+    def pull(self, residual: Floats) -> Floats:
+        """Return the product of residuals with what a torque at each time would do."""
+        later = _later(self.states * residual[:, None])
+        return np.asarray(np.einsum("nk,nk->n", self._here, later), np.float64)
+
+    def answer(self, impulse: NDArray[np.complex128]) -> Floats:
+        """Return what the real and the imaginary part of impulses do, the start freed."""
+        parts = np.stack([impulse.real, impulse.imag], axis=1)
+        sums = np.cumsum(self._here[:, :, None] * parts[:, None, :], axis=0)
+        columns = np.einsum("nk,nkp->np", self.states, sums)
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns), np.float64)
+
+    def information(self) -> Floats:
+        """Return the sum of squares of what a torque at each time would do, the start freed."""
+        gram = _later(np.einsum("nj,nk->njk", self.states, self.states))
+        whole = np.linalg.pinv(self.states.T @ self.states, hermitian=True)
+        free = gram - gram @ whole @ gram
+        left = np.einsum("nj,njk,nk->n", self._here, free, self._here)
+        return np.asarray(left, np.float64)
+
+    def noise(self, rng: np.random.Generator) -> Floats:
+        """Return residuals of noise alone."""
+        drawn = rng.standard_normal(self.residual.size)
+        return np.asarray(drawn - self.basis @ (self.basis.T @ drawn), np.float64)
+
+
+def _later(values: Floats) -> Floats:
+    """Return the sums over all later samples."""
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1] - values, np.float64)
+
+
+def _responses(
+    evidence: Evidence, windows: Sequence[WindowSlopes], damping: float
+) -> Iterator[_Response]:
+    for window in windows:
+        run = evidence.fitted[window.run]
+        kept = np.flatnonzero(window.weight > 0)
+        if kept.size < KEPT:
+            continue
+        time = run.time[window.first + kept]
+        states, weight = window.states[kept], window.weight[kept]
+        basis, _ = np.linalg.qr(states)
+        residual = window.residual[kept]
+        yield _Response(
+            run.lab_time_s + time,
+            np.cos(run.theta[window.first + kept]),
+            residual - basis @ (basis.T @ residual),
+            states,
+            weight,
+            np.exp(damping * (time[0] - time)),
+            basis,
+        )
