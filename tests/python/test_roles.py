@@ -16,7 +16,7 @@ from pendmap.diagnosis.candidates import Candidate, candidates
 from pendmap.model import Effect, effects
 from pendmap.model.units import Units
 
-ROLES = {"size", "width", "place", "power", "order", "time constant", "phase"}
+ROLES = {"size", "width", "place", "power", "order", "time constant", "phase", "mode"}
 SHAPES = {
     "bearing_harmonic": {"n": "order"},
     "coulomb_warm_up": {"tau": "time constant"},
@@ -24,6 +24,7 @@ SHAPES = {
     "eddy_brake": {"vc": "width"},
     "inertia_ripple": {"n": "order"},
     "magnet": {"width": "width"},
+    "pivot_compliance": {"wx": "mode", "z": "width"},
     "power_law_drag": {"n": "power"},
     "rough_spot": {"th0": "place", "w": "width"},
     "stribeck_friction": {"vs": "width"},

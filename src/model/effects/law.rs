@@ -108,7 +108,8 @@ pub enum Power {
 pub enum Role {
     /// How strong the effect is: at 0 there is none.
     Size,
-    /// How far it reaches, in angle or velocity.
+    /// How far it reaches, in angle or velocity; of a mode the half width of its resonance over its
+    /// frequency.
     Width,
     /// The angle at which it acts, on either side of the rest.
     Place,
@@ -120,12 +121,22 @@ pub enum Role {
     Time,
     /// An angle that may be anything within a turn.
     Phase,
+    /// The frequency of a mode of the rig.
+    Mode,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Size, Self::Width, Self::Place, Self::Power, Self::Order, Self::Time, Self::Phase];
+    pub const ALL: [Self; 8] = [
+        Self::Size,
+        Self::Width,
+        Self::Place,
+        Self::Power,
+        Self::Order,
+        Self::Time,
+        Self::Phase,
+        Self::Mode,
+    ];
 
     /// The words for it.
     #[must_use]
@@ -138,6 +149,7 @@ impl Role {
             Self::Order => "order",
             Self::Time => "time constant",
             Self::Phase => "phase",
+            Self::Mode => "mode",
         }
     }
 }
@@ -203,9 +215,29 @@ pub struct Point<R> {
     pub phase: R,
     /// The angle at which the motion last turned or began, and the effect's [`Law::kept`] there.
     pub past: [R; 2],
+    /// Displacement and momentum of the effect's [`Law::sway`].
+    pub sway: [R; 2],
 }
 
 impl<R: Real> Point<R> {
+    /// All of it 0: for what a formula has, whatever its value.
+    #[must_use]
+    pub fn nowhere(zero: R) -> Self {
+        Self {
+            theta: zero,
+            velocity: zero,
+            sense: zero,
+            side: zero,
+            sine: zero,
+            vertical: zero,
+            per_gravity: zero,
+            lab: zero,
+            phase: zero,
+            past: [zero; 2],
+            sway: [zero; 2],
+        }
+    }
+
     /// `cos theta`.
     #[inline(always)]
     #[must_use]
@@ -293,6 +325,18 @@ pub trait Law {
     #[inline(always)]
     #[must_use]
     fn kept<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
+        None
+    }
+
+    /// The rates of displacement and momentum of a mode of the rig that moves with the pendulum; none
+    /// where there is no such mode. The formulas take both from [`Point::sway`]. One effect of a model
+    /// may have a mode, and no map can have it.
+    ///
+    /// The rates are linear in displacement and momentum, that of the displacement is the momentum and
+    /// terms without either, and none has `th''`: so nothing of the mode jumps where friction does.
+    #[inline(always)]
+    #[must_use]
+    fn sway<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<[R; 2]> {
         None
     }
 
