@@ -150,7 +150,8 @@ impl Follow<'_> {
             course = course.driven_by(Arc::clone(recorded));
         }
         let times = &record.times[self.window.from..self.window.to];
-        let rate = pendulum.motion().omega.max(1.0);
+        // A mode of the rig asks for steps of its own, however slow the rest.
+        let rate = if course.field().sways() { *rate } else { pendulum.motion().omega.max(1.0) };
         let most =
             MOST_STEPS + (MOST_STEPS_A_TIME * rate * (times[times.len() - 1] - times[0])) as usize;
         let begin = |of: usize| along(self.window.start[of], motion.len() + of);

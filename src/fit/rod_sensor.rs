@@ -8,11 +8,12 @@
 //! Where friction jumps with the sense of the motion, `th''` and the reading jump with it, at every
 //! turn; a pendulum that is held fast has `th'' = 0` and shows gravity alone. A reading is the mean
 //! over an interval of sampling: at a turn within it the jump is shared in proportion, so that the
-//! sum of squares has no steps where a turn passes a sample.
+//! sum of squares has no steps where a turn passes a sample. An acceleration of the pivot, that of a
+//! pivot that gives way too, is left out of the reading.
 
 use std::f64::consts::FRAC_1_PI;
 
-use crate::integrate::course::Course;
+use crate::integrate::course::{Course, Past};
 use crate::integrate::tangent::Number;
 use crate::lanes::Work;
 use crate::lanes::sine::Fine;
@@ -44,7 +45,7 @@ impl RodSensor {
         course: &Course<N>,
         tau: f64,
         state: [N; 2],
-        moving: Option<([f64; 2], [N; 3])>,
+        moving: Option<([f64; 2], Past<N>)>,
         own: [N; 2],
     ) -> N {
         let mut reading = own[0];
@@ -66,7 +67,7 @@ struct Reading<'a, N> {
     course: &'a Course<N>,
     tau: f64,
     state: [N; 2],
-    moving: Option<([f64; 2], [N; 3])>,
+    moving: Option<([f64; 2], Past<N>)>,
     own: [N; 2],
     into: &'a mut N,
 }
@@ -97,7 +98,7 @@ impl<N: Number> Reading<'_, N> {
     /// `th''`, with the jump of friction at a turn less than half an interval away shared: the turn
     /// is `|th'| / |th''|` away.
     #[inline(always)]
-    fn mean_acceleration(&self, [sense, side]: [f64; 2], past: [N; 3]) -> N {
+    fn mean_acceleration(&self, [sense, side]: [f64; 2], past: Past<N>) -> N {
         let (course, tau, state) = (self.course, self.tau, self.state);
         let velocity = state[1];
         let here = course.acceleration(tau, state, [sense, side], past);

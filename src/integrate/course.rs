@@ -8,7 +8,6 @@ use crate::lanes::Work;
 use crate::model::effects::Point;
 use crate::model::equation::Forcing;
 use crate::model::recorded::Recorded;
-use crate::model::rest::Load;
 use crate::model::{Equation, Pendulum};
 
 /// The longest step is this times a power of the tolerance, over the greatest rate of small motions
@@ -21,6 +20,10 @@ const LONGEST_STEP: (f64, f64) = (1.6, 1.0 / 14.0);
 pub const FINEST: f64 = 1e-15;
 /// Angles, and times of a drive's period, at which the rate is looked for.
 const LOOKS: [usize; 2] = [32, 8];
+
+/// What a motion carries besides angle and velocity: the angle of the last turn, what an effect and the
+/// sensor's play kept there, and displacement and momentum of a mode of the rig.
+pub type Past<N> = [N; 5];
 
 /// The accelerations of a course: the equation of motion over numbers of some kind, and the motion
 /// of the pivot that was recorded.
@@ -136,8 +139,21 @@ impl<N: Number> Course<N> {
     }
 
     /// [`Field::acceleration`].
-    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
+    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: Past<N>) -> N {
         self.field.acceleration(tau, state, signs, past)
+    }
+
+    /// What a motion carries that begins in this state: the mode where it is pulled to, at rest.
+    #[must_use]
+    pub fn begin(&self, tau: f64, state: [N; 2]) -> Past<N> {
+        let zero = state[0].like(0.0);
+        let past = [state[0], zero, zero, zero, zero];
+        if !self.field.sways() {
+            return past;
+        }
+        let x = self.field.equation.aside(&self.field.point(tau, state, [1.0; 2], past).1);
+        let [rate, _] = self.field.sway(state, past);
+        [state[0], zero, zero, x, -rate]
     }
 
     /// Whether anything depends on the last turn.
@@ -148,22 +164,22 @@ impl<N: Number> Course<N> {
 
     /// The angle of a turn and what an effect keeps there, reached in this sense from the last one.
     #[must_use]
-    pub fn turned(&self, theta: N, sense: f64, past: [N; 3]) -> [N; 3] {
+    pub fn turned(&self, theta: N, sense: f64, past: Past<N>) -> Past<N> {
         if !self.keeps() {
             return past;
         }
         let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
         let kept = self.field.equation.kept(0, &at).unwrap_or(past[1]);
-        [theta, kept, self.played(theta, sense, past) - theta]
+        [theta, kept, self.played(theta, sense, past) - theta, past[3], past[4]]
     }
 
     /// What the sensor's play makes of an angle, reached in this sense from the last turn.
     #[must_use]
-    pub fn played(&self, theta: N, sense: f64, [turned, _, played]: [N; 3]) -> N {
+    pub fn played(&self, theta: N, sense: f64, [turned, _, played, x, y]: Past<N>) -> N {
         if !self.plain.equation.keeps()[1] {
             return theta;
         }
-        let past = [turned, played, played];
+        let past = [turned, played, played, x, y];
         let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
         self.field.equation.kept(1, &at).map_or(theta, |apart| theta + apart)
     }
@@ -171,7 +187,8 @@ impl<N: Number> Course<N> {
     /// The switching function of an effect with a corner; 1 where there is none.
     #[must_use]
     pub fn switch(&self, tau: f64, [theta, velocity]: [f64; 2]) -> f64 {
-        let at = self.plain.point(tau, [theta, velocity], [1.0; 2], [theta, 1.0, 0.0]).1;
+        let past = [theta, 1.0, 0.0, 0.0, 0.0];
+        let at = self.plain.point(tau, [theta, velocity], [1.0; 2], past).1;
         self.plain.equation.switch(&at).unwrap_or(1.0)
     }
 
@@ -194,6 +211,24 @@ impl<N: Number> Course<N> {
         self.jumps
     }
 
+    /// Whether what loads a pendulum at rest is known in closed form, but for a mode of the rig.
+    #[must_use]
+    pub fn is_harmonic(&self) -> bool {
+        self.harmonic
+    }
+
+    /// The time after which that load repeats; `None` if it does not.
+    #[must_use]
+    pub fn period(&self) -> Option<f64> {
+        self.period
+    }
+
+    /// The time scale on which it changes.
+    #[must_use]
+    pub fn look(&self) -> f64 {
+        self.look
+    }
+
     /// The longest step.
     #[must_use]
     pub fn longest_step(&self) -> f64 {
@@ -212,9 +247,16 @@ impl<N: Number> Field<N> {
         Self { equation: self.equation.with_lateral(), recorded: Some(recorded) }
     }
 
+    /// The equation of motion.
+    #[must_use]
+    pub fn equation(&self) -> &Equation<N> {
+        &self.equation
+    }
+
     /// What the pivot does at time `tau`, in the shape of `number`.
     #[inline(always)]
-    fn forcing(&self, tau: f64, number: N) -> Forcing<N> {
+    #[must_use]
+    pub fn forcing(&self, tau: f64, number: N) -> Forcing<N> {
         let mut forcing = self.equation.forcing(number.like(tau));
         if let Some(recorded) = &self.recorded {
             let [up, side] = recorded.acceleration(tau);
@@ -232,18 +274,35 @@ impl<N: Number> Field<N> {
         tau: f64,
         [theta, velocity]: [N; 2],
         [sense, side]: [f64; 2],
-        past: [N; 3],
+        past: Past<N>,
     ) -> (Forcing<N>, Point<N>) {
         let forcing = self.forcing(tau, theta);
         let signs = [theta.like(sense), theta.like(side)];
         let at = self.equation.point_held(&forcing, theta, velocity, signs);
-        (forcing, Point { past: [past[0], past[1]], ..at })
+        (forcing, Point { past: [past[0], past[1]], sway: [past[3], past[4]], ..at })
+    }
+
+    /// Whether a mode of the rig moves with the pendulum.
+    #[inline(always)]
+    #[must_use]
+    pub fn sways(&self) -> bool {
+        self.equation.sways()
+    }
+
+    /// The rates of that mode's displacement and momentum; 0 where there is none.
+    #[inline(always)]
+    #[must_use]
+    pub fn sway(&self, state: [N; 2], past: Past<N>) -> [N; 2] {
+        if !self.sways() {
+            return [state[0].like(0.0); 2];
+        }
+        self.equation.sway(&self.point(0.0, state, [1.0; 2], past).1)
     }
 
     /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
     /// says (1 or -1), since the turn that `past` says.
     #[inline(never)]
-    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
+    pub fn acceleration(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: Past<N>) -> N {
         let mut acceleration = state[1];
         let into = &mut acceleration;
         state[0].aside(Accelerating { field: self, tau, state, signs, past, into });
@@ -252,7 +311,7 @@ impl<N: Number> Field<N> {
 
     /// The same within its caller.
     #[inline(always)]
-    pub fn at(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: [N; 3]) -> N {
+    pub fn at(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: Past<N>) -> N {
         let (forcing, at) = self.point(tau, state, signs, past);
         self.equation.acceleration(&forcing, &at)
     }
@@ -264,7 +323,7 @@ struct Accelerating<'a, N> {
     tau: f64,
     state: [N; 2],
     signs: [f64; 2],
-    past: [N; 3],
+    past: Past<N>,
     into: &'a mut N,
 }
 
@@ -273,33 +332,6 @@ impl<N: Number> Work for Accelerating<'_, N> {
     fn run(self) {
         let Self { field, tau, state, signs, past, into } = self;
         *into = field.at(tau, state, signs, past);
-    }
-}
-
-/// A course, and what an effect keeps where the pendulum rests.
-#[derive(Debug)]
-pub struct Resting<'a, N>(pub &'a Course<N>, pub f64);
-
-impl<N> Load for Resting<'_, N> {
-    fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2] {
-        let Self(course, kept) = self;
-        let equation = &course.plain.equation;
-        let forcing = course.plain.forcing(tau, theta);
-        let past = [theta, *kept];
-        let at = Point { past, ..equation.point(&forcing, theta, 0.0, 1.0) };
-        [equation.load(&forcing, &at), equation.friction(&at).max(0.0)]
-    }
-    fn equation(&self) -> &Equation<f64> {
-        &self.0.plain.equation
-    }
-    fn has_closed_release(&self) -> bool {
-        self.0.harmonic
-    }
-    fn period(&self) -> Option<f64> {
-        self.0.period
-    }
-    fn time_scale(&self) -> f64 {
-        self.0.look
     }
 }
 
@@ -324,5 +356,26 @@ pub fn greatest_rate(pendulum: &Pendulum) -> f64 {
         }
     }
     let drive = if pendulum.is_autonomous() { 0.0 } else { pendulum.motion().omega };
-    stiffness.sqrt().max(damping).max(drive)
+    let own = if equation.sways() { rate_of_mode(pendulum) } else { 0.0 };
+    stiffness.sqrt().max(damping).max(drive).max(own)
+}
+
+/// The greatest frequency or rate of decay of a mode of the rig, the pendulum giving way.
+fn rate_of_mode(pendulum: &Pendulum) -> f64 {
+    let equation = Equation::lift(pendulum, |_, value| Tangent::<f64, 4>::constant(value));
+    let forcing = equation.forcing(Tangent::constant(0.0));
+    let (mut stiffness, mut damping) = (0_f64, 0_f64);
+    for i in 0..LOOKS[0] {
+        let theta = PI * (2.0 * i as f64 / LOOKS[0] as f64 - 1.0);
+        let (theta, velocity) = (Tangent::seeded(theta, 0), Tangent::seeded(0.0, 1));
+        let mut at = equation.point(&forcing, theta, velocity, Tangent::constant(1.0));
+        at.sway = [2, 3].map(|column| Tangent::seeded(0.0, column));
+        let pull = equation.acceleration(&forcing, &at).slope;
+        let [rate, force] = equation.sway(&at).map(|of| of.slope);
+        // `x''` by `x` and by the momentum.
+        let by = |column: usize| rate[1] * pull[column] + rate[3] * force[column];
+        stiffness = stiffness.max(by(2).abs());
+        damping = damping.max(by(3).abs());
+    }
+    stiffness.sqrt().max(damping)
 }

@@ -5,14 +5,15 @@
 
 use std::ops::Range;
 
-use super::course::Field;
+use super::course::{Field, Past};
 use super::dop853::{A, ALL_STAGES, C, D, E3, E5, STAGES};
+use super::sway::Sway;
 use super::tangent::Number;
 use crate::lanes::Work;
 
 /// A step from one time to another with the sense of the motion and the side of a corner held, so that
 /// the equation is analytic even where the velocity or the switching function passes zero.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Leap<N> {
     /// Where it starts.
     pub tau: f64,
@@ -20,14 +21,16 @@ pub struct Leap<N> {
     pub length: f64,
     /// The sense and the side held: 1 or -1.
     pub signs: [f64; 2],
-    /// The angle of the last turn, and what an effect and the sensor's play kept there.
-    pub past: [N; 3],
+    /// What the motion carries besides at its start.
+    pub past: Past<N>,
     /// Angle and velocity at its start.
     pub start: [N; 2],
     /// Angle and velocity at its end.
     pub end: [N; 2],
     velocity: [N; ALL_STAGES],
     acceleration: [N; ALL_STAGES],
+    /// The mode of the rig, where one moves with the pendulum.
+    pub sway: Option<Box<Sway<N>>>,
 }
 
 impl<N: Number> Leap<N> {
@@ -37,8 +40,9 @@ impl<N: Number> Leap<N> {
         let none = [start[0].like(0.0); ALL_STAGES];
         let (tau, length, signs) = (0.0, 0.0, [1.0; 2]);
         let zero = start[0].like(0.0);
-        let past = [start[0], zero, zero];
-        Self { tau, length, signs, past, start, end: start, velocity: none, acceleration: none }
+        let past = [start[0], zero, zero, zero, zero];
+        let (velocity, acceleration, sway) = (none, none, None);
+        Self { tau, length, signs, past, start, end: start, velocity, acceleration, sway }
     }
 
     /// The step of `length` from `start` at `tau`, where the acceleration is `first`.
@@ -69,6 +73,10 @@ impl<N: Number> Leap<N> {
         (self.tau, self.start, self.signs) = (tau, start, signs);
         self.velocity[0] = start[1];
         self.acceleration[0] = first;
+        if field.sways() {
+            let sway = self.sway.get_or_insert_with(|| Box::new(Sway::none(first)));
+            sway.keep(0, field.sway(start, self.past));
+        }
         self.shorten(field, length);
     }
 
@@ -91,6 +99,7 @@ impl<N: Number> Leap<N> {
             end: self.end.map(N::value),
             velocity: self.velocity.map(N::value),
             acceleration: self.acceleration.map(N::value),
+            sway: self.sway.as_ref().map(|sway| Box::new(sway.values())),
         }
     }
 
@@ -118,7 +127,12 @@ impl<N: Number> Leap<N> {
         let velocity = gained.scale_add(self.length, self.start[1]);
         let tau = self.tau + C[i] * self.length;
         self.velocity[i] = velocity;
-        self.acceleration[i] = field.at(tau, [theta, velocity], self.signs, self.past);
+        let mut past = self.past;
+        if let Some(sway) = &mut self.sway {
+            [past[3], past[4]] = sway.stage(i, self.length, [past[3], past[4]]);
+            sway.keep(i, field.sway([theta, velocity], past));
+        }
+        self.acceleration[i] = field.at(tau, [theta, velocity], self.signs, past);
         if i == STAGES {
             self.end = [theta, velocity];
         }
@@ -144,7 +158,10 @@ impl<N: Number> Leap<N> {
         let allowed = [tolerance, tolerance * speed.max(1.0)];
         let mut squares = [0.0; 2];
         for (weights, square) in [E5, E3].iter().zip(&mut squares) {
-            for (slopes, allowed) in [&self.velocity, &self.acceleration].into_iter().zip(allowed) {
+            let own = [&self.velocity, &self.acceleration].into_iter();
+            // Of a mode of the rig alike: what it does to the angle is no more.
+            let all = own.chain(self.sway.iter().flat_map(|sway| &sway.slopes));
+            for (slopes, allowed) in all.zip(allowed.into_iter().cycle()) {
                 let sum: f64 = weights.iter().zip(slopes).map(|(w, k)| w * k.value()).sum();
                 *square += (sum / allowed).powi(2);
             }
@@ -178,28 +195,32 @@ impl<N: Number> Leap<N> {
     pub fn trace(&mut self, field: &Field<N>, curve: &mut Curve<N>) {
         (curve.tau, curve.length) = (self.tau, self.length);
         (curve.theta[0], curve.velocity[0]) = (self.start[0], self.start[1]);
+        if self.sway.is_some() {
+            let all = curve.sway.get_or_insert_with(|| Box::new([[self.start[0]; 8]; 2]));
+            (all[0][0], all[1][0]) = (self.past[3], self.past[4]);
+        }
         self.fill(field, STAGES + 1..ALL_STAGES);
         self.start[0].aside(Curving { leap: self, curve });
     }
+}
 
-    #[inline(always)]
-    fn coefficients(&self, of: usize, slopes: &[N; ALL_STAGES], all: &mut [N; 8]) {
-        let gain = self.end[of] - self.start[of];
-        let (first, last) = (slopes[0].scale(self.length), slopes[STAGES].scale(self.length));
-        all[1] = gain;
-        all[2] = first - gain;
-        all[3] = gain.scale(2.0) - (last + first);
-        let mut k = 0;
-        while k < D.len() {
-            let mut sum = gain.like(0.0);
-            let mut j = 0;
-            while j < ALL_STAGES {
-                sum = slopes[j].scale_add(D[k][j], sum);
-                j += 1;
-            }
-            all[4 + k] = sum.scale(self.length);
-            k += 1;
+/// The coefficients of a curve that gains so much over a step of that length.
+#[inline(always)]
+fn coefficients<N: Number>(gain: N, length: f64, slopes: &[N; ALL_STAGES], all: &mut [N; 8]) {
+    let (first, last) = (slopes[0].scale(length), slopes[STAGES].scale(length));
+    all[1] = gain;
+    all[2] = first - gain;
+    all[3] = gain.scale(2.0) - (last + first);
+    let mut k = 0;
+    while k < D.len() {
+        let mut sum = gain.like(0.0);
+        let mut j = 0;
+        while j < ALL_STAGES {
+            sum = slopes[j].scale_add(D[k][j], sum);
+            j += 1;
         }
+        all[4 + k] = sum.scale(length);
+        k += 1;
     }
 }
 
@@ -231,56 +252,78 @@ impl<N: Number> Work for Curving<'_, N> {
     #[inline(always)]
     fn run(self) {
         let Self { leap, curve } = self;
-        leap.coefficients(0, &leap.velocity, &mut curve.theta);
-        leap.coefficients(1, &leap.acceleration, &mut curve.velocity);
+        let (start, end, length) = (leap.start, leap.end, leap.length);
+        coefficients(end[0] - start[0], length, &leap.velocity, &mut curve.theta);
+        coefficients(end[1] - start[1], length, &leap.acceleration, &mut curve.velocity);
+        if let (Some(sway), Some(all)) = (&leap.sway, &mut curve.sway) {
+            let mut of = 0;
+            while of < 2 {
+                let gain = sway.end[of] - leap.past[3 + of];
+                coefficients(gain, length, &sway.slopes[of], &mut all[of]);
+                of += 1;
+            }
+        }
     }
 }
 
 /// Angle and velocity over a step: with `x` the part of the step that has passed,
 /// `c0 + x (c1 + (1 - x) (c2 + x (c3 + (1 - x) (c4 + ...))))`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Curve<N> {
     tau: f64,
     length: f64,
     theta: [N; 8],
     /// The coefficients of the velocity.
     pub velocity: [N; 8],
+    /// Those of displacement and momentum of a mode of the rig.
+    sway: Option<Box<[[N; 8]; 2]>>,
 }
 
 impl<N: Number> Curve<N> {
     /// No curve yet.
     #[must_use]
     pub fn none([theta, velocity]: [N; 2]) -> Self {
-        Self { tau: 0.0, length: 0.0, theta: [theta; 8], velocity: [velocity; 8] }
+        let (theta, velocity) = ([theta; 8], [velocity; 8]);
+        Self { tau: 0.0, length: 0.0, theta, velocity, sway: None }
     }
 
     /// Angle and velocity at time `tau` of the step.
     #[must_use]
     pub fn at(&self, tau: f64) -> [N; 2] {
-        let mut state = [self.theta[7], self.velocity[7]];
+        self.sum([&self.theta, &self.velocity], tau)
+    }
+
+    /// Displacement and momentum of a mode of the rig; none where there is no such mode.
+    #[must_use]
+    pub fn sway(&self, tau: f64) -> Option<[N; 2]> {
+        self.sway.as_ref().map(|all| self.sum([&all[0], &all[1]], tau))
+    }
+
+    fn sum(&self, of: [&[N; 8]; 2], tau: f64) -> [N; 2] {
+        let mut into = [of[0][7], of[1][7]];
         let part = (tau - self.tau) / self.length;
-        self.theta[0].aside(Summing { curve: self, part, state: &mut state });
-        state
+        self.theta[0].aside(Summing { of, part, into: &mut into });
+        into
     }
 }
 
-/// The values of a curve at a part of its step.
+/// The values of two curves at a part of their step.
 struct Summing<'a, N> {
-    curve: &'a Curve<N>,
+    of: [&'a [N; 8]; 2],
     part: f64,
-    state: &'a mut [N; 2],
+    into: &'a mut [N; 2],
 }
 
 impl<N: Number> Work for Summing<'_, N> {
     #[inline(always)]
     fn run(self) {
-        let Self { curve, part, state } = self;
+        let Self { of, part, into } = self;
         let mut k = 7;
         while k > 0 {
             k -= 1;
             let factor = if k % 2 == 0 { part } else { 1.0 - part };
-            state[0] = state[0].scale_add(factor, curve.theta[k]);
-            state[1] = state[1].scale_add(factor, curve.velocity[k]);
+            into[0] = into[0].scale_add(factor, of[0][k]);
+            into[1] = into[1].scale_add(factor, of[1][k]);
         }
     }
 }

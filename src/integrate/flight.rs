@@ -7,13 +7,13 @@
 //! Budd, Champneys & Kowalczyk (2008), Piecewise-smooth Dynamical Systems, section 2.5).
 
 use super::corner;
-use super::course::{Course, Resting};
+use super::course::{Course, Past};
 use super::dense::Leap;
 use super::event::{Event, EventKind};
-use crate::model::rest::{Release, release};
-
+use super::sway::{self, Ring};
 use super::tangent::Number;
 use super::turning::{self, Turning};
+use crate::model::rest::Release;
 
 /// A step is at most so much longer than the one before it, and at least so much shorter.
 const CHANGE: [f64; 2] = [1.0 / 3.0, 6.0];
@@ -57,8 +57,8 @@ pub struct Flight<'a, N> {
     pub tau: f64,
     /// Angle, not wrapped, and velocity.
     pub state: [N; 2],
-    /// The angle of the last turn, and what an effect and the sensor's play kept there.
-    pub past: [N; 3],
+    /// What the motion carries besides.
+    pub past: Past<N>,
     /// Turns, sticks and releases so far.
     pub events: Vec<Event>,
     /// The product of the ratios of accelerations at the turns, 0 after a stick.
@@ -87,7 +87,7 @@ impl<'a, N: Number> Flight<'a, N> {
             course,
             tau,
             state,
-            past: Leap::none(state).past,
+            past: course.begin(tau, state),
             events,
             ratio: 1.0,
             steps: 0,
@@ -103,7 +103,7 @@ impl<'a, N: Number> Flight<'a, N> {
         if velocity != 0.0 {
             flight.set_out(1_f64.copysign(velocity));
         } else if course.jumps() {
-            match release(&Resting(course, 0.0), tau, state[0].value(), until) {
+            match sway::let_go(course, tau, state[0].value(), flight.past, until) {
                 Release::Now(sense) => flight.set_out(sense),
                 wait => flight.settle(wait),
             }
@@ -173,13 +173,18 @@ impl<'a, N: Number> Flight<'a, N> {
 
     fn rest(&mut self, wait: Release) -> Piece {
         let from = self.tau;
-        match wait {
-            Release::At(time, sense) if time < self.until => {
-                self.tau = time;
-                self.note(EventKind::Release);
-                self.set_out(sense);
-            }
-            _ => self.tau = self.until,
+        let moves = match wait {
+            Release::At(time, sense) if time < self.until => Some((time, sense)),
+            _ => None,
+        };
+        self.tau = moves.map_or(self.until, |(time, _)| time);
+        if let Some(ring) = Ring::at(self.course.field(), self.state[0]) {
+            let [.., x, y] = self.past;
+            [self.past[3], self.past[4]] = ring.after(self.tau - from, [x, y]);
+        }
+        if let Some((_, sense)) = moves {
+            self.note(EventKind::Release);
+            self.set_out(sense);
         }
         Piece::Rest(from, self.tau)
     }
@@ -251,6 +256,9 @@ impl<'a, N: Number> Flight<'a, N> {
 
     fn arrive(&mut self) {
         let Leap { tau, length, end: state, .. } = self.leap;
+        if let Some(sway) = &self.leap.sway {
+            [self.past[3], self.past[4]] = sway.end;
+        }
         let end = tau + length;
         self.tau = if (end - self.until).abs() < SHORTEST * end.abs() { self.until } else { end };
         self.state = state;
@@ -261,8 +269,8 @@ impl<'a, N: Number> Flight<'a, N> {
         self.past = self.course.turned(self.state[0], sense, self.past);
         let theta = self.state[0].value();
         let goes_on = if self.course.jumps() {
-            let resting = Resting(self.course, self.past[1].value());
-            self.uncrowded(release(&resting, self.tau, theta, self.until))
+            let wait = sway::let_go(self.course, self.tau, theta, self.past, self.until);
+            self.uncrowded(wait)
         } else {
             Release::Now(-sense)
         };

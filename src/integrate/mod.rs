@@ -9,6 +9,7 @@
 //! - [`corner`]: where an effect's formula changes besides the velocity's zeros
 //! - [`course`], [`dense`], [`turning`], [`event`], [`flight`]: one trajectory of any
 //!   model, adaptive, with exact turns, sticks and releases
+//! - [`sway`]: a mode of the rig beside it
 //! - [`sample`], [`sensitivity`]: the same at chosen times, with derivatives by parameters and start
 //! - [`flow`]: the stroboscopic map by it, with its derivative
 //! - [`stroboscopic`]: many trajectories, one forcing period at a time
@@ -33,6 +34,7 @@ pub mod sensitivity;
 pub mod step;
 pub mod stretch;
 pub mod stroboscopic;
+pub mod sway;
 pub mod tableau;
 pub mod tangent;
 pub mod ticket;

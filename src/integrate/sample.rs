@@ -1,6 +1,6 @@
 //! A trajectory at chosen times.
 
-use super::course::Course;
+use super::course::{Course, Past};
 use super::dense::Curve;
 use super::event::Event;
 use super::flight::{Flight, Piece};
@@ -13,9 +13,8 @@ pub struct Sampled<N> {
     pub states: Vec<[N; 2]>,
     /// The sense of the motion and the side of a corner at each time; none where it does not move.
     pub signs: Vec<Option<[f64; 2]>>,
-    /// The angle of the last turn before each time, and what an effect and the sensor's play kept there;
-    /// empty where nothing depends on it.
-    pub pasts: Vec<[N; 3]>,
+    /// What the motion carries besides at each time; empty where nothing depends on it.
+    pub pasts: Vec<Past<N>>,
     /// Turns, sticks and releases up to the last time.
     pub events: Vec<Event>,
     /// Whether friction holds the pendulum at the last time.
@@ -27,10 +26,10 @@ pub struct Sampled<N> {
 impl<N: Number> Sampled<N> {
     /// The past at the time of that place; that of a motion's start where nothing depends on it.
     #[must_use]
-    pub fn past(&self, place: usize) -> [N; 3] {
+    pub fn past(&self, place: usize) -> Past<N> {
         let [theta, _] = self.states[place];
         let zero = theta.like(0.0);
-        self.pasts.get(place).copied().unwrap_or([theta, zero, zero])
+        self.pasts.get(place).copied().unwrap_or([theta, zero, zero, zero, zero])
     }
 
     /// What the sensor is given at the time of that place: the angle, or what its play makes of it.
@@ -60,7 +59,7 @@ pub fn sample<N: Number>(
     let at_start = times.iter().take_while(|time| **time <= tau).count();
     states.extend(std::iter::repeat_n(flight.state, at_start));
     let mut signs = vec![flight.signs_held(); at_start];
-    let kept = if course.keeps() { times.len() } else { 0 };
+    let kept = if course.keeps() || course.field().sways() { times.len() } else { 0 };
     let mut pasts = vec![flight.past; at_start.min(kept)];
     let mut curve = Curve::none(flight.state);
     while let Some(piece) = flight.advance() {
@@ -77,6 +76,13 @@ pub fn sample<N: Number>(
                 let within = moves && *time < flight.tau;
                 states.push(if within { curve.at(*time) } else { flight.state });
             }
+            if moves && course.field().sways() {
+                for (time, past) in times[done..done + due].iter().zip(&mut pasts[done..]) {
+                    let at = if *time < flight.tau { curve.sway(*time) } else { None };
+                    let [.., x, y] = flight.past;
+                    [past[3], past[4]] = at.unwrap_or([x, y]);
+                }
+            }
         }
         if !between(&mut flight, &mut states[done..]) {
             break;
@@ -85,7 +91,7 @@ pub fn sample<N: Number>(
     let lost = flight.state.map(|x| x.reset(f64::NAN, 1.0));
     states.resize(times.len(), lost);
     signs.resize(times.len(), None);
-    pasts.resize(kept, [lost[0]; 3]);
+    pasts.resize(kept, [lost[0]; 5]);
     let stuck = flight.is_stuck();
     Sampled { states, signs, pasts, stuck, steps: flight.steps, events: flight.events }
 }

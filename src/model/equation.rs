@@ -9,6 +9,8 @@
 //! Where `w0` itself is fitted, time is counted in `1 / w_ref` with a fixed `w_ref` near it, and
 //! gravity, its drive included, is multiplied by `(w0 / w_ref)^2` ([`Equation::with_gravity`]).
 
+mod mapped;
+
 use std::f64::consts::FRAC_1_PI;
 
 use super::drive::Motion;
@@ -45,6 +47,8 @@ pub struct Equation<R> {
     formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
     /// What depends on the last turn: an effect with a torque, and the sensor's play.
     keepers: [Option<(Kind, [R; MOST_PARAMETERS])>; 2],
+    /// The effect with a mode of the rig.
+    mode: Option<(Kind, [R; MOST_PARAMETERS])>,
     /// The effect with a corner.
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
@@ -112,23 +116,15 @@ impl<R: Real> Equation<R> {
         let (mut frictions, mut formulas) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
-        let (mut corner, mut keepers) = (None, [None; 2]);
-        let probe = Point {
-            theta: zero,
-            velocity: zero,
-            sense: zero,
-            side: zero,
-            sine: zero,
-            vertical: zero,
-            per_gravity: zero,
-            lab: zero,
-            phase: zero,
-            past: [zero; 2],
-        };
+        let (mut corner, mut mode, mut keepers) = (None, None, [None; 2]);
+        let probe = Point::nowhere(zero);
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
             if effect.kind.switch(&parameters, &probe).is_some() {
                 corner = Some((effect.kind, parameters));
+            }
+            if effect.kind.sway(&parameters, &probe).is_some() {
+                mode = Some((effect.kind, parameters));
             }
             if effect.kind.kept(&parameters, &probe).is_some() {
                 keepers[usize::from(effect.is(&[Action::Play]))] = Some((effect.kind, parameters));
@@ -181,6 +177,7 @@ impl<R: Real> Equation<R> {
             frictions,
             formulas,
             keepers,
+            mode,
             corner,
             sideways,
             plain,
@@ -264,8 +261,8 @@ impl<R: Real> Equation<R> {
     ) -> Point<R> {
         let sine = theta.scale(FRAC_1_PI).sine::<Fine>();
         let Forcing { vertical, per_gravity, lab, phase, .. } = *forcing;
-        let past = [theta, sense];
-        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase, past }
+        let (past, sway) = ([theta, sense], [theta.like(0.0); 2]);
+        Point { theta, velocity, sense, side, sine, vertical, per_gravity, lab, phase, past, sway }
     }
 
     /// Whether a torque depends on the last turn, and whether the sensor has play.
@@ -279,6 +276,36 @@ impl<R: Real> Equation<R> {
     pub fn kept(&self, which: usize, at: &Point<R>) -> Option<R> {
         let (kind, parameters) = self.keepers[which].as_ref()?;
         kind.kept(parameters, at)
+    }
+
+    /// Whether a mode of the rig moves with the pendulum.
+    #[inline(always)]
+    #[must_use]
+    pub fn sways(&self) -> bool {
+        self.mode.is_some()
+    }
+
+    /// That mode's displacement where a motion begins; 0 where there is none.
+    #[must_use]
+    pub fn aside(&self, at: &Point<R>) -> R {
+        match &self.mode {
+            Some((kind, parameters)) => kind.aside(parameters, at),
+            None => at.constant(0.0),
+        }
+    }
+
+    /// The rates of that mode's displacement and momentum; 0 where there is none.
+    #[inline(always)]
+    #[must_use]
+    pub fn sway(&self, at: &Point<R>) -> [R; 2] {
+        let rates = match &self.mode {
+            Some((kind, parameters)) => kind.sway(parameters, at),
+            None => None,
+        };
+        match rates {
+            Some(rates) => rates,
+            None => [at.constant(0.0); 2],
+        }
     }
 
     /// The function at whose zeros an effect has a corner; none where no effect has.
@@ -405,63 +432,4 @@ impl<R: Real> Equation<R> {
 #[inline(always)]
 pub fn conservative_load<D: Degree, R: Real>(vertical: f64, torque: f64, half_turns: R) -> R {
     half_turns.sine::<D>().affine(-vertical, torque)
-}
-
-impl Equation<f64> {
-    /// The same over numbers in the shape of `number`.
-    #[inline(always)]
-    #[must_use]
-    pub fn map<R: Real>(&self, number: R) -> Equation<R> {
-        let Motion { p, omega, phase, second, second_phase, lateral, lateral_phase, chirp } =
-            self.motion;
-        let mut equation = Equation {
-            gamma: number.like(self.gamma),
-            theta_r: number.like(self.theta_r),
-            torque: number.like(self.torque),
-            motion: Motion {
-                p: number.like(p),
-                omega: number.like(omega),
-                phase: number.like(phase),
-                second: number.like(second),
-                second_phase: number.like(second_phase),
-                lateral: number.like(lateral),
-                lateral_phase: number.like(lateral_phase),
-                chirp: number.like(chirp),
-            },
-            gravity: [number.like(self.gravity[0]), number.like(self.gravity[1])],
-            lab_time: number.like(self.lab_time),
-            ages: self.ages,
-            torques: Vec::new(),
-            inertias: Vec::new(),
-            frictions: Vec::new(),
-            formulas: Vec::new(),
-            keepers: [None; 2],
-            corner: self
-                .corner
-                .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),
-            sideways: self.sideways,
-            plain: self.plain,
-            holds: self.holds,
-        };
-        for (kind, [a, b, c]) in &self.torques {
-            equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
-        }
-        for (kind, [a, b, c]) in &self.inertias {
-            equation.inertias.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
-        }
-        for (kind, [a, b, c]) in &self.frictions {
-            equation.frictions.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
-        }
-        for (formula, [a, b, c]) in &self.formulas {
-            let parameters = [number.like(*a), number.like(*b), number.like(*c)];
-            equation.formulas.push((formula, parameters));
-        }
-        equation
-    }
-
-    /// Whether nothing changes with the drive's phase: the pivot rests.
-    #[must_use]
-    pub fn is_autonomous(&self) -> bool {
-        self.motion.p == 0.0 && !self.asks_for_phase()
-    }
 }

@@ -22,6 +22,8 @@ from pendmap.records import read_experiment
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from pendmap.diagnosis.fitted_model import Windows
+
 GAMMA, THETA_R, P, OMEGA = 0.05, 0.03, 0.6, 2.0
 
 EFFECTS = {
@@ -181,9 +183,22 @@ def clean(folder: Path, effect: str) -> tuple[Evidence, dict[str, float]]:
     return dataclasses.replace(found, fitted=exact, held=held), truth["parameters"]
 
 
-@pytest.mark.parametrize(
-    "name", [*EFFECTS, "sensor_lag", "encoder_drift", "dahl_friction", "encoder_backlash"]
-)
+def whole(evidence: Evidence) -> Windows:
+    """Each run a window, begun at rest."""
+    runs = enumerate(evidence.fitted)
+    return tuple((k, 0, len(run.time), float(run.angle[0]), 0.0) for k, run in runs)
+
+
+OTHERS = [
+    "sensor_lag",
+    "encoder_drift",
+    "dahl_friction",
+    "encoder_backlash",
+    "pivot_compliance",
+]
+
+
+@pytest.mark.parametrize("name", [*EFFECTS, *OTHERS])
 def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path) -> None:
     evidence, truth = clean(tmp_path, name)
     base, _ = baseline(evidence)
@@ -193,13 +208,19 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
     if unit.phase is not None:
         start[f"{name}.{unit.phase}"] = truth[unit.phase]
     model, free = placed(base.fit.model, [unit]), [*base.free, *unit.free]
-    near = {"eddy_brake": ("vc", 0.8), "base_sway": ("ws", 1 + 1e-5), "impulses": ("t0", 1.01)}
-    if name in near:
-        # What has units is found beside the size, from elsewhere.
+    # What has units is found beside the size, from elsewhere.
+    elsewhere = {
+        "eddy_brake": {"vc": 0.8},
+        "pivot_compliance": {"wx": 0.95, "z": 0.5},
+        "base_sway": {"ws": 1 + 1e-5},
+        "impulses": {"t0": 1.01},
+    }.get(name)
+    if elsewhere is not None:
         free += unit.adapted
-        own, factor = near[name]
-        start[f"{name}.{own}"] = factor * truth[own]
-    found = fitted(evidence, model, free, (unit,), start=start).fit
+        start |= {f"{name}.{n}": part * truth[n] for n, part in elsewhere.items()}
+    # The mode is at rest where a run begins, not where a window within it does.
+    windows = whole(evidence) if name == "pivot_compliance" else None
+    found = fitted(evidence, model, free, (unit,), start=start, windows=windows).fit
     # Of a lag the second power of tau is left. Each window begins with a contact that has not
     # yielded and a sensor in the middle of its play.
     # A knock of the rig takes no time.
@@ -212,6 +233,28 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
         reached *= math.cos(found[f"{name}.{unit.phase}"] - truth[unit.phase])
     close = {"sensor_lag": 0.02, "dahl_friction": 1e-3, "encoder_backlash": 0.005, "impulses": 0.01}
     assert reached == pytest.approx(truth[size], rel=close.get(name, 1e-4))
-    if name in near:
-        own, _ = near[name]
-        assert found[f"{name}.{own}"] == pytest.approx(truth[own], rel=close.get(name, 1e-6))
+    for n in elsewhere or ():
+        assert found[f"{name}.{n}"] == pytest.approx(truth[n], rel=close.get(name, 1e-6))
+
+
+def test_the_mode_of_a_pivot_is_found_within_its_errors(tmp_path: Path) -> None:
+    evidence, truth = clean(tmp_path, "pivot_compliance")
+    draws, sigma = np.random.default_rng(1), 2e-5
+    runs = tuple(
+        dataclasses.replace(
+            run, theta=run.theta + draws.normal(0, sigma, len(run.time)), sigma=sigma
+        )
+        for run in evidence.fitted
+    )
+    noisy = dataclasses.replace(evidence, fitted=runs)
+    base, _ = baseline(noisy)
+    unit = Candidate("pivot_compliance", {"wx": truth["wx"], "z": truth["z"]})
+    near = {"mu": 0.5, "wx": 0.95, "z": 0.5}
+    start = {f"pivot_compliance.{n}": part * truth[n] for n, part in near.items()}
+    model, free = placed(base.fit.model, [unit]), [*base.free, *unit.free, *unit.adapted]
+    found = fitted(noisy, model, free, (unit,), start=base.start | start, windows=whole(noisy)).fit
+    assert found.rms == pytest.approx(sigma, rel=0.03)
+    for n, value in truth.items():
+        estimate = found.estimates[f"pivot_compliance.{n}"]
+        assert estimate.stderr is not None
+        assert abs(estimate.value - value) < 3 * estimate.stderr < 0.3 * value

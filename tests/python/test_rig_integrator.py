@@ -182,7 +182,8 @@ def test_a_pivot_that_gives_way_against_its_lagrangian() -> None:
         a, b = np.linalg.solve(matrix, force)
         return [v, a, u, b]
 
-    other = solve_ivp(rate, (0, 4), [0.5, 11.0, 0, 0], **LOW)
+    aside = mu * math.sin(0.5) * (w0**2 * math.cos(0.5) + 11.0**2) / wx**2
+    other = solve_ivp(rate, (0, 4), [0.5, 11.0, aside, 0], **LOW)
     effect = PivotCompliance(mu=mu, wx=wx, z=z)
     path = run(Parameters(w0, c, 0), (0, 1, 0), 0.5, 11.0, 4, [effect])
     assert path.angle(np.array([4.0])) == pytest.approx(other.y[0, -1], abs=1e-9)

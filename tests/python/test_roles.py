@@ -17,7 +17,7 @@ from pendmap.model import Effect, effects
 from pendmap.model.units import Units
 
 ROLES = {"size", "width", "place", "power", "order", "time constant", "phase"}
-ROLES |= {"frequency", "instant"}
+ROLES |= {"frequency", "instant", "mode"}
 SHAPES = {
     "base_sway": {"ws": "frequency"},
     "bearing_harmonic": {"n": "order"},
@@ -27,6 +27,7 @@ SHAPES = {
     "impulses": {"t0": "instant"},
     "inertia_ripple": {"n": "order"},
     "magnet": {"width": "width"},
+    "pivot_compliance": {"wx": "mode", "z": "width"},
     "power_law_drag": {"n": "power"},
     "rough_spot": {"th0": "place", "w": "width"},
     "stribeck_friction": {"vs": "width"},

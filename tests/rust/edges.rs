@@ -1,11 +1,12 @@
 //! Where rounding could decide: grazing contacts, starts at rest, the stick's edge.
 
 use pendmap::integrate::State;
-use pendmap::integrate::course::{Course, Resting};
+use pendmap::integrate::course::Course;
 use pendmap::integrate::event::{Event, EventKind};
 use pendmap::integrate::flight::Flight;
 use pendmap::integrate::flow::Flow;
 use pendmap::integrate::sample::{Sampled, sample};
+use pendmap::integrate::sway::Resting;
 use pendmap::model::rest::Load as _;
 use pendmap::model::{Effect, Kind, Pendulum};
 use proptest::prelude::*;
@@ -195,8 +196,8 @@ proptest! {
                     EventKind::Release => {
                         stuck = false;
                         // The sense of the load.
-                        sense = if Resting(&course, 0.0).excess_toward(event.tau, event.theta, 1.0)
-                            > Resting(&course, 0.0).excess_toward(event.tau, event.theta, -1.0) { 1.0 } else { -1.0 };
+                        sense = if Resting::still(&course, 0.0).excess_toward(event.tau, event.theta, 1.0)
+                            > Resting::still(&course, 0.0).excess_toward(event.tau, event.theta, -1.0) { 1.0 } else { -1.0 };
                     }
                     EventKind::StuckForEver => prop_assert!(stuck),
                 }
@@ -207,7 +208,7 @@ proptest! {
             if stuck {
                 prop_assert!(state[1].abs() == 0.0);
                 for s in [1.0, -1.0] {
-                    prop_assert!(Resting(&course, 0.0).excess_toward(tau, state[0], s) < 2e-10);
+                    prop_assert!(Resting::still(&course, 0.0).excess_toward(tau, state[0], s) < 2e-10);
                 }
             } else if sense == 0.0 {
                 sense = state[1].signum();

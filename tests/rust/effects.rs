@@ -172,6 +172,14 @@ fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64
             let all = gravity + 0.5 * e * n * angle.sin() * velocity * velocity;
             own = all / (1.0 + e * angle.cos()) - gravity;
         }
+        // The mode's displacement and momentum `x' + mu v cos th` being 0.
+        ("pivot_compliance", [mu, wx, z]) => {
+            let (sine, cosine) = theta.sin_cos();
+            let gravity = -w0 * w0 * (1.0 + up) * sine;
+            let rate = -mu * velocity * cosine;
+            let pull = 2.0 * z * wx * rate - mu * velocity * velocity * sine;
+            own = (gravity + pull * cosine) / (1.0 - mu * cosine * cosine) - gravity;
+        }
         (name, _) if kind.definition().group == Group::Reading => {
             assert!(name.starts_with("encoder") || name == "sensor_lag");
         }

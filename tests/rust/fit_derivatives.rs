@@ -177,6 +177,52 @@ fn derivatives_hold_where_a_contact_yields() {
 }
 
 #[test]
+fn derivatives_hold_where_the_pivot_gives_way() {
+    let happens = |pendulum: &Pendulum, start: State, until: f64, kind: EventKind| {
+        let course = Course::new(pendulum, true, TOLERANCE, |_, value| value);
+        let events = sample(&course, 0.0, start, &[until], |_, _| true).events;
+        events.iter().filter(|event| event.kind == kind).count()
+    };
+    let check = |pendulum: Pendulum, start: State, until: f64| {
+        let error = worst(record(pendulum, None, start, until), None, start);
+        assert!(error < 1e-6, "{error:e}");
+    };
+    let compliance: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.05, 5.3, 0.03]);
+    // Whirling, then swinging without friction.
+    check(with(undriven(0.1, 0.01), &[compliance]), [0.4, 2.8], 25.0);
+    // Turns at which the acceleration jumps, to a rest on which the mode rings.
+    let rubbing = with(undriven(0.02, 0.0).with_friction(0.06).expect("in range"), &[compliance]);
+    let start = [1.6, -0.1];
+    assert!(happens(&rubbing, start, 40.0, EventKind::Turn) > 4);
+    assert_eq!(happens(&rubbing, start, 40.0, EventKind::StuckForEver), 1);
+    check(rubbing, start, 40.0);
+    // Held fast now and then, and released by the drive.
+    let forced = driven(0.1, 1.5, 0.87).with_friction(0.2).expect("in range");
+    let (held, start) = (with(forced, &[compliance]), [-0.43, 1.03]);
+    assert!(happens(&held, start, 15.0, EventKind::Release) > 1);
+    check(held, start, 15.0);
+    // Released by the mode that rings on.
+    let ringing: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.3, 3.23, 0.01]);
+    let base = undriven(0.008, 0.0).with_friction(0.078).expect("in range");
+    let (shaken, start) = (with(base, &[ringing]), [0.3, 1.29]);
+    assert!(happens(&shaken, start, 40.0, EventKind::Release) > 1);
+    check(shaken, start, 40.0);
+}
+
+#[test]
+fn derivatives_hold_for_an_accelerometer_where_the_pivot_gives_way() {
+    let compliance: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.05, 5.3, 0.03]);
+    let rubbing = with(undriven(0.02, 0.0).with_friction(0.06).expect("in range"), &[compliance]);
+    let start = [1.6, -0.1];
+    let mut record = record(rubbing, None, start, 20.0);
+    let (rate, place, gravity) = (0.0, 1.0, 1.0);
+    let (bias, interval, tilt) = (0.0, 0.0, 0.1);
+    record.rod_sensor = Some(RodSensor { rate, place, gravity, bias, interval, tilt });
+    let error = worst(record, None, start);
+    assert!(error < 1e-6, "{error:e}");
+}
+
+#[test]
 fn derivatives_hold_where_a_sensor_has_play() {
     // No sample is so near where the play is taken up that a difference passes it.
     for (theta_r, until) in [(0.004, 40.0), (0.03, 60.0)] {

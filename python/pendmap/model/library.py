@@ -25,7 +25,7 @@ class EffectParameter:
         Its key in model files.
     role : str
         What it does: ``size``, ``width``, ``place``, ``power``, ``order`` (how many times in a
-        turn), ``time constant`` or ``phase``.
+        turn), ``time constant``, ``phase`` or ``mode`` (the frequency of a mode of the rig).
     unit : str
         Its unit in SI.
     power_of_w0 : float

@@ -14,10 +14,11 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
+import numpy as np
+
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.random import Generator
     from numpy.typing import NDArray
 
@@ -221,6 +222,10 @@ class Effect:
     def inertia(self, motion: Motion) -> Floats | float:
         """What the effect adds to the inertia, as a share of it, shape (L, K)."""
         return 0.0
+
+    def begin(self, motion: Motion) -> Floats:
+        """The effect's own variables where a motion begins, shape (L, K, states)."""
+        return np.zeros((*motion.theta.shape, self.states))
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
         """Time derivatives of the effect's own variables ``own``, shape (L, K, states).

@@ -166,6 +166,11 @@ class Equation:
         ]
         return acceleration, np.concatenate(parts, axis=-1)
 
+    def begin(self, m: Motion) -> Floats:
+        """Return the effects' own variables where a motion begins, shape (L, K, states)."""
+        parts = [effect.begin(m) for effect in self.effects if effect.states]
+        return np.concatenate(parts, axis=-1) if parts else np.zeros((*m.theta.shape, 0))
+
     def margins(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
         """How far a pendulum at rest is from slipping up and down, rad/s^2, shape (L, K).
 

@@ -75,7 +75,6 @@ class Lanes:
         self.time = starts.begin.astype(float)
         self.theta = starts.theta.astype(float)
         self.velocity = starts.velocity.astype(float)
-        self.own = np.zeros((count, equation.states))
         self.direction, self.side = np.sign(self.velocity), np.ones(count)
         fastest = max(equation.parameters.w0, float(np.abs(equation.drive.frequency).max()))
         self.longest = 1.0 / fastest
@@ -93,8 +92,9 @@ class Lanes:
         )
         every = np.arange(count)
         state = self.time, self.theta, self.velocity
-        load = self.motion(every, *(part[:, np.newaxis] for part in state)).load[:, 0]
-        self.side = np.where(load < 0, -1.0, 1.0)
+        motion = self.motion(every, *(part[:, np.newaxis] for part in state))
+        self.own = equation.begin(motion)[:, 0]
+        self.side = np.where(motion.load[:, 0] < 0, -1.0, 1.0)
         for lane in np.flatnonzero(self.velocity == 0).tolist():
             self.direction[lane] = self._slips(lane)
 

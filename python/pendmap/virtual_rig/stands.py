@@ -48,6 +48,14 @@ class PivotCompliance(Effect):
     def _modes(self) -> list[tuple[float, float, float]]:
         return [(self.mu, self.wx, self.z)]
 
+    def begin(self, motion: Motion) -> Floats:
+        # Pulled aside by the rod, and at rest.
+        pull = motion.sin * (motion.w0**2 * (1 + motion.vertical) * motion.cos + motion.velocity**2)
+        own = np.zeros((*motion.theta.shape, self.states))
+        for k, (mu, wx, _) in enumerate(self._modes()):
+            own[..., 2 * k] = mu * pull / wx**2
+        return own
+
     def acceleration(self, motion: Motion, own: Floats) -> Floats:
         total = np.zeros_like(motion.theta)
         for k, mode in enumerate(self._modes()):

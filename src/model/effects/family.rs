@@ -61,6 +61,7 @@ impl Kind {
             | Self::ElasticRestoring
             | Self::NaturalFrequencyDrift
             | Self::InertiaRipple
+            | Self::PivotCompliance
             | Self::RigTilt => Family::PositionTorque,
             Self::AddedMass
             | Self::DriveAmplitude

@@ -110,7 +110,8 @@ pub enum Power {
 pub enum Role {
     /// How strong the effect is: at 0 there is none.
     Size,
-    /// How far it reaches, in angle or velocity.
+    /// How far it reaches, in angle or velocity; of a mode the half width of its resonance over its
+    /// frequency.
     Width,
     /// The angle at which it acts, on either side of the rest.
     Place,
@@ -126,11 +127,13 @@ pub enum Role {
     Frequency,
     /// When it happens.
     Instant,
+    /// The frequency of a mode of the rig.
+    Mode,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Size,
         Self::Width,
         Self::Place,
@@ -140,6 +143,7 @@ impl Role {
         Self::Phase,
         Self::Frequency,
         Self::Instant,
+        Self::Mode,
     ];
 
     /// The words for it.
@@ -155,6 +159,7 @@ impl Role {
             Self::Phase => "phase",
             Self::Frequency => "frequency",
             Self::Instant => "instant",
+            Self::Mode => "mode",
         }
     }
 }
@@ -220,9 +225,29 @@ pub struct Point<R> {
     pub phase: R,
     /// The angle at which the motion last turned or began, and the effect's [`Law::kept`] there.
     pub past: [R; 2],
+    /// Displacement and momentum of the effect's [`Law::sway`].
+    pub sway: [R; 2],
 }
 
 impl<R: Real> Point<R> {
+    /// All of it 0: for what a formula has, whatever its value.
+    #[must_use]
+    pub fn nowhere(zero: R) -> Self {
+        Self {
+            theta: zero,
+            velocity: zero,
+            sense: zero,
+            side: zero,
+            sine: zero,
+            vertical: zero,
+            per_gravity: zero,
+            lab: zero,
+            phase: zero,
+            past: [zero; 2],
+            sway: [zero; 2],
+        }
+    }
+
     /// `cos theta`.
     #[inline(always)]
     #[must_use]
@@ -311,6 +336,23 @@ pub trait Law {
     #[must_use]
     fn kept<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<R> {
         None
+    }
+
+    /// The rates of displacement and momentum of a mode of the rig that moves with the pendulum; none
+    /// where there is no such mode. The formulas take both from [`Point::sway`]. One effect of a model
+    /// may have a mode, and no map can have it.
+    ///
+    /// The rates are linear in displacement and momentum, that of the displacement is the momentum and
+    /// terms without either, and none has `th''`: so nothing of the mode jumps where friction does.
+    #[inline(always)]
+    #[must_use]
+    fn sway<R: Real>(_: &[R; MOST_PARAMETERS], _: &Point<R>) -> Option<[R; 2]> {
+        None
+    }
+
+    /// The displacement of that mode where a motion begins: there it is at rest.
+    fn aside<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+        at.constant(0.0)
     }
 
     /// Changes the pivot's motion.

@@ -107,6 +107,27 @@ macro_rules! library {
                 }
             }
 
+            /// [`Law::sway`].
+            #[inline(always)]
+            pub fn sway<R: Real>(
+                self,
+                parameters: &[R; MOST_PARAMETERS],
+                at: &Point<R>,
+            ) -> Option<[R; 2]> {
+                match self {
+                    $(Self::$law => $module::$law::sway(parameters, at),)*
+                    Self::Formula(_) => None,
+                }
+            }
+
+            /// [`Law::aside`].
+            pub fn aside<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+                match self {
+                    $(Self::$law => $module::$law::aside(parameters, at),)*
+                    Self::Formula(_) => at.constant(0.0),
+                }
+            }
+
             /// [`Law::drive`].
             pub fn drive<R: Real>(self, parameters: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
                 match self {
@@ -191,6 +212,7 @@ library! {
     elastic_restoring::ElasticRestoring,
     natural_frequency_drift::NaturalFrequencyDrift,
     inertia_ripple::InertiaRipple,
+    pivot_compliance::PivotCompliance,
     added_mass::AddedMass,
     rig_tilt::RigTilt,
     drive_amplitude::DriveAmplitude,
@@ -301,19 +323,7 @@ impl Effect {
     /// Whether steps end at a corner of it.
     #[must_use]
     pub fn has_corner(&self) -> bool {
-        let nowhere = Point {
-            theta: 0.0,
-            velocity: 0.0,
-            sense: 1.0,
-            side: 1.0,
-            sine: 0.0,
-            vertical: 1.0,
-            per_gravity: 1.0,
-            lab: 0.0,
-            phase: 0.0,
-            past: [0.0; 2],
-        };
-        self.kind.switch(&self.parameters, &nowhere).is_some()
+        self.kind.switch(&self.parameters, &Point::nowhere(0.0)).is_some()
     }
 
     /// Whether it is the same for the mirrored motion, at the same phase of the drive.

@@ -416,6 +416,7 @@ fn is_odd(program: &Program, parameters: &[Parameter]) -> bool {
                 lab: 3.0,
                 phase: 1.1 - velocity,
                 past: [theta, sense],
+                sway: [0.0; 2],
             };
             let [forth, back] = [1.0, -1.0].map(|sense| program.run(&given, &at(sense)));
             (forth + back).abs() <= 1e-12 * (forth.abs() + back.abs())

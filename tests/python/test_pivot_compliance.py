@@ -1,0 +1,121 @@
+"""A pivot that gives way sideways, against an integrator and a virtual rig that are not its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from pendmap import InputError
+from pendmap.virtual_rig.drive import Drive
+from pendmap.virtual_rig.equation import Equation, Parameters
+from pendmap.virtual_rig.integrator import Starts, integrate
+from pendmap.virtual_rig.stands import PivotCompliance
+
+if TYPE_CHECKING:
+    from pendmap.virtual_rig.path import Path
+
+W0 = 6.2
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A pendulum on a pivot that gives way, SI, and a start."""
+
+    theta: float
+    velocity: float
+    mu: float = 0.05
+    wx: float = 40.0
+    z: float = 0.02
+    c: float = 0.05
+    friction: float = 0.0
+    drive: tuple[float, float] = (0.0, 1.0)
+
+    def simulated(self, until: float) -> pendmap.Trajectory:
+        """The library's motion, in its own units."""
+        values = {"mu": self.mu, "wx": self.wx / W0, "z": self.z}
+        model = pendmap.Pendulum(
+            gamma=self.c / W0,
+            theta_r=self.friction / W0**2,
+            p=self.drive[0],
+            omega=self.drive[1] / W0,
+            effects=(pendmap.Effect("pivot_compliance", values),),
+        )
+        return pendmap.simulate(model, self.theta, self.velocity / W0, until * W0, tol=1e-12)
+
+    def rig(self, until: float) -> Path:
+        """The virtual rig's motion."""
+        arrays = (np.array([x]) for x in (*self.drive, 0.0))
+        effect = PivotCompliance(mu=self.mu, wx=self.wx, z=self.z)
+        parameters = Parameters(W0, self.c, self.friction)
+        equation = Equation(parameters, Drive.harmonic(*arrays), np.zeros(1), [effect])
+        begin, theta = np.zeros(1), np.array([self.theta])
+        starts = Starts(np.array([0]), begin, begin + until, theta, np.array([self.velocity]))
+        (path,) = integrate(equation, starts)
+        return path
+
+
+CASES = {
+    "whirling": (Case(0.5, 21.0, wx=60.0), set()),
+    "swinging": (Case(2.8, 0.0, c=0.1), {"turn"}),
+    "rubbing to a rest": (Case(2.5, 0.0, friction=3.5), {"turn", "stick"}),
+    "driven, with sticks": (
+        Case(1.2, 0.0, mu=0.1, friction=4.0, drive=(0.9, 5.4)),
+        {"turn", "stick", "release"},
+    ),
+    "released by the mode": (
+        Case(0.3, 8.0, mu=0.3, wx=20.0, z=0.01, friction=3.0),
+        {"turn", "stick", "release"},
+    ),
+    "a mode that creeps back": (Case(2.0, 5.0, z=1.6, friction=3.5), {"turn", "stick"}),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_pivot_that_gives_way_is_that_of_the_virtual_rig(name: str) -> None:
+    case, events = CASES[name]
+    until = 10.0
+    found, path = case.simulated(until), case.rig(until)
+    assert {event.what for event in path.events} >= events
+    time = found.time.values / W0
+    assert found.theta.values == pytest.approx(path.angle(time), abs=1e-8)
+    assert found.velocity.values * W0 == pytest.approx(path.velocity(time), abs=1e-7)
+
+
+@pytest.mark.parametrize(("theta", "velocity"), [(0.5, 11.0), (2.0, 0.0), (0.1, 21.0)])
+def test_a_pivot_that_gives_way_is_that_of_its_lagrangian(theta: float, velocity: float) -> None:
+    case = Case(theta, velocity, wx=30.0, c=0.1)
+
+    def rate(_: float, y: np.ndarray) -> list[float]:
+        th, v, x, u = y
+        matrix = np.array([[1.0, math.cos(th)], [case.mu * math.cos(th), 1.0]])
+        pull = case.mu * v**2 * math.sin(th) - 2 * case.z * case.wx * u - case.wx**2 * x
+        a, b = np.linalg.solve(matrix, [-case.c * v - W0**2 * math.sin(th), pull])
+        return [v, a, u, b]
+
+    # The rod has pulled the pivot aside.
+    pull = math.sin(theta) * (W0**2 * math.cos(theta) + velocity**2)
+    begin = [theta, velocity, case.mu * pull / case.wx**2, 0]
+    other = solve_ivp(rate, (0, 4), begin, "DOP853", rtol=1e-12, atol=1e-13)
+    found = case.simulated(4.0)
+    assert float(found.theta[-1]) == pytest.approx(other.y[0, -1], abs=1e-8)
+    assert float(found.velocity[-1]) * W0 == pytest.approx(other.y[1, -1], abs=1e-7)
+
+
+def test_a_stiff_pivot_is_a_fixed_one() -> None:
+    stiff = Case(2.8, 0.0, wx=1240.0, z=0.5).simulated(5.0)
+    fixed = pendmap.simulate(pendmap.Pendulum(gamma=0.05 / W0, p=0.0), 2.8, 0.0, 5 * W0, tol=1e-12)
+    assert float(stiff.theta[-1]) == pytest.approx(float(fixed.theta[-1]), abs=1e-5)
+
+
+def test_maps_refuse_it() -> None:
+    values = {"mu": 0.05, "wx": 6.0, "z": 0.02}
+    effect = pendmap.Effect("pivot_compliance", values)
+    model = pendmap.Pendulum(p=0.6, effects=(effect,))
+    with pytest.raises(InputError, match="not in maps: its sideways mode has a motion of its own"):
+        pendmap.basins(model, pendmap.Grid.square(4))
