@@ -57,9 +57,8 @@ def difficulty(
         # From the noisy fit: what is measured is the effect, not how well a start is found.
         windows = _windows_at(evidence, base)
         begin = fitted(evidence, base.fit.model, base.free, start=base.start, windows=windows)
-        if not begin.fit.converged or len(case.effects) > 1:
-            # What the other effect of a pair did to the windows may lead astray.
-            begin = min((begin, baseline(evidence)[0]), key=lambda trial: trial.chi2)
+        # What disturbances or the other effect of a pair did to the windows may lead astray.
+        begin = min((begin, baseline(evidence)[0]), key=lambda trial: trial.chi2)
         gains.append(begin.chi2)
         own = effect.split(":")[0]
         reached, own_equals = _impostors(evidence, begin, own, without)
