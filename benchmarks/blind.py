@@ -7,9 +7,11 @@ in a quarter the true effect is withheld from the search, with all that these re
 from it. ``--forms`` and ``--nuisances`` add experiments whose form differs from the library's, and
 spoilt ones, which are scored apart. ``--mess`` adds experiments with disturbances that no effect
 has, half to ten times as strong as the noise, three in four of them with one main effect that does
-to the readings what they do or more. The seed is drawn and recorded; results are appended, and a
-run that was ended goes on where it stood. ``--report`` only prints what a file holds, and
-``--plot`` draws how far probabilities can be believed.
+to the readings what they do or more. ``--layouts`` adds experiments of laboratories
+that record less: one forced run, a single decay, 10 to 500 readings a second, 10 to 140 s. The seed
+is drawn and recorded; results are appended, and a run that was ended goes on where it stood.
+``--report`` only prints what a file holds, and ``--plot`` draws how far probabilities can be
+believed.
 """
 
 from __future__ import annotations
@@ -40,15 +42,19 @@ KINDS += ["none", "one", "none", "one", "withheld", "none", "one", "none", "two"
 """In turn, so that any part of a run has all of them."""
 
 
-def drawn(
-    count: int, seed: int, forms: int = 0, nuisances: int = 0, mess: int = 0
-) -> list[blind_cases.Case]:
-    """Draw the cases, each from a seed of its own: more of them change none."""
+FURTHER = ("form", "nuisance", "mess", "layout")
+"""Experiments that are scored apart, in the order of their streams of random numbers."""
+
+
+def drawn(count: int, seed: int, **further: int) -> list[blind_cases.Case]:
+    """Draw the cases, so many of each kind in ``FURTHER`` among them.
+
+    Each has a seed of its own: more of them change none.
+    """
     kinds = [KINDS[k % len(KINDS)] for k in range(count)]
     cases = []
-    for stream, (what, number) in enumerate(
-        (("", count), ("form", forms), ("nuisance", nuisances), ("mess", mess))
-    ):
+    for stream, what in enumerate(("", *FURTHER)):
+        number = further.get(what, 0) if what else count
         for k in range(number):
             rng = np.random.default_rng((seed, stream, k))
             cases.append(blind_cases.draw(what or kinds[k], rng))
@@ -72,6 +78,7 @@ def main() -> None:
     parser.add_argument("--forms", type=int, default=0)
     parser.add_argument("--nuisances", type=int, default=0)
     parser.add_argument("--mess", type=int, default=0)
+    parser.add_argument("--layouts", type=int, default=0)
     parser.add_argument("--seed", type=int, default=None, help="drawn if none is given")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("blind.jsonl"))
@@ -83,7 +90,13 @@ def main() -> None:
     seed = drawn_before if given.seed is None else given.seed
     if not given.report:
         known = {_key(row) for row in rows}
-        cases = drawn(given.experiments, seed, given.forms, given.nuisances, given.mess)
+        further = {
+            "form": given.forms,
+            "nuisance": given.nuisances,
+            "mess": given.mess,
+            "layout": given.layouts,
+        }
+        cases = drawn(given.experiments, seed, **further)
         left = [case for case in cases if _key(dataclasses.asdict(case)) not in known]
         with (
             ProcessPoolExecutor(given.workers) as pool,
@@ -101,6 +114,9 @@ def main() -> None:
     say(f"seed      {seed}; {len(rows)} experiments, {len(failed)} refused; all in {given.out}\n")
     say(table(["figure", "target", "measured"], blind_report.figures(good)))
     say("")
+    if layouts := blind_report.layouts(good):
+        say(table(["layout", "false alarms", "right", "wrong without reserve"], layouts))
+        say("")
     say(table(["probability", "names", "mean", "right"], blind_report.reliability(good)))
     say("")
     say(table(["hidden, G >= 60", "said", "times"], blind_report.confusion(good)))

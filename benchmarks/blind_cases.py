@@ -18,6 +18,20 @@ if TYPE_CHECKING:
     from pendmap.records import Experiment
 
 KINDS = {"mixed": (5, 4), "free": (5, 0), "single": (1, 0)}
+"""Free and forced runs."""
+
+LAYOUTS = {
+    "one forced run among free ones": (5, 1),
+    "only free runs held out": (5, 4),
+    "single decay": (1, 0),
+    "three free runs": (3, 0),
+}
+"""The same of laboratories that record less."""
+
+RATES = (10.0, 25.0, 50.0, 100.0, 200.0, 500.0)
+LENGTHS = (10.0, 140.0)
+"""Readings a second, and seconds, in these."""
+
 SAMPLES = (100.0, 100.0, 100.0, 200.0, 500.0)
 COUNTS = (1024, 2048, 4096, 8192)
 BASE = ("viscous_damping", "coulomb_friction")
@@ -59,35 +73,17 @@ class Case:
     outliers: float = 0.0
     jitter: float = 0.0
     mess: float = 0.0
+    duration: float | None = None
 
 
 def draw(what: str, rng: np.random.Generator) -> Case:
-    """Draw a case: ``none``, ``one``, ``two``, ``withheld``, ``form``, ``nuisance`` or ``mess``."""
+    """Draw a case: ``none``, ``one``, ``two``, ``withheld``, or what is scored apart."""
     kind = str(rng.choice(list(KINDS), p=(0.6, 0.25, 0.15)))
+    if what == "layout":
+        kind = str(rng.choice(list(LAYOUTS)))
     counts = int(rng.choice(COUNTS))
     noise = max(float(np.exp(rng.uniform(math.log(0.05), math.log(0.5)))), 0.3 * 360 / counts)
-    known = {e["name"]: e for e in virtual_rig.describe()}
-    usable = [n for n in library() if n in known and n not in BASE]
-    if kind == "single":
-        usable = [n for n in usable if n not in AGEING]
-    if kind != "mixed":
-        usable = [n for n in usable if library()[n]["group"] != "drive" and not known[n]["needs"]]
-    effects: tuple[str, ...] = ("none",)
-    if what in {"one", "nuisance"} and (what == "one" or rng.random() < 0.5):  # noqa: PLR2004
-        effects = (str(rng.choice(usable)),)
-    elif what == "mess":
-        effects = (str(rng.choice(usable)),) if rng.random() < MAIN else ("none",)
-    elif what == "two":
-        effects = tuple(str(e) for e in rng.choice(usable, 2, replace=False))
-    elif what == "withheld":
-        foreign = [n for n in known if n in FOREIGN or (":" not in n and n not in library())]
-        foreign = [n for n in foreign if kind != "single" or n not in FOREIGN]
-        foreign = [n for n in foreign if kind == "mixed" or not known[n]["needs"]]
-        name = str(rng.choice(foreign if rng.random() < 0.5 else usable))  # noqa: PLR2004
-        effects = (name,)
-    elif what == "form":
-        variants = [n for n in known if ":" in n and n.split(":")[0] in library()]
-        effects = (str(rng.choice([n for n in variants if n not in FOREIGN])),)
+    effects = _effects(what, kind, rng)
     size = (
         1.0 if effects == ("none",) else float(np.exp(rng.uniform(math.log(0.08), math.log(1.2))))
     )
@@ -103,15 +99,50 @@ def draw(what: str, rng: np.random.Generator) -> Case:
     )
     if what == "mess":
         return dataclasses.replace(case, mess=float(np.exp(rng.uniform(*np.log(MESS)))))
+    if what == "layout":
+        duration = float(np.exp(rng.uniform(*np.log(LENGTHS))))
+        return dataclasses.replace(case, rate=float(rng.choice(RATES)), duration=duration)
     if what != "nuisance":
         return case
     name = list(SPOILT)[int(rng.integers(len(SPOILT)))]
     return dataclasses.replace(case, **{name: SPOILT[name]})
 
 
+def _effects(what: str, kind: str, rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw what is hidden."""
+    free, forced = runs_of(kind)
+    known = {e["name"]: e for e in virtual_rig.describe()}
+    usable = [n for n in library() if n in known and n not in BASE]
+    if free == 1:
+        usable = [n for n in usable if n not in AGEING]
+    if forced == 0:
+        usable = [n for n in usable if library()[n]["group"] != "drive" and not known[n]["needs"]]
+    if what == "one" or (what == "nuisance" and rng.random() < 0.5):  # noqa: PLR2004
+        return (str(rng.choice(usable)),)
+    if what in {"mess", "layout"} and rng.random() < MAIN:
+        return (str(rng.choice(usable)),)
+    if what == "two":
+        return tuple(str(e) for e in rng.choice(usable, 2, replace=False))
+    if what == "withheld":
+        foreign = [n for n in known if n in FOREIGN or (":" not in n and n not in library())]
+        foreign = [n for n in foreign if free > 1 or n not in FOREIGN]
+        foreign = [n for n in foreign if forced or not known[n]["needs"]]
+        among = foreign if foreign and rng.random() < 0.5 else usable  # noqa: PLR2004
+        return (str(rng.choice(among)),)
+    if what == "form":
+        variants = [n for n in known if ":" in n and n.split(":")[0] in library()]
+        return (str(rng.choice([n for n in variants if n not in FOREIGN])),)
+    return ("none",)
+
+
+def runs_of(kind: str) -> tuple[int, int]:
+    """Return the free and the forced runs of a kind of experiment."""
+    return (KINDS | LAYOUTS)[kind]
+
+
 def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment, float]:
     """Write and read a case's experiment; return it with the noise's standard deviation, rad."""
-    free, forced = KINDS[case.kind]
+    free, forced = runs_of(case.kind)
     request = virtual_rig.Request(
         "hidden",
         seed=case.seed,
@@ -122,6 +153,7 @@ def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment
         noise=0.0 if clean else case.noise,
         counts=0 if clean else case.counts,
         rate=case.rate,
+        duration=case.duration,
         correlation=0.0 if clean else case.correlation,
         dropouts=0.0 if clean else case.dropouts,
         outliers=0.0 if clean else case.outliers,
@@ -131,4 +163,12 @@ def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment
     where = virtual_rig.places(folder / ("clean" if clean else "noisy"), replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
     count = math.tau / case.counts / math.sqrt(12)
-    return read_experiment(where.experiment), math.hypot(math.radians(case.noise), count)
+    experiment = read_experiment(where.experiment)
+    if case.kind == "only free runs held out":
+        seen = [k for k, run in enumerate(experiment.runs) if run.kind == "free"]
+        runs = tuple(
+            dataclasses.replace(run, hold_out=k in seen[1:3])
+            for k, run in enumerate(experiment.runs)
+        )
+        experiment = dataclasses.replace(experiment, runs=runs)
+    return experiment, math.hypot(math.radians(case.noise), count)

@@ -208,6 +208,25 @@ def figures(rows: list[Row]) -> list[list[str]]:
     ]
 
 
+def layouts(rows: Iterable[Row]) -> list[list[str]]:
+    """Return by layout: false alarms, names that are right, and names that cannot be."""
+    own = [row for row in rows if row["what"] == "layout"]
+    lines = []
+    for layout in dict.fromkeys(row["kind"] for row in own):
+        those = [row for row in own if row["kind"] == layout]
+        none = [r for r in those if not true_names(r)]
+        seen = [r for r in those if strength(r) >= STRONG and r["s"] * strength(r) >= CLEAR]
+        lines.append(
+            [
+                layout,
+                wilson(sum(r["verdict"] != "none" for r in none), len(none)),
+                wilson(sum(map(right, seen)), len(seen)),
+                wilson(sum(map(another, those)), len(those)),
+            ]
+        )
+    return lines
+
+
 def first(row: Row) -> bool:
     """Whether the first effect that is claimed is the main one, by its name or in its class."""
     return bool(row["named"]) and bool(classes(row)[0] & {*row["equals"], *true_names(row)})

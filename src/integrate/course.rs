@@ -16,6 +16,9 @@ use crate::model::{Equation, Pendulum};
 /// and motions smaller than the tolerance keep seven digits of their own, so that their turns are
 /// turns. It falls with the tolerance all along, so that tightening always tells.
 const LONGEST_STEP: (f64, f64) = (1.6, 1.0 / 14.0);
+/// What of a mode's rate counts for the longest step: it moves little beside the pendulum, and each
+/// step's error covers it.
+const MODE: f64 = 0.25;
 /// The smallest error of a step that rounding allows to be estimated.
 pub const FINEST: f64 = 1e-15;
 /// Angles, and times of a drive's period, at which the rate is looked for.
@@ -356,7 +359,7 @@ pub fn greatest_rate(pendulum: &Pendulum) -> f64 {
         }
     }
     let drive = if pendulum.is_autonomous() { 0.0 } else { pendulum.motion().omega };
-    let own = if equation.sways() { rate_of_mode(pendulum) } else { 0.0 };
+    let own = if equation.sways() { MODE * rate_of_mode(pendulum) } else { 0.0 };
     stiffness.sqrt().max(damping).max(drive).max(own)
 }
 

@@ -39,9 +39,9 @@ impl Law for PivotCompliance {
                 role: Role::Mode,
                 unit: "rad/s",
                 power: Power::Of(1),
-                range: [1.0, f64::INFINITY],
-                typical: [5.0, 20.0],
-                meaning: "angular frequency of the pivot's mode",
+                range: [1.0, 30.0],
+                typical: [4.0, 16.0],
+                meaning: "angular frequency of the pivot's mode; beyond 30 w0 the pivot is as good as fixed",
             },
             Parameter {
                 name: "z",
