@@ -95,7 +95,7 @@ fn equal_steps(count: usize) -> [f64; 2] {
     let (mut state, mut between) = (start, 0_f64);
     for k in 0..count {
         let tau = k as f64 * length;
-        let first = course.acceleration(tau, state, [1.0; 2], course.begin(state));
+        let first = course.acceleration(tau, state, [1.0; 2], course.begin(tau, state));
         let mut leap = Leap::new(course.field(), tau, state, first, [1.0; 2], length);
         let middle = tau + 0.37 * length;
         between = between.max(distance(leap.curve(course.field()).at(middle), exact(middle)));
