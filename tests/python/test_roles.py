@@ -27,7 +27,7 @@ SHAPES = {
     "impulses": {"t0": "instant"},
     "inertia_ripple": {"n": "order"},
     "magnet": {"width": "width"},
-    "pivot_compliance": {"wx": "mode", "z": "width"},
+    "pivot_compliance": {"wx": "mode", "z": "mode"},
     "power_law_drag": {"n": "power"},
     "rough_spot": {"th0": "place", "w": "width"},
     "stribeck_friction": {"vs": "width"},

@@ -52,6 +52,9 @@ SOUGHT: Final = 1000
 """The same of a frequency or an instant, each of which chance may hit; residuals say which of them
 are scored."""
 
+MODES: Final = 3
+"""The same of a mode of the rig, whose short steps cost the most."""
+
 PLACES: Final = 9
 """The same of a place on the circle, in equal steps."""
 
@@ -268,6 +271,6 @@ def _scan(entry: Mapping[str, Any]) -> NDArray[np.float64]:
     if entry["role"] in {"frequency", "instant"}:
         return np.linspace(low, high, SOUGHT)
     if low > 0:
-        return np.geomspace(low, high, SCANNED)
+        return np.geomspace(low, high, MODES if entry["role"] == "mode" else SCANNED)
     width = (high - low) / SCANNED
     return np.linspace(low + 0.5 * width, high - 0.5 * width, SCANNED)

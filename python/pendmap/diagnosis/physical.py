@@ -90,9 +90,7 @@ def _limits(
         return _end(evidence) - _span(evidence), _end(evidence)
     if entry["role"] == "width":
         low, high = entry["typical"]
-        unit = (
-            trial.fit.estimates[f"{candidate.name}.{name}"].value / trial.shape_of(candidate)[name]
-        )
+        unit = model.w0 ** entry["power_of_w0"]
         return low / STRETCH * unit, high * STRETCH * unit
     return -math.inf, math.inf
 

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["located"]
 
-KEPT: Final = 6
-"""Frequencies, or instants, that are kept: as many as other shapes are scored."""
+KEPT: Final = 4
+"""Frequencies, or instants, that are kept."""
 
 FINE: Final = 4
 """Frequencies looked at in one over the time that the records span."""

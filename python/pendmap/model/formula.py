@@ -62,8 +62,9 @@ class Formula:
         - ``power``: its value in SI is the one without dimensions times this power of ``w0``; or
           ``"2 - n"``, with another parameter ``n``;
         - ``role``: what it does: ``size``, ``width``, ``place``, ``power``, ``order`` (how many
-          times in a turn, a whole number), ``time constant``, ``phase`` or ``mode`` (the frequency
-          of a mode of the rig); by default as the term and the power of ``w0`` show it;
+          times in a turn, a whole number), ``time constant``, ``phase``, ``frequency``,
+          ``instant`` (when it happens) or ``mode`` (frequency or damping ratio of a mode of the
+          rig); by default as the term and the power of ``w0`` show it;
         - ``typical``: the smallest and the largest value of interest, without dimensions, where a
           search looks; by default 1e-4 and 0.3;
         - ``range``: the least and the greatest value allowed, without dimensions; by default any;

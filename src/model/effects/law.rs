@@ -110,8 +110,7 @@ pub enum Power {
 pub enum Role {
     /// How strong the effect is: at 0 there is none.
     Size,
-    /// How far it reaches, in angle or velocity; of a mode the half width of its resonance over its
-    /// frequency.
+    /// How far it reaches, in angle or velocity.
     Width,
     /// The angle at which it acts, on either side of the rest.
     Place,
@@ -127,7 +126,7 @@ pub enum Role {
     Frequency,
     /// When it happens.
     Instant,
-    /// The frequency of a mode of the rig.
+    /// The frequency of a mode of the rig, or its damping ratio.
     Mode,
 }
 

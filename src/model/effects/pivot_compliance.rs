@@ -45,7 +45,7 @@ impl Law for PivotCompliance {
             },
             Parameter {
                 name: "z",
-                role: Role::Width,
+                role: Role::Mode,
                 unit: "1",
                 power: Power::Of(0),
                 range: [0.0, f64::INFINITY],

@@ -147,7 +147,8 @@ def tightened(evidence: Evidence, found: Found, level: float, reasons: Reasons) 
     w0 = found.trial.fit.model.w0
     ahead = Prospects(evidence, found, menu_of(evidence, w0), (), reasons)
     shared = ahead.now.shared
-    sizes = [c.free[0] for c in found.trial.chosen if c.free[0] in shared]
+    # What happens once is not met again.
+    sizes = [c.free[0] for c in found.trial.chosen if c.free[0] in shared and not c.once]
     if not sizes:
         return None
     every = range(len(shared))
