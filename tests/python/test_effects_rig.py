@@ -17,6 +17,7 @@ from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import Candidate, placed
 from pendmap.diagnosis.data import Evidence, evidence_of
 from pendmap.diagnosis.fitted_model import fitted
+from pendmap.model.effects import definition, is_shape
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
@@ -202,8 +203,11 @@ OTHERS = [
 def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path) -> None:
     evidence, truth = clean(tmp_path, name)
     base, _ = baseline(evidence)
-    size, *shape = truth
-    unit = Candidate(name, {n: truth[n] for n in shape if n != "psi"})
+    size, *_ = truth
+    w0 = base.fit.model.w0
+    entries = [e for e in definition(name)["parameters"] if is_shape(e)]
+    shape = {e["name"]: truth[e["name"]] / w0 ** e["power_of_w0"] for e in entries}
+    unit = Candidate(name, shape)
     start = base.start | {f"{name}.{size}": 0.5 * truth[size]}
     if unit.phase is not None:
         start[f"{name}.{unit.phase}"] = truth[unit.phase]
@@ -248,7 +252,8 @@ def test_the_mode_of_a_pivot_is_found_within_its_errors(tmp_path: Path) -> None:
     )
     noisy = dataclasses.replace(evidence, fitted=runs)
     base, _ = baseline(noisy)
-    unit = Candidate("pivot_compliance", {"wx": truth["wx"], "z": truth["z"]})
+    wx = truth["wx"] / base.fit.model.w0
+    unit = Candidate("pivot_compliance", {"wx": wx, "z": truth["z"]})
     near = {"mu": 0.5, "wx": 0.95, "z": 0.5}
     start = {f"pivot_compliance.{n}": part * truth[n] for n, part in near.items()}
     model, free = placed(base.fit.model, [unit]), [*base.free, *unit.free, *unit.adapted]

@@ -130,11 +130,12 @@ def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
             reached = (rest.chi2 - fit.chi2) / level
         likeness = scores.likeness(own, k)
         more = score.candidate.count > candidate.count
-        behind = gain - reached + score.candidate.looks - candidate.looks
+        chosen = score.candidate.looks - candidate.looks
+        behind = gain - reached + chosen
         contains = more and likeness > CONTAINS and behind > -state.thresholds.alike
         alike = behind < state.thresholds.alike
         if fit is not None and not alike and not candidate.once:
-            alike = _of_one_part(best, fit)
+            alike = _of_one_part(best, fit, chosen * level)
         rivals.append(
             Rival(
                 score.candidate,
@@ -151,10 +152,13 @@ def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
     return Standing(candidate, gain, state.closed(rest, best), tuple(rivals))
 
 
-def _of_one_part(best: Trial, other: Trial) -> bool:
-    """Whether a model is better than another by one run alone, or by a third of a single one."""
+def _of_one_part(best: Trial, other: Trial, chosen: float) -> bool:
+    """Whether a model is better than another by one run alone, or by a third of a single one.
+
+    ``chosen`` is what the other one gains by a choice among many values.
+    """
     behind = _by_part(other) - _by_part(best)
-    return bool(behind.sum() - behind.max() < 0)
+    return bool(behind.sum() - behind.max() + chosen < 0)
 
 
 def _by_part(trial: Trial) -> np.ndarray:
