@@ -44,6 +44,7 @@ def _following(state: State, best: Trial) -> Trial | None:
                 other is not None
                 and other.chi2 < best.chi2 - state.thresholds.alike * best.level
                 and state.cost(other) < state.cost(best)
+                and state.gains(rest, other)
                 and state.holds(best, other)
             ):
                 return other

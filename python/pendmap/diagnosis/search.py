@@ -8,8 +8,8 @@
    pairs; at first also at the models without one of the core's effects.
 4. The best few are fitted with all other parameters, within physics.
 5. The cheapest, by its sum of squares and Schwarz's penalty, is accepted if noise hardly gains as
-   much, if it closes its share of a gap that it does not close whole, and if it loses on no
-   held-out set.
+   much, if it closes its share of a gap that it does not close whole (with a frequency or an
+   instant all of it), and if it loses on no held-out set.
 6. Accepted effects are dropped where they gain too little beside the others, and replaced by what
    fits better; of fits that the records do not tell apart the simplest and commonest stands.
 7. Steps 2 to 6 are repeated until nothing is accepted.

@@ -273,11 +273,17 @@ class State:
         return min(chance * sum(map(len, self._pool(rest))), 1.0)
 
     def gains(self, rest: Trial, full: Trial) -> bool:
-        """Whether further effects gain more than chance, and close what they must."""
+        """Whether further effects gain more than chance, and close what they must.
+
+        Away from the noise a frequency or an instant of a thousand fits part of anything: an effect
+        that has one closes the whole gap or none.
+        """
         if self.chance(rest, full) >= self.thresholds.chance:
             return False
         if full.remainder.chance >= self.thresholds.rest:
             return True
+        if any(c.sought and c.name not in rest.names for c in full.chosen):
+            return False
         return self.closed(rest, full) >= self.thresholds.closes
 
     @staticmethod

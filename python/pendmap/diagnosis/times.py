@@ -125,6 +125,9 @@ def _frequencies(responses: Sequence[_Response], most: float) -> list[float]:
         pull += turn * np.interp(omega, coarse, products[0])
         square += turn**2 * np.interp(omega, coarse, np.mean(products[1:] ** 2, axis=0))
         both += np.interp(omega, coarse, np.mean(np.abs(products[1:]) ** 2, axis=0))
+    # Motions that part from each other make squares beyond all numbers.
+    unit = max(float(both.real.max()), 1e-300)
+    pull, square, both = pull / math.sqrt(unit), square / unit, both / unit
     score = both.real * np.abs(pull) ** 2 - (square.conj() * pull**2).real
     score /= np.maximum(both.real**2 - np.abs(square) ** 2, 1e-300)
     peaks = np.flatnonzero((score[1:-1] > score[:-2]) & (score[1:-1] >= score[2:])) + 1
