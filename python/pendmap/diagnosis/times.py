@@ -36,6 +36,9 @@ KEPT: Final = 4
 FINE: Final = 4
 """Frequencies looked at in one over the time that the records span."""
 
+MOST: Final = 1 << 18
+"""Frequencies looked at, however long the records span."""
+
 GROWTH: Final = 30.0
 """Growth of a change of the start, over the least of all windows, up to which a window is calm."""
 
@@ -65,8 +68,10 @@ def located(
     model : Rig
         The model.
     """
-    found = []
+    found: list[list[Candidate]] = []
     responses = _calm(list(_responses(evidence, windows, model.c_over_m))) if pool else []
+    if not responses:
+        return found
     for one, *_ in pool:
         scanned = one.sought or {}
         unit = model.w0 ** scanned["power_of_w0"]
@@ -82,6 +87,8 @@ def _calm(responses: list[_Response]) -> list[_Response]:
 
     What a torque does where motions part is great, and to first order wrong.
     """
+    if not responses:
+        return []
     growth = np.array([np.abs(own.states / own.weight[:, None]).max() for own in responses])
     return [own for own, by in zip(responses, growth, strict=True) if by <= GROWTH * growth.min()]
 
@@ -111,8 +118,12 @@ def _frequencies(responses: Sequence[_Response], most: float) -> list[float]:
     spacing = 0.5 * np.pi / most
     size = 1 << math.ceil(math.log2(FINE * (longest / spacing + 2)))
     coarse = 2 * np.pi * np.fft.rfftfreq(size, spacing)
+    count = min(int(FINE * most * span / (2 * np.pi)), MOST)
+    omega = most * np.arange(1, count + 1) / max(count, 1)
     # A frequency of less than one in the records is a constant torque or a drift.
-    omega = 2 * np.pi * np.arange(FINE, int(FINE * most * span / (2 * np.pi))) / (FINE * span)
+    omega = omega[omega >= 2 * np.pi / span]
+    if omega.size < 3:  # noqa: PLR2004 (no peak)
+        return []
     rng = np.random.default_rng(0)
     pull, square, both = (np.zeros(omega.size, complex) for _ in range(3))
     for own in responses:
