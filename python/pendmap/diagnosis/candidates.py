@@ -127,9 +127,14 @@ class Candidate:
         return next((e for e in entries if e["role"] in {"frequency", "instant"}), None)
 
     @property
+    def choices(self) -> int:
+        """Among how many values residuals choose its frequency or instant; 1 without one."""
+        return SOUGHT if self.sought else 1
+
+    @property
     def looks(self) -> float:
-        """Twice the logarithm of the values among which residuals choose one: what chance gains."""
-        return 2 * math.log(SOUGHT) if self.sought else 0.0
+        """Twice the logarithm of the choices: what chance gains by them."""
+        return 2 * math.log(self.choices)
 
     @property
     def once(self) -> bool:

@@ -216,13 +216,13 @@ def form_of(
         Chances that noise alone leaves as much of all else that was looked at.
     """
     shapes = Counter(score.candidate.name for score in scores.scores)
-    best = scores.best()
-    tails = {
-        scores.scores[k].candidate.name: shapes[scores.scores[k].candidate.name]
-        * chance_of(scores.scores[k].gain, len(scores.columns[k]))
-        for k in best
-        if scores.scores[k].gain > 0
-    }
+    tails = {}
+    for k in scores.best():
+        score = scores.scores[k]
+        name = score.candidate.name
+        if score.gain > 0:
+            looks = max(shapes[name], score.candidate.choices)
+            tails[name] = looks * chance_of(score.gain, len(scores.columns[k]))
     further = min(tails, key=lambda name: tails[name], default=None)
     effects = 1.0 if further is None else min(tails[further] * len(tails), 1.0)
     return Form({"effects": effects, **others}, further)
