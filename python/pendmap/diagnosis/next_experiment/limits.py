@@ -70,7 +70,7 @@ def detection_limits(
         candidate = score.candidate
         if candidate.name in found:
             continue
-        wanted = needed(_threshold(candidate, len(scores.scores)), len(candidate.free))
+        wanted = needed(_threshold(candidate, scores.looks), len(candidate.free))
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         if size > HUGE * _greatest(candidate, units):
