@@ -26,7 +26,7 @@ LAYOUTS = {
     "single decay": (1, 0),
     "three free runs": (3, 0),
 }
-"""The same of laboratories that record less."""
+"""Free and forced runs of laboratories that record less."""
 
 RATES = (10.0, 25.0, 50.0, 100.0, 200.0, 500.0)
 LENGTHS = (10.0, 140.0)

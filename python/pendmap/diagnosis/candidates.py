@@ -49,14 +49,14 @@ greatest in equal ratios: neighbouring shapes are then alike to a few percent. W
 too there are no ratios: the middles of as many equal parts."""
 
 SOUGHT: Final = 1000
-"""The same of a frequency or an instant, each of which chance may hit; residuals say which of them
-are scored."""
+"""Values of a frequency or an instant among which the residuals choose those that are scored.
+Chance may hit each of them."""
 
 MODES: Final = 3
-"""The same of a mode of the rig, whose short steps cost the most."""
+"""Values of a mode's frequency at which a candidate is scored. A fast mode needs short steps."""
 
 PLACES: Final = 9
-"""The same of a place on the circle, in equal steps."""
+"""Places on the circle at which a candidate is scored, in equal steps."""
 
 FAINT: Final = 1e-12
 """A size without dimensions at which an effect with a phase is scored: at 0 the phase would do

@@ -43,7 +43,7 @@ GROWTH: Final = 30.0
 """Growth of a change of the start, over the least of all windows, up to which a window is calm."""
 
 LOOKED_AT: Final = 4
-"""So many times as many are looked at once more."""
+"""The best ``LOOKED_AT * KEPT`` frequencies get an exact gain, without draws of noise."""
 
 DRAWS: Final = 32
 """Draws of noise that say what it makes of the products at each frequency."""

@@ -5,7 +5,7 @@ use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 impl Equation<f64> {
-    /// The same over numbers in the shape of `number`.
+    /// The equation over numbers in the shape of `number`.
     #[inline(always)]
     #[must_use]
     pub fn map<R: Real>(&self, number: R) -> Equation<R> {
