@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from blind_cases import SOUND, Case, record
 from blind_difficulty import difficulty, disturbance
 from pendmap import virtual_rig
+from pendmap.comparison.data import evidence_of
 from pendmap.diagnosis import diagnose
 from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.data import evidence_of
 from pendmap.errors import InputError
 from pendmap.model.effects import library
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blind_cases import record
+from pendmap.comparison.data import Evidence, evidence_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
-from pendmap.diagnosis.data import Evidence, evidence_of
 from pendmap.diagnosis.fitted_model import fitted
 from pendmap.diagnosis.refit import refitted
 from pendmap.diagnosis.scores import scores_of

@@ -21,6 +21,8 @@ const WIDEST: usize = 16;
 /// up. Ten in a unit of time are common.
 const MOST_STEPS: usize = 1000;
 const MOST_STEPS_A_TIME: f64 = 50.0;
+/// The quickest rate of a mode that a motion is followed with.
+const QUICKEST: f64 = 10.0;
 /// The free parameters of a reading, angle and velocity.
 const READINGS: usize = MOST_READINGS + 2;
 
@@ -151,7 +153,8 @@ impl Follow<'_> {
         }
         let times = &record.times[self.window.from..self.window.to];
         // A mode of the rig asks for steps of its own, however slow the rest.
-        let rate = if course.field().sways() { *rate } else { pendulum.motion().omega.max(1.0) };
+        let rate = if course.field().sways() { rate.min(QUICKEST) } else { 1.0 };
+        let rate = rate.max(pendulum.motion().omega);
         let most =
             MOST_STEPS + (MOST_STEPS_A_TIME * rate * (times[times.len() - 1] - times[0])) as usize;
         let begin = |of: usize| along(self.window.start[of], motion.len() + of);

@@ -15,7 +15,7 @@ from pendmap.identification.runs import FitRun
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.noise import Remainder
+    from pendmap.residuals.noise import Remainder
 
     Floats = NDArray[np.float64]
 

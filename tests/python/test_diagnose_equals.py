@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pendmap import virtual_rig
+from pendmap.comparison.data import evidence_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import Candidate
-from pendmap.diagnosis.data import evidence_of
 from pendmap.diagnosis.scores import Scores, scores_of
 from pendmap.records import read_experiment
 

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import report, virtual_rig
+from pendmap.comparison.data import Evidence, evidence_of
 from pendmap.diagnosis import diagnose, diagnosed_model
 from pendmap.diagnosis.candidates import Candidate
-from pendmap.diagnosis.data import Evidence, evidence_of
 from pendmap.diagnosis.fitted_model import Trial, fitted
 from pendmap.diagnosis.physical import within_physics
 from pendmap.diagnosis.summary import as_json, as_text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,16 +13,19 @@ import pytest
 import pendmap
 from driven_decays import motion
 from hidden import diagnosed
+from pendmap.comparison.data import evidence_of
 from pendmap.diagnosis.alternatives import Rival, Standing
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
-from pendmap.diagnosis.data import evidence_of
-from pendmap.diagnosis.runs import run_by_run
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import Found, State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.diagnosis.verdict import judge, probabilities
 from pendmap.records import Experiment, Run
+from pendmap.residuals.by_run import RunByRun, run_by_run
+
+if TYPE_CHECKING:
+    from pendmap.diagnosis.fitted_model import Trial
 
 CHANCE, SURE = Thresholds().rest, Thresholds().sure
 
@@ -83,6 +87,10 @@ def waving() -> tuple[State, Found]:
     return state, state.found(search(state, core, lambda _: None))
 
 
+def runs_of(state: State, trial: Trial) -> RunByRun:
+    return run_by_run(state.evidence.fitted, trial.fit, trial.remainder, trial.level)
+
+
 @pytest.mark.parametrize(
     ("change", "verdict"),
     [
@@ -99,7 +107,7 @@ def test_what_is_partial(
     state, best = waving
     assert best.trial.names == ("quadratic_drag",)
     state.thresholds = Thresholds(**change)  # type: ignore[arg-type]
-    judged = judge(state, best, run_by_run(state.evidence, best.trial), 1.0)
+    judged = judge(state, best, runs_of(state, best.trial), 1.0)
     assert judged.closed > 0.5
     assert judged.verdict == verdict
     assert judged.approximate is (verdict == "partial" or min(judged.probabilities) < SURE)
@@ -113,7 +121,7 @@ def test_the_effect_that_closes_most_comes_first(waving: tuple[State, Found]) ->
     assert both is not None
     for chosen in (both.chosen, both.chosen[::-1]):
         trial = dataclasses.replace(both, chosen=chosen)
-        judged = judge(state, state.found(trial), run_by_run(state.evidence, trial), 1.0)
+        judged = judge(state, state.found(trial), runs_of(state, trial), 1.0)
         assert [s.candidate.name for s in judged.standings] == ["quadratic_drag", "encoder_gain"]
         assert judged.standings[0].gain > judged.standings[1].gain
 

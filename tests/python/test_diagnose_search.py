@@ -12,10 +12,10 @@ import pytest
 
 from driven_decays import motion
 from pendmap import read_experiment, virtual_rig
+from pendmap.comparison.data import Evidence, evidence_of
 from pendmap.diagnosis.alternatives import standing_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import CORE
-from pendmap.diagnosis.data import Evidence, evidence_of
 from pendmap.diagnosis.held import predictive
 from pendmap.diagnosis.prune import pruned
 from pendmap.diagnosis.search import search

@@ -14,7 +14,7 @@ from scipy.fft import idct
 
 from driven_decays import motion
 from leftovers import RUNS, SAMPLES, coloured, trial
-from pendmap.diagnosis.data import Evidence, evidence_of
+from pendmap.comparison.data import Evidence, evidence_of
 from pendmap.diagnosis.model_error import model_errors, weighted
 from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run

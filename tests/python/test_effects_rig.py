@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import virtual_rig
+from pendmap.comparison.data import Evidence, evidence_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import Candidate, placed
-from pendmap.diagnosis.data import Evidence, evidence_of
 from pendmap.diagnosis.fitted_model import fitted
 from pendmap.model.effects import definition, is_shape
 from pendmap.records import read_experiment

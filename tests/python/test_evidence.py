@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from pendmap.diagnosis.data import evidence_of
+from pendmap.comparison.data import evidence_of
 from pendmap.errors import InputError
 from pendmap.records import Experiment, Run
 

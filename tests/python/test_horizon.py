@@ -10,9 +10,9 @@ import pytest
 
 from hidden import once
 from pendmap import Rig
+from pendmap.comparison.forecast import forecasts_of
+from pendmap.comparison.replay import Motion, replayed, strength_of
 from pendmap.diagnosis import diagnosed_model
-from pendmap.diagnosis.forecast import forecasts_of
-from pendmap.diagnosis.replay import Motion, replayed, strength_of
 from pendmap.identification import compare
 from pendmap.identification.runs import FitRun
 
@@ -71,7 +71,7 @@ def test_a_replay_falls_freely_where_nothing_else_acts() -> None:
 
 
 def test_the_strength_of_a_drag_is_its_torque(found: Discrepancy) -> None:
-    strength = strength_of(found.evidence, found.best, "quadratic_drag")
+    strength = strength_of(found.best.trial.fit, found.evidence.fitted, "quadratic_drag")
     q = found.effects[0].parameters["q"]
     speeds = np.concatenate([curve[1] for curve in found.best.trial.fit.curves])
     speeds = speeds[np.isfinite(speeds)]
@@ -84,7 +84,7 @@ def test_forecasts_do_not_depend_on_where_clocks_begin(found: Discrepancy) -> No
     for begin in np.random.default_rng(1).uniform(0.0, 1000.0, 3):
         held = tuple(_later(run, float(begin)) for run in found.evidence.held)
         evidence = dataclasses.replace(found.evidence, held=held)
-        moved = forecasts_of(evidence, found.base, found.best, {})
+        moved = forecasts_of(evidence, found.base.fits, found.best.fits, {})
         for forecast, usual in zip(moved, found.forecasts, strict=True):
             np.testing.assert_allclose(forecast.after, usual.after, rtol=0.1)
 

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import pendmap
 from decays import decay, record
 from pendmap import InputError, figures
-from pendmap.diagnosis.data import evidence_of
+from pendmap.comparison.data import evidence_of
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.compare import compare
 from pendmap.identification.joint import fit_together

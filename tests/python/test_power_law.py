@@ -12,9 +12,9 @@ import pytest
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import virtual_rig
+from pendmap.comparison.data import evidence_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
-from pendmap.diagnosis.data import evidence_of
 from pendmap.diagnosis.fitted_model import with_candidates
 from pendmap.diagnosis.named import diagnosed_model
 from pendmap.identification.fitting import FitRun, fit_runs, score

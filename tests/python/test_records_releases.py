@@ -11,7 +11,7 @@ import pytest
 
 import pendmap
 from decays import decay, record
-from pendmap.diagnosis.data import evidence_of
+from pendmap.comparison.data import evidence_of
 from pendmap.identification import compare, identified_model, identify_experiment
 from pendmap.identification.compared import as_json as compared
 from pendmap.identification.compared import as_text as compared_text

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.diagnosis.prune import rivals_of
+from pendmap.diagnosis.scores import CONTAINS
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,71 +19,38 @@ if TYPE_CHECKING:
 
 __all__ = ["Rival", "Standing", "standing_of"]
 
-CONTAINS: float = 0.99
-"""Cosine between what two effects do to the readings from which the one with more parameters has
-the other one as a special case."""
-
 THIRDS: int = 3
 """Parts of a single run, each of which a name must survive without."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Rival:
-    """Another effect in the place of one that was accepted.
+    """Another effect in the place of one that was accepted."""
 
-    Parameters
-    ----------
-    candidate : Candidate
-        Effect and shape.
-    gain : float
-        Fall of the sum of squares with it, in independent readings.
-    behind : float
-        Gain of the accepted effect less its own, each less what chance gains by a choice among
-        many values: twice the difference of log-likelihoods.
-    separation : float
-        ``s = 1 - gain / gain of the accepted effect``.
-    likeness : float
-        Cosine of the angle between what both do to the readings.
-    refitted : bool
-        Whether the gain is that of a fit; else it is the score's.
-    contains : bool
-        Whether it has the accepted effect as a special case and gains no more than chance by it.
-    alike : bool
-        Whether the records do not tell it from the accepted effect: it is behind by less than the
-        threshold, or by the readings of one run alone, of a single run by those of a third, unless
-        the accepted effect happens once.
-    """
-
-    candidate: Candidate
-    gain: float
+    candidate: Candidate  # Effect and shape
+    gain: float  # Fall of the sum of squares with it, in independent readings
+    # Gain of the accepted effect less its own, each less what chance gains by a choice among many
+    # values: twice the difference of log-likelihoods.
     behind: float
-    separation: float
-    likeness: float
-    refitted: bool
+    separation: float  # ``s = 1 - gain / gain of the accepted effect``
+    likeness: float  # Cosine of the angle between what both do to the readings
+    refitted: bool  # Whether the gain is that of a fit; else it is the score's
+    # Whether it has the accepted effect as a special case and gains no more than chance by it.
     contains: bool
+    # Whether the records do not tell it from the accepted effect: it is behind by less than the
+    # threshold, or by the readings of one run alone, of a single run by those of a third, unless
+    # the accepted effect happens once.
     alike: bool
 
 
 @dataclasses.dataclass(frozen=True)
 class Standing:
-    """An accepted effect among its rivals.
+    """An accepted effect among its rivals."""
 
-    Parameters
-    ----------
-    candidate : Candidate
-        The effect.
-    gain : float
-        Fall of the sum of squares with it, in independent readings.
-    closed : float
-        Share of the squared gap above the noise that it closes beside the others.
-    rivals : tuple of Rival
-        The nearest first.
-    """
-
-    candidate: Candidate
-    gain: float
-    closed: float
-    rivals: tuple[Rival, ...]
+    candidate: Candidate  # The effect
+    gain: float  # Fall of the sum of squares with it, in independent readings
+    closed: float  # Share of the squared gap above the noise that it closes beside the others
+    rivals: tuple[Rival, ...]  # The nearest first
 
     @property
     def equivalent(self) -> list[str]:
@@ -105,12 +73,10 @@ def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
     """Return an effect of the best model among those that might stand in its place."""
     level = best.level
     rest = state.rest(best, candidate)
-    if rest is None:
-        return Standing(candidate, math.inf, 1.0, ())  # without it there is no motion
     gain = (rest.chi2 - best.chi2) / level
     scores = state.scores(rest)
     places = scores.best()
-    own = next((k for k in places if scores.scores[k].candidate.name == candidate.name), None)
+    own = next((k for k in places if scores.name(k) == candidate.name), None)
     if own is None:
         return Standing(candidate, gain, state.closed(rest, best), ())
     fits = dict(rivals_of(state, best, candidate, rest))

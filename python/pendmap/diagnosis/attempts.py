@@ -16,33 +16,17 @@ __all__ = ["Attempt", "attempt_of", "core_attempt"]
 
 @dataclasses.dataclass(frozen=True)
 class Attempt:
-    """Candidates that were fitted, and whether they were accepted.
+    """Candidates that were fitted, and whether they were accepted."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        The effects.
-    shape : dict of str to float
-        Of the first, without dimensions.
-    score : float
-        Gain that the score promises, in independent readings.
-    gain : float
-        Fall of the cost: of the sum of squares in independent readings with Schwarz's penalty.
-    held_gain : float or None
-        Least fall on a held-out set, in independent readings; none where it was not asked for.
-    accepted : bool
-        Whether the search went on from there.
-    stage : int
-        Number of effects of the model without them.
-    """
-
-    names: tuple[str, ...]
-    shape: dict[str, float]
-    score: float
+    names: tuple[str, ...]  # The effects
+    shape: dict[str, float]  # Of the first, without dimensions
+    score: float  # Gain that the score promises, in independent readings
+    # Fall of the cost: of the sum of squares in independent readings with Schwarz's penalty.
     gain: float
+    # Least fall on a held-out set, in independent readings; none where it was not asked for.
     held_gain: float | None
-    accepted: bool
-    stage: int
+    accepted: bool  # Whether the search went on from there
+    stage: int  # Number of effects of the model without them
 
 
 def core_attempt(state: State, core: Trial, *, accepted: bool) -> Attempt:

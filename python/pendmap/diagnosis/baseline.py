@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.candidates import CORE, Candidate, own_name
+from pendmap.diagnosis.candidates import CORE, Candidate
 from pendmap.diagnosis.fitted_model import GENTLE, Trial, fitted, settled, with_candidates
 from pendmap.diagnosis.physical import within_physics
 from pendmap.diagnosis.refit import best_of
@@ -17,11 +17,12 @@ from pendmap.identification.fitting import fit_runs
 from pendmap.identification.rough import rough_start
 from pendmap.identification.start import starting_values
 from pendmap.model import Rig
+from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from pendmap.diagnosis.data import Evidence
+    from pendmap.comparison.data import Evidence
     from pendmap.identification.runs import FitRun
 
 __all__ = ["baseline", "follows", "taken_by"]
@@ -46,15 +47,8 @@ def baseline(
     them. Each is fitted from the other's motion too. Damping may come out negative: a bound stalls
     the fit, and what is missing in the model may drive it there.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    model : Rig, optional
-        One to begin with instead: its natural frequency, viscous damping and effects' sizes are
-        fitted, Coulomb friction and a constant torque only if it has them.
-    without : collection of str
-        Effects that are left out of the core.
+    Of a given model the natural frequency, viscous damping and sizes of effects are fitted, Coulomb
+    friction and a constant torque only if it has them. Effects of ``without`` are not in the core.
 
     Raises
     ------

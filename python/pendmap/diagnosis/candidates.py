@@ -13,7 +13,7 @@ from pendmap.errors import InputError
 from pendmap.identification.report import DRAG
 from pendmap.model.effects import Effect, definition, is_shape, library, middle
 from pendmap.model.formula import Formula
-from pendmap.model.rig import COUNTERPARTS
+from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -30,7 +30,6 @@ __all__ = [
     "candidates",
     "checked_own",
     "commonness",
-    "own_name",
     "placed",
 ]
 
@@ -66,21 +65,12 @@ million times as much of it: effects are derived in several passes, all about on
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """An effect of the library, or of the user's own, with a shape.
+    """An effect of the library, or of the user's own, with a shape."""
 
-    Parameters
-    ----------
-    name : str
-        The effect.
-    shape : mapping of str to float
-        Values of what is no size and no phase, without dimensions.
-    formula : Formula, optional
-        Where it is the user's own.
-    """
-
-    name: str
+    name: str  # The effect
+    # Values of what is no size and no phase, without dimensions.
     shape: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    formula: Formula | None = None
+    formula: Formula | None = None  # Where it is the user's own
 
     @property
     def definition(self) -> dict[str, Any]:
@@ -113,6 +103,15 @@ class Candidate:
         """
         entries = [e for e in self.definition["parameters"] if e["role"] != "order"]
         return [f"{self.name}.{e['name']}" for e in entries if e["name"] in self.shape]
+
+    @property
+    def exponents(self) -> dict[str, str]:
+        """The exponents of its shape by the sizes whose units depend on them."""
+        return {
+            f"{self.name}.{entry['name']}": f"{self.name}.{entry['power_of_w0_less']}"
+            for entry in self.definition["parameters"]
+            if f"{self.name}.{entry['power_of_w0_less']}" in self.adapted
+        }
 
     @property
     def places(self) -> list[str]:
@@ -171,15 +170,6 @@ def commonness(effect: str) -> int:
     return len(COMMON) + (names.index(effect) if effect in names else len(names))
 
 
-def own_name(effect: str) -> str | None:
-    """Return the parameter of a :class:`pendmap.Rig` that says the same as an effect, if any."""
-    if effect not in library():
-        return None
-    entries = definition(effect)["parameters"]
-    known = COUNTERPARTS.get(entries[0]["name"])
-    return known[0] if len(entries) == 1 and known is not None else None
-
-
 def placed(model: Rig, added: Sequence[Candidate]) -> Rig:
     """Return a model with candidates in it, at size 0, to be scored or fitted."""
     units = model.units
@@ -231,17 +221,9 @@ def candidates(
 ) -> list[list[Candidate]]:
     """Return the candidates that records may show, by effect, each in all its shapes.
 
-    Parameters
-    ----------
-    taken : collection of str
-        Effects that the model has already, and parameters of a :class:`pendmap.Rig` that are free:
-        an effect that says the same as one of them is left out.
-    driven : bool
-        Whether there are runs with a harmonic drive; effects of the drive need one.
-    without : collection of str
-        Effects that are left out besides.
-    own : collection of Formula
-        Effects of the user's own, beside the library's.
+    ``taken`` are effects that the model has already and parameters of a :class:`Rig` that are free:
+    an effect that says the same as one of them is left out, as are those of ``without``. Effects of
+    the drive need runs with a harmonic drive; ``own`` are the user's own.
     """
     formulas = {formula.name: formula for formula in own}
     found = []

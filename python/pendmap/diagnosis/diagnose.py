@@ -7,18 +7,16 @@ import dataclasses
 import functools
 from typing import TYPE_CHECKING, Any, Final
 
+from pendmap.comparison.cycles import Cycles, cycles_of
+from pendmap.comparison.data import Evidence, evidence_of
+from pendmap.comparison.forecast import Forecast, Gap, forecasts_of, gap_of
+from pendmap.comparison.further import Reasons, attempted
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import checked_own
-from pendmap.diagnosis.cycles import Cycles, cycles_of
-from pendmap.diagnosis.data import Evidence, evidence_of
-from pendmap.diagnosis.forecast import Forecast, Gap, forecasts_of, gap_of
 from pendmap.diagnosis.functions import FunctionScore, call_once, divided, function_scores
-from pendmap.diagnosis.further import Reasons, attempted
 from pendmap.diagnosis.named import NamedEffect, named_effects
 from pendmap.diagnosis.next_experiment.advice import Advice, advice_of
 from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.residual_torque import Torque, residual_torque, standing_out
-from pendmap.diagnosis.runs import RunByRun, run_by_run
 from pendmap.diagnosis.scores import Scores
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
@@ -29,6 +27,8 @@ from pendmap.identification.astray import refuse_astray
 from pendmap.model.effects import definition
 from pendmap.notebook import Readable
 from pendmap.records.summary import unit_wrong
+from pendmap.residuals.by_run import RunByRun, run_by_run
+from pendmap.residuals.torque import Torque, residual_torque, standing_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -157,7 +157,7 @@ class Discrepancy(Readable):
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:
         """How the error of both models grows with the horizon, on what was held back."""
-        return forecasts_of(self.evidence, self.base, self.best, self.reasons)
+        return forecasts_of(self.evidence, self.base.fits, self.best.fits, self.reasons)
 
     @functools.cached_property
     def advice(self) -> Advice:
@@ -175,7 +175,7 @@ class Discrepancy(Readable):
     @functools.cached_property
     def cycles(self) -> tuple[Cycles, ...]:
         """Periods and peaks of each free run against those of both models."""
-        return cycles_of(self.evidence, self.base, self.best, self.reasons)
+        return cycles_of(self.evidence, self.base.fits, self.best.fits, self.reasons)
 
 
 def diagnose(  # noqa: PLR0913 (each is asked for by name)
@@ -242,8 +242,9 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
     report(steps - 1, steps)
     with _followed(experiment):
-        runs = run_by_run(state.evidence, nearest.trial)
-        after = residual_torque(state.evidence, nearest.trial)
+        last, fitted = nearest.trial, state.evidence.fitted
+        runs = run_by_run(fitted, last.fit, last.remainder, last.level)
+        after = residual_torque(fitted, last.fit, last.remainder)
     judgement = judge(state, nearest, runs, after.chance)
     claimed = judgement.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else begin
@@ -253,8 +254,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         before = attempted(
             reasons,
             "where",
-            lambda: residual_torque(state.evidence, begin.trial),
-            Torque.unknown(begin.trial),
+            lambda: residual_torque(fitted, begin.trial.fit, begin.trial.remainder),
+            Torque.unknown(begin.trial.remainder),
         )
     scores = state.scores(begin.trial)
     return Discrepancy(
@@ -264,7 +265,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         nearest,
         judgement,
         named_effects(state, best, judgement, runs, reasons) if claimed else (),
-        gap_of(evidence, begin, best),
+        gap_of(evidence, begin.fits, best.fits),
         before,
         after if claimed else before,
         standing_out(before),

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.diagnosis.candidates import placed
-from pendmap.diagnosis.noise import Remainder, remainder_of
-from pendmap.diagnosis.valley import exponents, nearer
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
+from pendmap.identification.valley import nearer
+from pendmap.residuals.noise import Remainder, remainder_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
@@ -66,29 +66,14 @@ NEAR_STEPS: Final = 6
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """A model fitted to the evidence.
+    """A model fitted to the evidence."""
 
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        To the runs that are not held back.
-    free : tuple of str
-        What was fitted, as in :func:`pendmap.identification.fitting.fit_runs`.
-    chosen : tuple of Candidate
-        The effects that were added to the baseline.
-    runs : tuple of FitRun
-        What it was fitted to.
-    floors : tuple of float
-        Share of rounding in the variance of each run's noise.
-    zeroed : tuple of str
-        Coefficients that were negative and are held at 0; a larger model frees them again.
-    """
-
-    fit: TrajectoryFit
-    free: tuple[str, ...]
-    chosen: tuple[Candidate, ...]
-    runs: tuple[FitRun, ...]
-    floors: tuple[float, ...]
+    fit: TrajectoryFit  # To the runs that are not held back
+    free: tuple[str, ...]  # What was fitted, as in fit_runs
+    chosen: tuple[Candidate, ...]  # The effects that were added to the baseline
+    runs: tuple[FitRun, ...]  # What it was fitted to
+    floors: tuple[float, ...]  # Share of rounding in the variance of each run's noise
+    # Coefficients that were negative and are held at 0; a larger model frees them again.
     zeroed: tuple[str, ...] = ()
 
     @functools.cached_property
@@ -149,10 +134,13 @@ class Trial:
 
     @property
     def adapted(self) -> int:
-        """How many numbers were adapted to the records, shapes that were scanned among them."""
+        """How many numbers were adapted to the records.
+
+        Shapes that were scanned are among them, and what is held at 0.
+        """
         free = set(self.free)
         scanned = sum(c.count - len(free & {*c.free, *c.adapted}) for c in self.chosen)
-        return len(self.fit.names) + scanned
+        return len(self.fit.names) + len(self.zeroed) + scanned
 
 
 def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
@@ -171,20 +159,8 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
 ) -> Trial:
     """Fit a model to the evidence.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    model : Rig
-        With its effects, where the search begins.
-    free : sequence of str
-        What is fitted.
-    chosen : sequence of Candidate
-        The effects of the model that were added to the baseline.
-    start, windows, steps, least_gain, growth, target
-        As of :func:`pendmap.identification.fitting.fit_runs`.
-    zeroed : sequence of str
-        Coefficients that are held at 0.
+    ``zeroed`` are coefficients held at 0; the last arguments are those of
+    :func:`pendmap.identification.fitting.fit_runs`.
     """
     fit = fit_runs(
         evidence.fitted,
@@ -228,23 +204,9 @@ def with_candidates(  # noqa: PLR0913 (what to fit, and from where)
 ) -> Trial:
     """Fit a trial's model with further effects, from the trial's parameters and windows on.
 
-    Coefficients that the trial holds at 0 are free again.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        Where the fit starts.
-    added : sequence of Candidate
-        The effects.
-    start : mapping of str to float
-        Sizes and phases to start with.
-    level : float
-        Sum of squares that counts as one independent reading; steps that promise a small part of
-        it are not taken.
-    short : bool
-        Whether to start from short windows, where the trial's lead astray.
+    Coefficients that the trial holds at 0 are free again. Steps that promise a small part of
+    ``level``, one independent reading, are not taken. ``short`` starts from short windows, where
+    the trial's lead astray.
     """
     model = placed(trial.fit.model, added)
     free = [*trial.free, *trial.zeroed, *(name for c in added for name in c.free)]
@@ -254,7 +216,7 @@ def with_candidates(  # noqa: PLR0913 (what to fit, and from where)
     least = LITTLE * level
     if shapes and not short:
         # A shape means nothing before its effect has a size.
-        steps = FEW_STEPS if any(exponents(c) for c in added) else SIZED_STEPS
+        steps = FEW_STEPS if any(c.exponents for c in added) else SIZED_STEPS
         sized = fitted(
             evidence, model, free, start=begin, windows=windows, steps=steps, least_gain=least
         )
@@ -291,7 +253,7 @@ def _near_exponents(
 
     fit = sized.fit
     for candidate in added:
-        for size, exponent in exponents(candidate).items():
+        for size, exponent in candidate.exponents.items():
             fit = nearer(fit, evidence.fitted, size, exponent, again)
     return fit
 

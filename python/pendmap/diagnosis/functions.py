@@ -2,7 +2,7 @@
 
 A function that looks up a table, or asks a trained model, is nothing that the kernel can step
 with. But sampled along a fitted motion its torque ``u`` moves the readings, to first order, by the
-integral that :mod:`pendmap.diagnosis.residual_torque` has for any torque; with ``x`` that response
+integral that :mod:`pendmap.residuals.torque` has for any torque; with ``x`` that response
 over the standard errors, what the fitted parameters and initial states can follow taken off, and
 ``r`` the residuals, the size is ``x' r / x' x`` and the sum of squares falls by
 ``(x' r)^2 / x' x``.
@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import checks
-from pendmap.diagnosis.residual_torque import freed, responses, windows_of
 from pendmap.errors import InputError
+from pendmap.residuals.torque import freed, responses, windows_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.data import Evidence
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.records import Run
 
@@ -158,13 +158,6 @@ def call_once(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
     Angles and velocities that are exactly 0 are left out: a motion passes them between two
     readings, where a reading in counts stays, and a function may be of no value there.
 
-    Parameters
-    ----------
-    runs : iterable of Run
-        The records.
-    functions : sequence of TorqueFunction
-        The candidates.
-
     Raises
     ------
     InputError
@@ -189,17 +182,7 @@ def call_once(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
 def function_scores(
     evidence: Evidence, base: Trial, best: Trial, functions: Sequence[TorqueFunction]
 ) -> tuple[FunctionScore, ...]:
-    """Score functions at a baseline and at a best model.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    base, best : Trial
-        The two fits.
-    functions : sequence of TorqueFunction
-        The candidates.
-    """
+    """Score functions at a baseline and at a best model."""
     if not functions:
         return ()
     first = _scored(evidence, base, functions)
@@ -214,7 +197,7 @@ def _scored(
     evidence: Evidence, trial: Trial, functions: Sequence[TorqueFunction]
 ) -> list[tuple[float, float, float]]:
     """Return size, its standard error and gain of each."""
-    windows, places = windows_of(evidence, trial)
+    windows, places = windows_of(evidence.fitted, trial.fit)
     columns = []
     for window, place in zip(windows, places, strict=True):
         own = slice(window.first, window.first + len(window.residual))
@@ -222,7 +205,7 @@ def _scored(
         torques = np.stack([function.torque(place, theta) for function in functions], axis=1)
         columns.append(responses(evidence.fitted[window.run], window, torques))
     sizes = np.linalg.norm(np.concatenate(columns), axis=0)
-    further, residual = freed(evidence, windows, columns)
+    further, residual = freed(evidence.fitted, windows, columns)
     level = trial.remainder.level
     found = []
     for k, size in enumerate(sizes):

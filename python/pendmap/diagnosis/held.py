@@ -14,7 +14,7 @@ from pendmap.identification.fitting import TrajectoryFit, fit_runs
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.diagnosis.data import Evidence
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial, Windows
     from pendmap.identification.runs import FitRun
 
@@ -27,21 +27,11 @@ FOLDS: Final = 5
 
 @dataclasses.dataclass(frozen=True)
 class Held:
-    """A model on the records held back, its parameters as they were fitted to the others.
+    """A model on the records held back, its parameters as they were fitted to the others."""
 
-    Parameters
-    ----------
-    chi2 : float
-        Sum of squared residuals over standard errors, initial states adapted.
-    degrees : int
-        Samples less what was adapted.
-    fit : TrajectoryFit
-        Curves and residuals.
-    """
-
-    chi2: float
-    degrees: int
-    fit: TrajectoryFit
+    chi2: float  # Sum of squared residuals over standard errors, initial states adapted
+    degrees: int  # Samples less what was adapted
+    fit: TrajectoryFit  # Curves and residuals
 
 
 def tried(evidence: Evidence, trial: Trial) -> Held:

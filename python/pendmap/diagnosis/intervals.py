@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from pendmap.identification.fitting import fit_runs
 
 if TYPE_CHECKING:
-    from pendmap.diagnosis.data import Evidence
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial
 
 __all__ = ["Z95", "profiles"]

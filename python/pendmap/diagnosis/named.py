@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.diagnosis.candidates import own_name
-from pendmap.diagnosis.further import Reasons, attempted
+from pendmap.comparison.further import Reasons, attempted
 from pendmap.diagnosis.intervals import Z95, profiles
 from pendmap.diagnosis.refit import elsewhere
 from pendmap.identification.conversion import interval
 from pendmap.identification.model_file import provenance
 from pendmap.model import Effect
+from pendmap.model.rig import own_name
 from pendmap.records.summary import doubted
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.diagnose import Discrepancy
     from pendmap.diagnosis.fitted_model import Trial
-    from pendmap.diagnosis.runs import RunByRun
     from pendmap.diagnosis.scores import Score
     from pendmap.diagnosis.state import Found, State
     from pendmap.diagnosis.verdict import Judgement
     from pendmap.model import Formula, Rig
+    from pendmap.residuals.by_run import RunByRun
 
 __all__ = ["NamedEffect", "diagnosed_model", "named_effects", "values_of"]
 
@@ -121,9 +121,8 @@ def _sought(state: State, best: Trial) -> dict[str, list[Score]]:
     """Return, by effect, the frequencies or instants that residuals ask for without it."""
     found = {}
     for candidate in best.chosen:
-        rest = state.rest(best, candidate) if candidate.sought else None
-        if rest is not None:
-            scores = state.scores(rest).scores
+        if candidate.sought:
+            scores = state.scores(state.rest(best, candidate)).scores
             found[candidate.name] = [s for s in scores if s.candidate.name == candidate.name]
     return found
 

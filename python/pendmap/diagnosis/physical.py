@@ -10,8 +10,8 @@ from pendmap.diagnosis.fitted_model import LITTLE, fitted
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial
 
 __all__ = ["signed_sizes", "within_physics"]
@@ -26,13 +26,14 @@ STRETCH: Final = 2.0
 """Factor by which a width may leave its typical range."""
 
 
-def within_physics(evidence: Evidence, trial: Trial) -> Trial | None:
+def within_physics(evidence: Evidence, trial: Trial, target: float = math.inf) -> Trial | None:
     """Return a fit whose coefficients a pendulum can have; none where the effects have no such fit.
 
     Viscous damping and Coulomb friction below 0 are set to 0, and the others fitted again. An added
     effect must oppose the motion where its kind does, must not drive the motion by a drift or an
     asymmetry greater than what drifts, must take longer than a swing and no longer than the record,
-    and must have a width near its typical range.
+    and must have a width near its typical range. A fit that leads far above the sum of squares
+    ``target`` is given up.
     """
     while negative := [n for n in OPPOSING if n in trial.fit.estimates and trial.fit[n] < 0]:
         zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
@@ -46,6 +47,7 @@ def within_physics(evidence: Evidence, trial: Trial) -> Trial | None:
                 windows=trial.fit.windows,
                 zeroed=(*trial.zeroed, *negative),
                 least_gain=LITTLE * trial.level,
+                target=target,
             )
         except InputError:
             return None

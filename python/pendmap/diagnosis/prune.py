@@ -35,8 +35,6 @@ def _following(state: State, best: Trial) -> Trial | None:
     """Return a model that is preferred to another one; none where that stands."""
     for candidate in best.chosen:
         rest = state.rest(best, candidate)
-        if rest is None:
-            continue  # without it there is no motion to speak of
         if not state.gains(rest, best):
             return rest
         for _, other in rivals_of(state, best, candidate, rest):
@@ -44,6 +42,7 @@ def _following(state: State, best: Trial) -> Trial | None:
                 other is not None
                 and other.chi2 < best.chi2 - state.thresholds.alike * best.level
                 and state.cost(other) < state.cost(best)
+                and state.closes(best, other)
                 and state.gains(rest, other)
                 and state.holds(best, other)
             ):
@@ -61,7 +60,6 @@ def rivals_of(
     others = [
         k
         for k in scores.best()
-        if scores.scores[k].candidate.name != candidate.name
-        and scores.scores[k].gain > limits.worth * gain
+        if scores.name(k) != candidate.name and scores.scores[k].gain > limits.worth * gain
     ]
     return [(k, state.instead(best, candidate, rest, k)) for k in others[: limits.rivals]]

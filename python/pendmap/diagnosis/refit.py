@@ -18,14 +18,13 @@ from pendmap.diagnosis.fitted_model import (
 )
 from pendmap.diagnosis.intervals import Z95
 from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.valley import exponents
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.scores import Score, Scores
     from pendmap.diagnosis.thresholds import Thresholds
@@ -36,6 +35,7 @@ __all__ = [
     "best_of",
     "better_side",
     "elsewhere",
+    "enlarged",
     "key_of",
     "refitted",
     "replaced",
@@ -101,7 +101,8 @@ def refitted(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
         found = best_of(found, fit(added, step, short=True))
     if found is None or found.chi2 > trial.chi2:
         return None
-    return within_physics(evidence, better_side(evidence, found))
+    found = within_physics(evidence, better_side(evidence, found), trial.chi2)
+    return found if found is not None and found.chi2 <= trial.chi2 else None
 
 
 def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds) -> list[int]:
@@ -109,7 +110,7 @@ def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds)
     if len(places) > 1:
         return []
     one = scores.scores[places[0]]
-    if not one.candidate.adapted or exponents(one.candidate):
+    if not one.candidate.adapted or one.candidate.exponents:
         return []
     shapes = [
         k
@@ -140,6 +141,19 @@ def without(evidence: Evidence, trial: Trial, dropped: Candidate, level: float) 
     return within_physics(evidence, rest)
 
 
+def enlarged(
+    evidence: Evidence, rest: Trial, trial: Trial, chosen: Sequence[Candidate], level: float
+) -> Trial | None:
+    """Return a model with all chosen effects, from one with some and what a trial has of them."""
+    added = [c for c in chosen if c.name not in rest.names]
+    start = {n: v for n, v in trial.start.items() if any(n in c.free for c in added)}
+    try:
+        found = with_candidates(evidence, rest, added, start, level=level)
+    except InputError:
+        return None
+    return within_physics(evidence, found)
+
+
 def replaced(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     evidence: Evidence,
     trial: Trial,
@@ -148,10 +162,12 @@ def replaced(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     place: int,
     level: float,
     target: float,
+    rest: float,
 ) -> Trial | None:
     """Return a trial's model with another effect in the place of one, from the trial's motion.
 
-    The fit is given up where it promises to end far above the sum of squares ``target``.
+    The fit is given up where it promises to end far above the sum of squares ``target``; it is none
+    where it is above ``rest``, that of the model with neither.
     """
     model, free, start = _without(trial, dropped)
     score = scores.scores[place]
@@ -170,7 +186,9 @@ def replaced(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
         )
     except InputError:
         return None
-    return found if found.fit.given_up else within_physics(evidence, found)
+    if found.chi2 > rest:
+        return None
+    return found if found.fit.given_up else within_physics(evidence, found, rest)
 
 
 def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:

@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.diagnosis.candidates import placed
-from pendmap.diagnosis.times import located
 from pendmap.identification.sensitivity import (
     STATE,
     WindowSlopes,
@@ -32,23 +31,29 @@ from pendmap.identification.sensitivity import (
     lengths,
     window_slopes,
 )
+from pendmap.residuals.times import calm_responses, frequencies, instants
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.model import Rig
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Score", "Scores", "scores_of"]
+__all__ = ["CONTAINS", "Score", "Scores", "scores_of"]
 
 PASS: Final = 16
 """So many directions the integrator carries at once: effects beyond them cost another pass, and
 each pass evaluates all effects that the model has."""
+
+CONTAINS: Final = 0.99
+"""Cosine between what two effects do to the readings from which the one can do what the other does;
+with more parameters it has the other one as a special case."""
 
 SAME: Final = 1e-6
 """A cosine that falls short of 1 by less is that of two names for one thing."""
@@ -60,48 +65,26 @@ information) does nothing of its own: rounding and the integrator's error are no
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """A candidate's score.
+    """A candidate's score."""
 
-    Parameters
-    ----------
-    candidate : Candidate
-        Effect and shape.
-    gain : float
-        ``G``: by which the sum of squares is expected to fall.
-    start : mapping of str to float
-        Size and phase where it is expected to be least, SI.
-    information : float
-        ``x' x`` of the size: a size ``a`` gains ``a^2`` times this; of an effect with a phase at
-        the phase where it is least. 0 where the records do not show the effect at all.
-    """
-
-    candidate: Candidate
-    gain: float
-    start: dict[str, float]
+    candidate: Candidate  # Effect and shape
+    gain: float  # ``G``: by which the sum of squares is expected to fall
+    start: dict[str, float]  # Size and phase where it is expected to be least, SI
+    # ``x' x`` of the size: a size ``a`` gains ``a^2`` times this; of an effect with a phase at the
+    # phase where it is least. 0 where the records do not show the effect at all.
     information: float
 
 
 @dataclasses.dataclass(frozen=True)
 class Scores:
-    """Scores of all candidates in all shapes at one fit.
+    """Scores of all candidates in all shapes at one fit."""
 
-    Parameters
-    ----------
-    scores : tuple of Score
-        One for each candidate and shape.
-    columns : tuple of list of int
-        The columns of each in what follows.
-    gram : ndarray of float, shape (k, k)
-        Products of what the candidates do to the readings, each of unit length; a row of zeros for
-        what the records do not show.
-    pull : ndarray of float, shape (k,)
-        Its products with the residuals.
-    """
-
-    scores: tuple[Score, ...]
-    columns: tuple[list[int], ...]
+    scores: tuple[Score, ...]  # One for each candidate and shape
+    columns: tuple[list[int], ...]  # The columns of each in what follows
+    # Products of what the candidates do to the readings, each of unit length; a row of zeros for
+    # what the records do not show.
     gram: Floats
-    pull: Floats
+    pull: Floats  # Its products with the residuals
 
     @classmethod
     def of_none(cls) -> Scores:
@@ -113,6 +96,10 @@ class Scores:
         """Among how many candidates, in all their shapes, the best one is chosen."""
         sought = {s.candidate.name: s.candidate.choices for s in self.scores if s.candidate.sought}
         return sum(not s.candidate.sought for s in self.scores) + sum(sought.values())
+
+    def name(self, place: int) -> str:
+        """Return the effect at a place."""
+        return self.scores[place].candidate.name
 
     def best(self) -> list[int]:
         """Return the places of each effect's best shape, the greatest gain first."""
@@ -153,15 +140,8 @@ class Scores:
 def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]) -> Scores:
     """Return the scores of candidates at a fit.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    trial : Trial
-        The fit.
-    pool : sequence of sequence of Candidate
-        By effect, each in its shapes; as many are derived together as one pass of the integrator
-        carries, one shape of an effect each.
+    ``pool`` has by effect its shapes; as many effects are derived together, one shape of each, as
+    one pass of the integrator carries.
     """
     room = max(PASS - len({name.partition("[")[0] for name in trial.fit.names}) - STATE, 1)
     sought = [shapes for shapes in pool if shapes[0].sought]
@@ -180,7 +160,7 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
             names = [name for name in found if name in trial.fit.estimates]
             wanted = [found.index(name) for name in names] + wanted
             # Frequencies and instants are those that the residuals ask for.
-            queue += _passes(located(evidence, sought, slopes, trial.fit.model), room)
+            queue += _passes(_located(evidence, sought, slopes, trial.fit.model), room)
         bare = passes[0] if passes else slopes
         passes.append(
             [
@@ -217,6 +197,27 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
         faint = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
         scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], faint))
     return Scores(tuple(scores), tuple(where), gram, pull)
+
+
+def _located(
+    evidence: Evidence,
+    pool: Sequence[Sequence[Candidate]],
+    windows: Sequence[WindowSlopes],
+    model: Rig,
+) -> list[list[Candidate]]:
+    """Return candidates with the frequencies or instants that residuals ask for most."""
+    found: list[list[Candidate]] = []
+    responses = calm_responses(evidence.fitted, windows, model.c_over_m) if pool else []
+    for one, *_ in pool if responses else ():
+        scanned = one.sought or {}
+        unit = model.w0 ** scanned["power_of_w0"]
+        if scanned["role"] == "frequency":
+            values = frequencies(responses, scanned["typical"][1] * unit)
+        else:
+            values = instants(responses)
+        shapes = [{**one.shape, scanned["name"]: value / unit} for value in values]
+        found.append([dataclasses.replace(one, shape=shape) for shape in shapes])
+    return found
 
 
 def _passes(pool: Sequence[Sequence[Candidate]], room: int) -> list[list[Candidate]]:

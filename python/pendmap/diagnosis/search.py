@@ -43,7 +43,7 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
         state.attempts.append(core_attempt(state, core, accepted=bool(best.chosen)))
     # What takes the place of the core's effects starts without them.
     rests = [state.rest(best, candidate) for candidate in best.chosen]
-    starts = [rest for rest in rests if rest is not None and follows(state.evidence, rest)]
+    starts = [rest for rest in rests if follows(state.evidence, rest)]
     seen: set[Key] = set()
     # What is accepted may be dropped again: no set of effects is enlarged twice.
     while state.room(best) > 0 and key_of(best.chosen) not in seen:
@@ -64,7 +64,7 @@ def beginnings(state: State, core: Trial) -> list[Trial]:
         state.accept(core)
         for candidate in core.chosen:
             rest = state.rest(core, candidate)
-            starts += [rest] if rest is not None and rest.chosen else []
+            starts += [rest] if rest.chosen else []
     return sorted(starts, key=state.cost)
 
 

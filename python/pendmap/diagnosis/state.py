@@ -8,22 +8,23 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.comparison.replay import Fits
 from pendmap.diagnosis.baseline import taken_by
 from pendmap.diagnosis.candidates import ZERO, candidates, commonness
 from pendmap.diagnosis.fitted_model import fitted, settled
 from pendmap.diagnosis.held import Held, predictive, tried
 from pendmap.diagnosis.model_error import model_errors, weighted
 from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.refit import Key, key_of, refitted, replaced, without
-from pendmap.diagnosis.scores import Scores, scores_of
+from pendmap.diagnosis.refit import Key, best_of, enlarged, key_of, refitted, replaced, without
+from pendmap.diagnosis.scores import CONTAINS, Scores, scores_of
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.attempts import Attempt
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.thresholds import Thresholds
     from pendmap.model import Formula
@@ -42,25 +43,14 @@ class Found:
     trial: Trial
     held: Held
 
+    @property
+    def fits(self) -> Fits:
+        """The fits to the records and to what was held back."""
+        return Fits(self.trial.fit, self.held.fit)
+
 
 class State:
-    """Fits of a diagnosis, computed when they are asked for.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    base : Trial
-        The given model.
-    thresholds : Thresholds
-        The numbers that decide.
-    most : int
-        Greatest number of added effects; the sensor's zero does not count.
-    without : collection of str
-        Effects that are no candidates.
-    own : collection of Formula
-        Candidates of the user's own.
-    """
+    """Fits of a diagnosis, computed when they are asked for."""
 
     def __init__(  # noqa: PLR0913 (what is searched, and among what)
         self,
@@ -82,7 +72,7 @@ class State:
     def _begin(self, base: Trial) -> None:
         self.base = self._best = base
         self._fits: dict[Key, Trial] = {key_of(()): base}
-        self._rests: dict[tuple[Key, str], Trial | None] = {}
+        self._rests: dict[tuple[Key, str], Trial] = {}
         self._refits: dict[tuple[Key, Key], Trial | None] = {}
         self._instead: dict[tuple[Key, Key, str], Trial | None] = {}
         self._scores: dict[Key, Scores] = {}
@@ -167,14 +157,25 @@ class State:
             self._refits[key] = self.keep(found)
         return self._refits[key]
 
-    def rest(self, trial: Trial, dropped: Candidate) -> Trial | None:
-        """Return a trial's model without one of its effects; none where the motion is lost."""
+    def rest(self, trial: Trial, dropped: Candidate) -> Trial:
+        """Return the best model with a trial's other effects, with fewer where these do no good."""
         way = key_of(trial.chosen), dropped.name
         if way not in self._rests:
-            rest = without(self.evidence, trial, dropped, self.level)
             chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
-            self._rests[way] = self.keep(rest) or self._fits.get(key_of(chosen))
+            self.keep(without(self.evidence, trial, dropped, self.level))
+            rest = self._fewer(chosen)
+            if len(rest.chosen) < len(chosen):
+                # More parameters fit no worse: the motion was lost on the way.
+                self.keep(enlarged(self.evidence, rest, trial, chosen, self.level))
+                rest = self._fewer(chosen)
+            self._rests[way] = rest
         return self._rests[way]
+
+    def _fewer(self, chosen: Sequence[Candidate]) -> Trial:
+        """Return the best known model with no other effects than these."""
+        names = {candidate.name for candidate in chosen}
+        known = (t for t in self._fits.values() if names.issuperset(t.names))
+        return min(known, key=lambda t: t.chi2)
 
     def simplest(self, best: Trial) -> Trial:
         """Return the simplest, then commonest, fit that the records do not tell from the best.
@@ -199,11 +200,20 @@ class State:
         way = key_of(trial.chosen), key_of([scores.scores[place].candidate]), dropped.name
         if way not in self._instead:
             target = trial.chi2 + self.thresholds.alike * self.level
-            found = replaced(self.evidence, trial, dropped, scores, place, self.level, target)
-            if found is None:
-                found = self.refit(rest, [place])
+            found = replaced(
+                self.evidence, trial, dropped, scores, place, self.level, target, rest.chi2
+            )
+            if found is None or self._lost(found, dropped, rest, place):
+                found = best_of(found, self.refit(rest, [place]))
             self._instead[way] = found if found is None or found.fit.given_up else self.keep(found)
         return self._instead[way]
+
+    def _lost(self, found: Trial, dropped: Candidate, rest: Trial, place: int) -> bool:
+        """Whether a fit was given up of an effect that can do all that the dropped one does."""
+        scores = self.scores(rest)
+        own = next((k for k in scores.best() if scores.name(k) == dropped.name), None)
+        like = own is not None and scores.likeness(own, place) > CONTAINS
+        return like and found.fit.given_up
 
     def held(self, trial: Trial) -> Held | None:
         """Return how a model does on what was held back; none where its motion is lost there."""
@@ -257,7 +267,7 @@ class State:
         """Return the probability that noise alone gains as much as the further effects of a model.
 
         Fisher's F of the fall of the sum of squares over the greater one of the noise and of what
-        the larger model leaves, times the number of candidates in all their shapes.
+        the larger model leaves, times the number of candidates and that of the effect's shapes.
         """
         from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
 
@@ -270,7 +280,9 @@ class State:
             full.remainder.chance_of(gain, more, full.level if full.level < 1 else 0.0),
             float(fdtrc(more, readings, max(gain, 0.0) / more / full.level)),
         )
-        return min(chance * sum(map(len, self._pool(rest))), 1.0)
+        shapes = {each[0].name: len(each) for each in self._pool(rest)}
+        looks = max((shapes.get(c.name, 1) for c in full.chosen), default=1)
+        return min(chance * len(shapes) * looks, 1.0)
 
     def gains(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects gain more than chance, and close what they must.
@@ -280,11 +292,16 @@ class State:
         """
         if self.chance(rest, full) >= self.thresholds.chance:
             return False
-        if full.remainder.chance >= self.thresholds.rest:
-            return True
-        if any(c.sought and c.name not in rest.names for c in full.chosen):
-            return False
-        return self.closed(rest, full) >= self.thresholds.closes
+        sought = any(c.sought and c.name not in rest.names for c in full.chosen)
+        return self.explains(full) or (not sought and self.closes(rest, full))
+
+    def explains(self, trial: Trial) -> bool:
+        """Whether noise alone leaves as much as a model."""
+        return trial.remainder.chance >= self.thresholds.rest
+
+    def closes(self, rest: Trial, full: Trial) -> bool:
+        """Whether a model closes the share of another one's gap that it has to, or all of it."""
+        return self.explains(full) or self.closed(rest, full) >= self.thresholds.closes
 
     @staticmethod
     def closed(rest: Trial, full: Trial) -> float:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.diagnosis.cycles import AFTER, BEFORE
+from pendmap.comparison.cycles import AFTER, BEFORE
 from pendmap.diagnosis.named import values_of
 from pendmap.model.unit_names import unit_of
 from pendmap.records.summary import doubts, doubts_said, findings_said

@@ -17,8 +17,8 @@ class Thresholds:
     Parameters
     ----------
     chance : float
-        Probability that noise alone gains as much as an effect, times the number of candidates in
-        all their shapes, below which the effect is accepted.
+        Probability that noise alone gains as much as an effect, times the number of candidates and
+        that of the effect's shapes, below which the effect is accepted.
     rest : float
         Probability that noise alone leaves as much as a model leaves, below which the model lacks
         something.

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Trial
-    from pendmap.diagnosis.runs import RunByRun
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Found, State
+    from pendmap.residuals.by_run import RunByRun
 
 __all__ = ["COEFFICIENTS", "Form", "Judgement", "features", "form_of", "judge", "probabilities"]
 
@@ -30,55 +30,35 @@ SEVERAL: Final = 1.0
 
 @dataclasses.dataclass(frozen=True)
 class Judgement:
-    """What a search amounts to.
+    """What a search amounts to."""
 
-    Parameters
-    ----------
-    verdict : str
-        ``none``: the baseline describes the records; ``named``: effects explain all; ``ambiguous``:
-        a class of effects does, which these records do not tell apart; ``partial``: effects close
-        most of the gap and something is left; ``unknown``: something is missing that no candidate
-        explains.
-    standings : tuple of Standing
-        The effects that were found, among their rivals.
-    left : float
-        The slow part of what is left, over its standard error.
-    ratio, ratio_allowed : float
-        Sum of squares over degrees of freedom, and up to where chance and the doubt about the noise
-        allow it: ``1 + 4 sqrt(2 / N + 4 r^2)``.
-    ratio_held : float
-        Sum of squares over degrees of freedom on what was held back.
-    closed : float
-        Share of the squared gap above the noise that the effects close on what was fitted.
-    uneven : float
-        How differently the runs would have the parameters, over the standard error of that
-        (Cochran's Q less its degrees of freedom over ``sqrt(2 degrees)``).
-    spread : float
-        Standard error of the first effect's size by its scatter between the runs beyond noise,
-        over the size.
-    chance : float
-        That noise alone would show such a torque over angle, velocity, amplitude, drive phase or
-        time as is left.
-    form : Form
-        What is left, looked for in every direction.
-    probabilities : tuple of float
-        That the name of each standing, or one of its class, is right.
-    approximate : bool
-        Whether names are given with reserve: something is left, or one of them is not sure.
-    """
-
+    # ``none``: the baseline describes the records; ``named``: effects explain all; ``ambiguous``: a
+    # class of effects does, which these records do not tell apart; ``partial``: effects close most
+    # of the gap and something is left; ``unknown``: something is missing that no candidate
+    # explains.
     verdict: Verdict
-    standings: tuple[Standing, ...]
-    left: float
+    standings: tuple[Standing, ...]  # The effects that were found, among their rivals
+    left: float  # The slow part of what is left, over its standard error
+    # Sum of squares over degrees of freedom, and up to where chance and the doubt about the noise
+    # allow it: ``1 + 4 sqrt(2 / N + 4 r^2)``.
     ratio: float
     ratio_allowed: float
-    ratio_held: float
+    ratio_held: float  # Sum of squares over degrees of freedom on what was held back
+    # Share of the squared gap above the noise that the effects close on what was fitted.
     closed: float
+    # How differently the runs would have the parameters, over the standard error of that (Cochran's
+    # Q less its degrees of freedom over ``sqrt(2 degrees)``).
     uneven: float
+    # Standard error of the first effect's size by its scatter between the runs beyond noise, over
+    # the size.
     spread: float
+    # That noise alone would show such a torque over angle, velocity, amplitude, drive phase or time
+    # as is left.
     chance: float
-    form: Form
+    form: Form  # What is left, looked for in every direction
+    # That the name of each standing, or one of its class, is right.
     probabilities: tuple[float, ...]
+    # Whether names are given with reserve: something is left, or one of them is not sure.
     approximate: bool
 
 
@@ -138,12 +118,7 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
 def _foretold(best: Found, ratio: float) -> float:
     """Return the chance that noise alone leaves as much on what was held back.
 
-    Parameters
-    ----------
-    best : Found
-        The model.
-    ratio : float
-        Sum of squares per reading that counts as noise.
+    ``ratio`` is the sum of squares per reading that counts as noise.
     """
     from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
 
@@ -182,18 +157,12 @@ class Form:
     every other effect in every shape (Rao's score at the best model), the torque over angle,
     velocity, amplitude, phase and time, the slow part of the residuals, whether all runs would have
     the same parameters, and the residuals of what was held back.
-
-    Parameters
-    ----------
-    chances : mapping of str to float
-        By what was looked at, that noise alone leaves as much: ``effects`` of the library that are
-        not in the model, ``torque``, ``slow`` residuals, ``runs``, ``held_out`` sets.
-    further : str or None
-        The effect that would take up most of what is left.
     """
 
+    # By what was looked at, that noise alone leaves as much: ``effects`` of the library that are
+    # not in the model, ``torque``, ``slow`` residuals, ``runs``, ``held_out`` sets.
     chances: Mapping[str, float]
-    further: str | None
+    further: str | None  # The effect that would take up most of what is left
 
     @property
     def chance(self) -> float:
@@ -206,14 +175,7 @@ def form_of(
 ) -> Form:
     """Return what is left.
 
-    Parameters
-    ----------
-    scores : Scores
-        Of all candidates at the best model.
-    chance_of : callable
-        Of a gain and how many numbers were adapted for it, the chance that noise alone makes it.
-    others : mapping of str to float
-        Chances that noise alone leaves as much of all else that was looked at.
+    ``others`` are the chances that noise alone leaves as much of all else that was looked at.
     """
     shapes = Counter(score.candidate.name for score in scores.scores)
     tails = {}

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
-    from pendmap.diagnosis.forecast import Forecast
     from pendmap.figures.blocks import Box
 
 __all__ = [

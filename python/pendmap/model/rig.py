@@ -10,6 +10,7 @@ from pendmap import checks
 from pendmap.errors import InputError
 from pendmap.model import quantities
 from pendmap.model.covariance import said_of
+from pendmap.model.effects import definition, library
 from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
 from pendmap.model.units import Units
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from pendmap.model.effects import Effect
 
-__all__ = ["COUNTERPARTS", "Rig", "without_dimensions"]
+__all__ = ["COUNTERPARTS", "Rig", "own_name", "without_dimensions"]
 
 COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
     "gamma": ("c_over_m", 1),
@@ -32,6 +33,15 @@ COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
 }
 """For each parameter of a :class:`Pendulum` its name in a :class:`Rig`, and the power of ``w0``
 that makes the one the other."""
+
+
+def own_name(effect: str) -> str | None:
+    """Return the parameter of a :class:`Rig` that says the same as an effect, if any."""
+    if effect not in library():
+        return None
+    entries = definition(effect)["parameters"]
+    known = COUNTERPARTS.get(entries[0]["name"])
+    return known[0] if len(entries) == 1 and known is not None else None
 
 
 @dataclasses.dataclass(frozen=True)

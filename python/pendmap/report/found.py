@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.further import Reasons, attempted
-from pendmap.diagnosis.replay import strength_of
+from pendmap.comparison.further import Reasons, attempted
+from pendmap.comparison.replay import strength_of
 from pendmap.diagnosis.summary import zeroed
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Formula, Items, Name, Paragraph, Picture, Section, Table
@@ -96,7 +96,10 @@ def _strength(found: Discrepancy, effect: NamedEffect) -> Iterator[str]:
     """Yield how strong an effect is over the records, against friction and gravity."""
     reasons: Reasons = {}
     strength = attempted(
-        reasons, "strength", lambda: strength_of(found.evidence, found.best, effect.name), None
+        reasons,
+        "strength",
+        lambda: strength_of(found.best.trial.fit, found.evidence.fitted, effect.name),
+        None,
     )
     if strength is None:
         yield f". How strong it is over these records is not computed: {reasons['strength']}"

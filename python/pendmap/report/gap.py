@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.diagnosis.residual_torque import STANDS_OUT
 from pendmap.diagnosis.summary import PLACES
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
 from pendmap.report.noise import worth
 from pendmap.report.wording import chance, compared, joined, mrad, number, stated, values
+from pendmap.residuals.torque import STANDS_OUT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
-    from pendmap.diagnosis.forecast import Forecast
     from pendmap.report.document import Block, Text
 
 __all__ = ["gap", "verdict", "where"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.candidates import own_name
+from pendmap.model.rig import own_name
 from pendmap.pictures.names import unit_of
 from pendmap.report.document import Name, Strong, Table
 from pendmap.words import written

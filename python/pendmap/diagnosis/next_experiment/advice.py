@@ -6,12 +6,12 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.further import Reasons, attempted
+from pendmap.comparison.further import Reasons, attempted
 from pendmap.diagnosis.next_experiment.limits import detection_limits
 from pendmap.diagnosis.next_experiment.power import seen, separated, tightened
 
 if TYPE_CHECKING:
-    from pendmap.diagnosis.data import Evidence
+    from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.next_experiment.limits import Limit
     from pendmap.diagnosis.next_experiment.power import Outlook, Prospect
     from pendmap.diagnosis.scores import Scores
@@ -28,22 +28,14 @@ MARGIN: Final = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Advice:
-    """What to record next.
+    """What to record next."""
 
-    Parameters
-    ----------
-    next_experiment : str or None
-        In a sentence or two; none where it cannot be computed.
-    limits : mapping of str to Limit
-        For each effect that was not found the smallest size that would have been found with 95 %
-        probability.
-    outlook : Outlook or None
-        What is wanted, and what each proposal would do for it; none where no proposal can be run
-        through by the model.
-    """
-
-    next_experiment: str | None
+    next_experiment: str | None  # In a sentence or two; none where it cannot be computed
+    # For each effect that was not found the smallest size that would have been found with 95 %
+    # probability.
     limits: dict[str, Limit]
+    # What is wanted, and what each proposal would do for it; none where no proposal can be run
+    # through by the model.
     outlook: Outlook | None
 
     @property

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.comparison.data import held_parts
+from pendmap.comparison.replay import Motion, replayed
 from pendmap.diagnosis.candidates import placed
-from pendmap.diagnosis.data import held_parts
-from pendmap.diagnosis.replay import Motion, replayed
 from pendmap.errors import InputError
 from pendmap.identification.free import PER_RUN
 from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.further import Reasons
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.further import Reasons
     from pendmap.diagnosis.next_experiment.proposals import Planned, Proposal, Start
     from pendmap.diagnosis.state import Found
     from pendmap.identification.fitting import TrajectoryFit
@@ -53,15 +53,9 @@ ALL: Final = 2e-6
 
 @dataclasses.dataclass(frozen=True)
 class Information:
-    """The information of records about columns.
+    """The information of records about columns."""
 
-    Parameters
-    ----------
-    matrix : ndarray of float, shape (k, k)
-        ``X' X``, in SI.
-    """
-
-    matrix: Floats
+    matrix: Floats  # ``X' X``, in SI
 
     def __add__(self, other: Information) -> Information:
         return Information(self.matrix + other.matrix)
@@ -78,12 +72,7 @@ class Information:
     def followed(self, columns: Sequence[int], by: Sequence[int], beside: Sequence[int]) -> Floats:
         """Return the coefficients by which columns come nearest to others, shape (n of by, n).
 
-        Parameters
-        ----------
-        columns : sequence of int
-            Those that are followed.
-        by, beside : sequence of int
-            Those that follow; coefficients of the first are returned.
+        ``beside`` follow too; their coefficients are not returned.
         """
         every = [*by, *beside]
         found = self._inverse(every) @ self.matrix[np.ix_(every, columns)]
@@ -103,20 +92,12 @@ class Information:
 
 @dataclasses.dataclass(frozen=True)
 class Columns:
-    """Derivatives at a fit, window by window.
+    """Derivatives at a fit, window by window."""
 
-    Parameters
-    ----------
-    shared : tuple of str
-        The fitted parameters that belong to no run alone; the first columns.
-    places : mapping of Candidate's title to list of int
-        The columns of each further candidate: size, and phase if it has one.
-    windows : tuple of WindowSlopes
-        Columns are those of ``shared`` and the candidates', then those of single runs.
-    """
-
-    shared: tuple[str, ...]
+    shared: tuple[str, ...]  # The fitted parameters that belong to no run alone; the first columns
+    # The columns of each further candidate: size, and phase if it has one.
     places: dict[str, list[int]]
+    # Columns are those of ``shared`` and the candidates', then those of single runs.
     windows: tuple[WindowSlopes, ...]
 
     @property
@@ -130,14 +111,7 @@ class Columns:
     ) -> Columns:
         """Return the derivatives by a fit's parameters and by candidates'.
 
-        Parameters
-        ----------
-        fit : TrajectoryFit
-            Where they are taken, with the windows of the runs.
-        runs : sequence of FitRun
-            The records.
-        candidates : sequence of Candidate
-            Further effects; an effect may be there in several shapes.
+        They are taken with the windows of the runs; an effect may be there in several shapes.
         """
         shared = tuple(dict.fromkeys(name for name in fit.names if not _of_one_run(name)))
         places: dict[str, list[int]] = {}
@@ -173,14 +147,7 @@ class Columns:
     ) -> Information:
         """Return the information of all runs, or of the first samples of one.
 
-        Parameters
-        ----------
-        run : int, optional
-            Which run; all by default.
-        samples : int, optional
-            How many of its samples; all by default.
-        hold : bool
-            Whether stretches of it will be held back, as of records of which no whole run is.
+        ``hold``: stretches of it will be held back, as of records of which no whole run is.
         """
         total = np.zeros((self.count, self.count))
         rows: dict[int, list[Floats]] = {}
@@ -237,18 +204,7 @@ FEWEST: Final = 3
 class Prospects:
     """Proposals run through by the model found, and what they would say.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The records, from which sampling and noise come.
-    found : Found
-        The model.
-    menu : sequence of Proposal
-        What might be recorded; one in which the model is lost is left out.
-    candidates : sequence of Candidate
-        Effects beside those of the model.
-    reasons : dict of str to str
-        Where it is kept how many are left out, and why.
+    A proposal in which the model is lost is left out; ``reasons`` has how many, and why.
 
     Raises
     ------
@@ -320,7 +276,7 @@ def _simulated(
     evidence: Evidence, found: Found, longest: dict[Start, float], reasons: Reasons
 ) -> tuple[list[Start], list[FitRun], Windows]:
     """Return starts, runs and windows of what the model could be run through."""
-    motion, w0 = Motion.of(found), found.trial.fit.model.w0
+    motion, w0 = Motion.of(found.trial.fit), found.trial.fit.model.w0
     step = _step(evidence, w0)
     readings = [evidence.readings[k] for k in evidence.fitted_of]
     floor = float(np.median([reading.sigma for reading in readings]))

@@ -28,20 +28,12 @@ HUGE: Final = 10.0
 
 @dataclasses.dataclass(frozen=True)
 class Limit:
-    """The smallest size of an effect that would have been found with 95 % probability.
+    """The smallest size of an effect that would have been found with 95 % probability."""
 
-    Parameters
-    ----------
-    size : float
-        In SI, in the shape that shows it least of those that show it; infinite where none does.
-    candidate : Candidate
-        The effect in that shape.
-    unseen : tuple of Candidate
-        Shapes that the records do not show at all, where there are others that they do.
-    """
-
+    # In SI, in the shape that shows it least of those that show it; infinite where none does.
     size: float
-    candidate: Candidate
+    candidate: Candidate  # The effect in that shape
+    # Shapes that the records do not show at all, where there are others that they do.
     unseen: tuple[Candidate, ...] = ()
 
 
@@ -53,17 +45,6 @@ def detection_limits(
     Of a size ``a`` the expected gain is ``a^2`` times the information ``x' x`` (what of the
     effect's own the fitted parameters and initial states cannot follow); the gain is then
     distributed as noncentral chi-squared, and has to pass the search's threshold.
-
-    Parameters
-    ----------
-    scores : Scores
-        Of all candidates, at the model beside which they were looked for.
-    level : float
-        Of the noise.
-    found : collection of str
-        Effects that have no limit, as they are there.
-    units : Units
-        Of the model.
     """
     shapes: dict[str, list[tuple[float, Candidate]]] = {}
     for score in scores.scores:
@@ -106,12 +87,7 @@ def _greatest(candidate: Candidate, units: Units) -> float:
 def needed(threshold: float, count: int) -> float:
     """Return the expected gain with which a threshold is passed with 95 % probability.
 
-    Parameters
-    ----------
-    threshold : float
-        What the gain has to pass.
-    count : int
-        Of numbers that are fitted: degrees of freedom.
+    ``count`` are the degrees of freedom: how many numbers are fitted.
     """
     from scipy.optimize import brentq  # noqa: PLC0415 (where it is needed)
     from scipy.stats import ncx2  # noqa: PLC0415

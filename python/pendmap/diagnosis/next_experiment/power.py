@@ -25,9 +25,9 @@ from pendmap.diagnosis.thresholds import Thresholds
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.further import Reasons
     from pendmap.diagnosis.alternatives import Rival, Standing
-    from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.further import Reasons
     from pendmap.diagnosis.next_experiment.information import Information
     from pendmap.diagnosis.next_experiment.proposals import Proposal
     from pendmap.diagnosis.scores import Scores
@@ -220,52 +220,28 @@ Aim = Literal["separation", "interval", "limits"]
 
 @dataclasses.dataclass(frozen=True)
 class Prospect:
-    """What a proposal would do.
+    """What a proposal would do."""
 
-    Parameters
-    ----------
-    proposal : Proposal
-        What would be recorded.
-    value : float
-        The figure that is wanted, after it.
-    wrong : float or None
-        Chance that the wrong name would win, of a separation.
-    resolved : float or None
-        Chance that only one name would be left, of a separation.
-    """
-
-    proposal: Proposal
-    value: float
-    wrong: float | None = None
-    resolved: float | None = None
+    proposal: Proposal  # What would be recorded
+    value: float  # The figure that is wanted, after it
+    wrong: float | None = None  # Chance that the wrong name would win, of a separation
+    resolved: float | None = None  # Chance that only one name would be left, of a separation
 
 
 @dataclasses.dataclass(frozen=True)
 class Outlook:
-    """What is wanted, and what each proposal would do for it.
+    """What is wanted, and what each proposal would do for it."""
 
-    Parameters
-    ----------
-    aim : str
-        ``separation``: the least ``s G`` of names that are not told apart; ``interval``: the width
-        of the widest interval of 95 %, over the value; ``limits``: the median over effects of the
-        smallest size that would be seen, over what it is now.
-    about : tuple of str
-        The names it is about: of a class; the parameter; those effects whose limits fall most.
-    now, wanted : float
-        The figure without a new record, and what is aimed at.
-    prospects : tuple of Prospect
-        In the order of the menu.
-    equals : tuple of (str, str)
-        Names that none of the proposals tells apart.
-    """
-
+    # ``separation``: the least ``s G`` of names that are not told apart; ``interval``: the width of
+    # the widest interval of 95 %, over the value; ``limits``: the median over effects of the
+    # smallest size that would be seen, over what it is now.
     aim: Aim
+    # The names it is about: of a class; the parameter; those effects whose limits fall most.
     about: tuple[str, ...]
-    now: float
+    now: float  # The figure without a new record, and what is aimed at
     wanted: float
-    prospects: tuple[Prospect, ...]
-    equals: tuple[tuple[str, str], ...] = ()
+    prospects: tuple[Prospect, ...]  # In the order of the menu
+    equals: tuple[tuple[str, str], ...] = ()  # Names that none of the proposals tells apart
 
     @property
     def best(self) -> Prospect | None:

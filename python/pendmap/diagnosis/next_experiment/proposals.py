@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.data import Evidence
+    from pendmap.comparison.data import Evidence
     from pendmap.identification.runs import FitRun
 
 __all__ = ["Planned", "Proposal", "Start", "menu_of"]
@@ -70,27 +70,14 @@ SWINGING: Final = 1.0
 
 @dataclasses.dataclass(frozen=True)
 class Start:
-    """How a run begins, and what drives it.
+    """How a run begins, and what drives it."""
 
-    Parameters
-    ----------
-    what : str
-        In words.
-    theta, velocity : float
-        Angle (rad) and velocity (rad/s) at the first sample.
-    wait_s : float
-        Pause in the laboratory before it, s, beyond the usual one.
-    lab_time_s : float
-        When it begins.
-    drive : mapping of str to float or None
-        As of :class:`pendmap.identification.runs.FitRun`; none of a free decay.
-    """
-
-    what: str
-    theta: float
+    what: str  # In words
+    theta: float  # Angle (rad) and velocity (rad/s) at the first sample
     velocity: float
-    wait_s: float
-    lab_time_s: float
+    wait_s: float  # Pause in the laboratory before it, s, beyond the usual one
+    lab_time_s: float  # When it begins
+    # As of FitRun; none of a free decay.
     drive: Mapping[str, float | None] | None = dataclasses.field(default=None, hash=False)
 
     @property
@@ -109,15 +96,9 @@ class Planned:
 
 @dataclasses.dataclass(frozen=True)
 class Proposal:
-    """An experiment: runs to be recorded beside the records that there are.
+    """An experiment: runs to be recorded beside the records that there are."""
 
-    Parameters
-    ----------
-    runs : tuple of Planned
-        One or more of the same length.
-    """
-
-    runs: tuple[Planned, ...]
+    runs: tuple[Planned, ...]  # One or more of the same length
 
     @property
     def seconds(self) -> float:

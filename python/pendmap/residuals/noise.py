@@ -4,7 +4,7 @@ A pendulum's model errs slowly: what it lacks shows at the frequencies of the sw
 lowest harmonics and below. Noise stands above them too, so that the spectrum there says how strong
 it is where errors of the model cannot be told from it: as strong if it is white, stronger where it
 is correlated from sample to sample. The laws that the upper part of the spectrum allows
-(:mod:`pendmap.diagnosis.colour`) are continued downward, each with its probability.
+(:mod:`pendmap.residuals.colour`) are continued downward, each with its probability.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.colour import Laws, laws_of
-from pendmap.diagnosis.spectrum import spectra_of
+from pendmap.residuals.colour import Laws, laws_of
+from pendmap.residuals.spectrum import spectra_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

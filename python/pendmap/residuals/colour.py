@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.spectrum import PHASES
+from pendmap.residuals.spectrum import PHASES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,7 +101,7 @@ def laws_of(power: Floats, sizes: Floats, floors: Floats) -> Laws:
     ----------
     power : ndarray of float, shape (runs, bins)
         Squared amplitudes added up in each bin; bins as of
-        :data:`pendmap.diagnosis.spectrum.PHASES`.
+        :data:`pendmap.residuals.spectrum.PHASES`.
     sizes : ndarray of float, shape (runs, bins)
         How many there are; one or more in all.
     floors : ndarray of float, shape (runs,)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.further import Reasons, attempted
-from pendmap.diagnosis.replay import Motion, replayed
+from pendmap.comparison.further import Reasons, attempted
+from pendmap.comparison.replay import Motion, replayed
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of
@@ -22,8 +22,9 @@ from pendmap.identification.table1 import errors_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.state import Found
+    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.replay import Fits
+    from pendmap.identification.fitting import TrajectoryFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors
 
@@ -64,7 +65,7 @@ class Cycles:
     errors: dict[str, PeakErrors]
 
 
-def cycles_of(evidence: Evidence, base: Found, best: Found, reasons: Reasons) -> tuple[Cycles, ...]:
+def cycles_of(evidence: Evidence, base: Fits, best: Fits, reasons: Reasons) -> tuple[Cycles, ...]:
     """Return figure 7 of every free run that has a full cycle, those held out first."""
     found = []
     for k, (run, reading) in enumerate(zip(evidence.runs, evidence.readings, strict=True)):
@@ -78,7 +79,7 @@ def cycles_of(evidence: Evidence, base: Found, best: Found, reasons: Reasons) ->
             simulated = attempted(
                 reasons,
                 f"cycles.{run.name}.{name}",
-                functools.partial(_simulated, model, peaks, reading.sigma, run.lab_time_s),
+                functools.partial(_simulated, model.fitted, peaks, reading.sigma, run.lab_time_s),
                 None,
             )
             if simulated is not None:
@@ -89,19 +90,19 @@ def cycles_of(evidence: Evidence, base: Found, best: Found, reasons: Reasons) ->
 
 
 def _simulated(
-    found: Found, peaks: Peaks, sigma: float, lab_time_s: float
+    fit: TrajectoryFit, peaks: Peaks, sigma: float, lab_time_s: float
 ) -> tuple[Floats, Floats]:
     """Return times and angles of a model's peaks from the first measured one on."""
     turned = peaks.turned
     first, amplitude = float(turned.time[0]), float(turned.amplitude[0])
     until = 1.2 * (float(turned.time[-1]) - first) + 5.0
-    swing = math.tau / found.trial.fit.model.w0
+    swing = math.tau / fit.model.w0
     time = first + np.linspace(0.0, until, math.ceil(PER_SWING * until / swing) + 1)
     run = FitRun(time, np.zeros(time.shape), sigma, lab_time_s=lab_time_s)
     # The sensor's errors stand between the angle and its reading; they change slowly with it.
     start = amplitude
     for _ in range(2):
-        ((readings, curve),) = replayed(Motion.of(found), [run], [(start, 0.0)])
+        ((readings, curve),) = replayed(Motion.of(fit), [run], [(start, 0.0)])
         start += amplitude - float(readings[0])
     return _peaks(time, readings, curve)
 

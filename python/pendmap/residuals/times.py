@@ -21,14 +21,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.data import Evidence
+    from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
-    from pendmap.model import Rig
 
     Floats = NDArray[np.float64]
 
-__all__ = ["located"]
+__all__ = ["Response", "calm_responses", "frequencies", "instants"]
 
 KEPT: Final = 4
 """Frequencies, or instants, that are kept."""
@@ -49,51 +47,21 @@ DRAWS: Final = 32
 """Draws of noise that say what it makes of the products at each frequency."""
 
 
-def located(
-    evidence: Evidence,
-    pool: Sequence[Sequence[Candidate]],
-    windows: Sequence[WindowSlopes],
-    model: Rig,
-) -> list[list[Candidate]]:
-    """Return candidates with a frequency or an instant in the shapes that residuals ask for most.
+def calm_responses(
+    runs: Sequence[FitRun], windows: Sequence[WindowSlopes], damping: float
+) -> list[Response]:
+    """Return what torques do in the windows in which motions do not part.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The records.
-    pool : sequence of sequence of Candidate
-        By effect, each in its shapes.
-    windows : sequence of WindowSlopes
-        Residuals of a model and their derivatives by the initial states.
-    model : Rig
-        The model.
+    What a torque does where a change of the start grows far more than in other windows is great,
+    and to first order wrong. ``damping`` is ``c/m``, 1/s.
     """
-    found: list[list[Candidate]] = []
-    responses = _calm(list(_responses(evidence, windows, model.c_over_m))) if pool else []
-    if not responses:
-        return found
-    for one, *_ in pool:
-        scanned = one.sought or {}
-        unit = model.w0 ** scanned["power_of_w0"]
-        look = _frequencies if scanned["role"] == "frequency" else _instants
-        values = look(responses, scanned["typical"][1] * unit)
-        own = [{**one.shape, scanned["name"]: value / unit} for value in values]
-        found.append([dataclasses.replace(one, shape=shape) for shape in own])
-    return found
+    every = list(_responses(runs, windows, damping))
+    growth = [float(np.abs(own.states / own.weight[:, None]).max()) for own in every]
+    least = GROWTH * min(growth, default=0.0)
+    return [own for own, by in zip(every, growth, strict=True) if by <= least]
 
 
-def _calm(responses: list[_Response]) -> list[_Response]:
-    """Return the windows in which a change of the start does not grow far more than in others.
-
-    What a torque does where motions part is great, and to first order wrong.
-    """
-    if not responses:
-        return []
-    growth = np.array([np.abs(own.states / own.weight[:, None]).max() for own in responses])
-    return [own for own, by in zip(responses, growth, strict=True) if by <= GROWTH * growth.min()]
-
-
-def _instants(responses: Sequence[_Response], _: float) -> list[float]:
+def instants(responses: Sequence[Response]) -> list[float]:
     """Return the times in the laboratory, s, of the knocks that would gain most."""
     time, gain = [], []
     for own in responses:
@@ -105,7 +73,7 @@ def _instants(responses: Sequence[_Response], _: float) -> list[float]:
     return _greatest(np.concatenate(time), np.concatenate(gain), 0.0)
 
 
-def _frequencies(responses: Sequence[_Response], most: float) -> list[float]:
+def frequencies(responses: Sequence[Response], most: float) -> list[float]:
     """Return the frequencies up to ``most``, rad/s, of the sways that would gain most.
 
     Each window has its products ``P`` with ``exp(i w t)`` in its own time, and what noise makes of
@@ -147,7 +115,7 @@ def _frequencies(responses: Sequence[_Response], most: float) -> list[float]:
     return _greatest(omega[peaks], np.array(gains), np.pi / longest)
 
 
-def _gain(responses: Sequence[_Response], omega: float) -> float:
+def _gain(responses: Sequence[Response], omega: float) -> float:
     """Return the gain of a sway of one frequency, draws of noise aside."""
     pull, information = np.zeros(2), np.zeros((2, 2))
     for own in responses:
@@ -167,7 +135,7 @@ def _greatest(values: Floats, gains: Floats, apart: float) -> list[float]:
 
 
 @dataclasses.dataclass(frozen=True)
-class _Response:
+class Response:
     """What torques do in a window, by what stands at the head of the file.
 
     ``time`` is that of the laboratory, ``basis`` spans what the initial state does.
@@ -219,10 +187,10 @@ def _later(values: Floats) -> Floats:
 
 
 def _responses(
-    evidence: Evidence, windows: Sequence[WindowSlopes], damping: float
-) -> Iterator[_Response]:
+    runs: Sequence[FitRun], windows: Sequence[WindowSlopes], damping: float
+) -> Iterator[Response]:
     for window in windows:
-        run = evidence.fitted[window.run]
+        run = runs[window.run]
         kept = np.flatnonzero(window.weight > 0)
         if kept.size < KEPT:
             continue
@@ -230,7 +198,7 @@ def _responses(
         states, weight = window.states[kept], window.weight[kept]
         basis, _ = np.linalg.qr(states)
         residual = window.residual[kept]
-        yield _Response(
+        yield Response(
             run.lab_time_s + time,
             np.cos(run.theta[window.first + kept]),
             residual - basis @ (basis.T @ residual),

@@ -20,12 +20,11 @@ from pendmap.identification.sensitivity import sensitivities
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.diagnosis.candidates import Candidate
     from pendmap.identification.fitting import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
-__all__ = ["exponents", "nearer"]
+__all__ = ["nearer"]
 
 STAGES: Final = 8
 """Exponents that are tried at most."""
@@ -49,15 +48,6 @@ HOPE: Final = 3.0
 """So many times as much as a step promises is the most that is hoped for."""
 
 
-def exponents(candidate: Candidate) -> dict[str, str]:
-    """Return the exponents of an effect's shape by the sizes whose units depend on them."""
-    return {
-        f"{candidate.name}.{entry['name']}": f"{candidate.name}.{entry['power_of_w0_less']}"
-        for entry in candidate.definition["parameters"]
-        if f"{candidate.name}.{entry['power_of_w0_less']}" in candidate.adapted
-    }
-
-
 def nearer(  # noqa: PLR0913 (what to fit, and how)
     fit: TrajectoryFit,
     runs: Sequence[FitRun],
@@ -69,18 +59,8 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
 ) -> TrajectoryFit:
     """Return a fit in which an exponent, which is not fitted, is near its best.
 
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        Of all else.
-    runs : sequence of FitRun
-        Its records.
-    size, exponent : str
-        The size whose unit depends on the exponent, and this.
-    again : callable
-        Fits a model from a start on, with the windows of a fit; an InputError where it is lost.
-    target : float
-        The sum of squares that is to be reached; what promises far less is given up.
+    ``again`` fits a model from a start on, with the windows of a fit. What promises far less than
+    the sum of squares ``target`` is given up.
     """
     reach = REACH
     for _ in range(STAGES):

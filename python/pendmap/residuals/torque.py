@@ -30,11 +30,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.fitted_model import Trial
-    from pendmap.diagnosis.noise import Remainder
+    from pendmap.identification.fitting import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
+    from pendmap.residuals.noise import Remainder
 
     Floats = NDArray[np.float64]
 
@@ -68,29 +67,21 @@ LOST: Final = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Torque:
-    """The torque that a model lacks.
+    """The torque that a model lacks."""
 
-    Parameters
-    ----------
-    rows : dict of list of dict
-        For each of :data:`OVER` a row a bin: ``from`` and ``to``, ``torque`` and ``stderr`` in
-        rad/s^2, ``z`` their ratio, whether it is the torque along the motion. Empty where the
-        records do not show it.
-    gains : dict of (float, int)
-        For each what the sum of squares falls by if the torques of all its bins are added to the
-        model, and how many numbers that is.
-    remainder : Remainder
-        What the model leaves, and with it the noise.
-    """
-
+    # For each of OVER a row a bin: ``from`` and ``to``, ``torque`` and ``stderr`` in rad/s^2, ``z``
+    # their ratio, whether it is the torque along the motion. Empty where the records do not show
+    # it.
     rows: dict[str, list[dict[str, Any]]]
+    # For each what the sum of squares falls by if the torques of all its bins are added to the
+    # model, and how many numbers that is.
     gains: dict[str, tuple[float, int]]
-    remainder: Remainder
+    remainder: Remainder  # What the model leaves, and with it the noise
 
     @classmethod
-    def unknown(cls, trial: Trial) -> Torque:
+    def unknown(cls, remainder: Remainder) -> Torque:
         """Return that of a model of which it cannot be computed."""
-        return cls({name: [] for name in OVER}, {}, trial.remainder)
+        return cls({name: [] for name in OVER}, {}, remainder)
 
     @property
     def chance(self) -> float:
@@ -100,9 +91,9 @@ class Torque:
         return min(min(tails, default=1.0) * max(len(tails), 1), 1.0)
 
 
-def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
+def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, remainder: Remainder) -> Torque:
     """Return the torque that a fitted model lacks in the runs that it was fitted to."""
-    windows, places = windows_of(evidence, trial)
+    windows, places = windows_of(runs, fit)
     names = [name for name in OVER if any(np.isfinite(p[name]).any() for p in places)]
     edges = {
         name: np.unique(
@@ -112,15 +103,15 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
     }
     names = [name for name in names if edges[name].size > 2]  # noqa: PLR2004 (two bins at least)
     columns = [
-        responses(evidence.fitted[window.run], window, _binned(place, {n: edges[n] for n in names}))
+        responses(runs[window.run], window, _binned(place, {n: edges[n] for n in names}))
         for window, place in zip(windows, places, strict=True)
     ]
-    further, residual = freed(evidence, windows, columns)
+    further, residual = freed(runs, windows, columns)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
     joint = _solved(further, residual)
     # Errors are those of what the bins together leave.
-    wide = math.sqrt(max(trial.remainder.level, _level(residual - further @ joint.torque)))
+    wide = math.sqrt(max(remainder.level, _level(residual - further @ joint.torque)))
     first = 0
     for name in names:
         last = first + edges[name].size - 1
@@ -141,7 +132,7 @@ def residual_torque(evidence: Evidence, trial: Trial) -> Torque:
             for k in range(torque.size)
         ]
         first = last
-    return Torque(found, gains, trial.remainder)
+    return Torque(found, gains, remainder)
 
 
 def _level(residual: Floats) -> float:
@@ -154,19 +145,19 @@ def _level(residual: Floats) -> float:
 
 
 def windows_of(
-    evidence: Evidence, trial: Trial
+    runs: Sequence[FitRun], fit: TrajectoryFit
 ) -> tuple[list[WindowSlopes], list[dict[str, Floats]]]:
     """Return the derivatives of a fit window by window, and where the motion is at each sample.
 
     All samples have them: integrals run through those that do not count.
     """
-    whole = [dataclasses.replace(run, trusted=None) for run in evidence.fitted]
-    _, windows = window_slopes(trial.fit, whole, (), trial.fit.model)
-    return windows, [_places(evidence.fitted[w.run], trial, w) for w in windows]
+    whole = [dataclasses.replace(run, trusted=None) for run in runs]
+    _, windows = window_slopes(fit, whole, (), fit.model)
+    return windows, [_places(runs[w.run], fit, w) for w in windows]
 
 
 def freed(
-    evidence: Evidence, windows: Sequence[WindowSlopes], columns: Sequence[Floats]
+    runs: Sequence[FitRun], windows: Sequence[WindowSlopes], columns: Sequence[Floats]
 ) -> tuple[Floats, Floats]:
     """Return columns and residuals, what parameters and initial states can follow taken off.
 
@@ -174,7 +165,7 @@ def freed(
     """
     parts = []
     for window, own in zip(windows, columns, strict=True):
-        run = evidence.fitted[window.run]
+        run = runs[window.run]
         if run.trusted is not None:
             lost = ~run.trusted[window.first : window.first + len(window.residual)]
             for values in (own, window.columns, window.states, window.residual):
@@ -193,11 +184,11 @@ def standing_out(torque: Torque) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: -abs(row["z"]))
 
 
-def _places(run: FitRun, trial: Trial, window: WindowSlopes) -> dict[str, Floats]:
+def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, Floats]:
     """Return where the motion is at each sample of a window."""
     own = slice(window.first, window.first + len(window.residual))
-    theta, velocity = (row[own] for row in trial.fit.curves[window.run])
-    energy = 1 - np.cos(theta) + 0.5 * (velocity / trial.fit.model.w0) ** 2
+    theta, velocity = (row[own] for row in fit.curves[window.run])
+    energy = 1 - np.cos(theta) + 0.5 * (velocity / fit.model.w0) ** 2
     amplitude = np.where(
         energy > 2,  # noqa: PLR2004 (that of the upright rest)
         math.pi * np.sqrt(energy / 2),
@@ -206,7 +197,7 @@ def _places(run: FitRun, trial: Trial, window: WindowSlopes) -> dict[str, Floats
     phase = np.full(theta.shape, math.nan)
     if run.drive:
         names = (f"phi[{window.run}]", "phi")
-        fitted = next((trial.fit[n] for n in names if n in trial.fit.estimates), 0.0)
+        fitted = next((fit[n] for n in names if n in fit.estimates), 0.0)
         known = run.drive.get("phi")
         turned = float(run.drive.get("Omega") or 0.0) * run.time[own]
         phase = np.angle(np.exp(1j * (turned + (fitted if known is None else known))))
@@ -233,18 +224,7 @@ def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
 def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
     """Return what torques do to the readings of a window, over their standard errors.
 
-    Parameters
-    ----------
-    run : FitRun
-        The record.
-    window : WindowSlopes
-        The derivatives of its window.
-    torques : ndarray of float, shape (n, k)
-        Torques per moment of inertia at the window's samples, rad/s^2.
-
-    Returns
-    -------
-    ndarray of float, shape (n, k)
+    Torques per moment of inertia at the window's samples, rad/s^2; both have the shape (n, k).
     """
     own = slice(window.first, window.first + len(window.residual))
     time = run.time[own]

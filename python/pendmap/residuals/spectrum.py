@@ -63,7 +63,7 @@ class Spectra:
     states : ndarray of float, shape (runs,)
         How many initial states were adapted.
     independent : float
-        Independent readings, see :class:`pendmap.diagnosis.noise.Remainder`.
+        Independent readings, see :class:`pendmap.residuals.noise.Remainder`.
     """
 
     slow: Floats

@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.further import Reasons, attempted
-from pendmap.diagnosis.replay import Motion, drives, replayed, settled
+from pendmap.comparison.further import Reasons, attempted
+from pendmap.comparison.replay import Motion, drives, replayed, settled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.state import Found
+    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.replay import Fits
     from pendmap.identification.fitting import TrajectoryFit
     from pendmap.identification.runs import FitRun
 
@@ -88,10 +88,10 @@ class _Stretch:
 
 
 def forecasts_of(
-    evidence: Evidence, base: Found, best: Found, reasons: Reasons
+    evidence: Evidence, base: Fits, best: Fits, reasons: Reasons
 ) -> tuple[Forecast, ...]:
     """Return the error of forecasts, of free runs and of forced ones."""
-    swing = math.tau / base.trial.fit.model.w0
+    swing = math.tau / base.fitted.model.w0
     every = [s for place in range(len(evidence.held)) for s in _stretches(evidence, place, swing)]
     kinds = (("free", False), ("forced", True))
     found = []
@@ -133,7 +133,7 @@ def _earliest(stretch: _Stretch, swing: float) -> float:
 
 
 def _forecast(
-    kind: str, stretches: list[_Stretch], base: Found, best: Found, swing: float
+    kind: str, stretches: list[_Stretch], base: Fits, best: Fits, swing: float
 ) -> Forecast | None:
     rooms = [float(s.run.time[s.last]) - _earliest(s, swing) for s in stretches]
     rooms = [room for room in rooms if room > 0]
@@ -152,7 +152,7 @@ def _forecast(
         which.append((counts, bins))
         sigma = np.broadcast_to(np.asarray(stretch.run.sigma, float), ahead.shape)
         floors.append(float(np.mean(sigma[counts] ** 2)) if counts.any() else math.nan)
-    before, after = (_errors(found, starts, which, reach, swing, count) for found in (base, best))
+    before, after = (_errors(model, starts, which, reach, swing, count) for model in (base, best))
     return Forecast(
         kind,
         (np.arange(count) + 0.5) * reach / count,
@@ -185,7 +185,7 @@ def _ahead(stretch: _Stretch, at: float, reach: float) -> NDArray[np.bool_]:
 
 
 def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are sorted)
-    found: Found,
+    model: Fits,
     starts: list[tuple[_Stretch, float]],
     which: list[tuple[NDArray[np.bool_], NDArray[np.int64]]],
     reach: float,
@@ -195,11 +195,11 @@ def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are so
     """Return the root mean square error in each bin."""
     before, whole = [], []
     for stretch, at in starts:
-        run = dataclasses.replace(stretch.run, drive=drives(found, stretch.run, stretch.place))
+        run = dataclasses.replace(stretch.run, drive=drives(model.held, stretch.run, stretch.place))
         behind = _behind(stretch, at, swing)
         before.append(_of(run, behind))
         whole.append(_of(run, behind | _ahead(stretch, at, reach)))
-    motion = Motion.of(found)
+    motion = Motion.of(model.fitted)
     states = settled(motion, before, [_guess(run, swing) for run in before])
     forecasts = replayed(motion, whole, states)
     squares, samples = np.zeros(count), np.zeros(count)
@@ -266,10 +266,10 @@ class Gap:
     by_run: tuple[RunGap, ...]
 
 
-def gap_of(evidence: Evidence, base: Found, best: Found) -> Gap:
+def gap_of(evidence: Evidence, base: Fits, best: Fits) -> Gap:
     """Return the gap that a baseline leaves and that a model leaves."""
-    before, held_before = base.trial.fit, base.held.fit
-    after, held_after = best.trial.fit, best.held.fit
+    before, held_before = base
+    after, held_after = best
     rows = _rows(evidence.fitted, before, after, held_out=False)
     held = _rows(evidence.held, held_before, held_after, held_out=True)
     return Gap(

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendmap.diagnosis.candidates import own_name
 from pendmap.identification.fitting import fit_runs
+from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.state import Found
     from pendmap.identification.fitting import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
@@ -27,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = [
     "EXACT",
     "STEP",
+    "Fits",
     "Motion",
     "Strength",
     "acting",
@@ -42,6 +41,13 @@ none."""
 
 SEARCHED: Final = 12
 """Steps in which a state is found."""
+
+
+class Fits(NamedTuple):
+    """A model fitted to records, and with its parameters held on the records held back."""
+
+    fitted: TrajectoryFit
+    held: TrajectoryFit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,9 +66,8 @@ class Motion:
     own: Mapping[str, float]
 
     @classmethod
-    def of(cls, found: Found) -> Motion:
+    def of(cls, fit: TrajectoryFit) -> Motion:
         """Return that of a model that was fitted."""
-        fit = found.trial.fit
         return cls(fit.model, {name: fit[name] for name in OWN if name in fit.estimates})
 
     def without(self, effect: str) -> Motion:
@@ -118,11 +123,11 @@ def settled(
     return [(theta, velocity) for *_, theta, velocity in fit.windows]
 
 
-def drives(found: Found, run: FitRun, place: int) -> Mapping[str, float | None] | None:
+def drives(held: TrajectoryFit, run: FitRun, place: int) -> Mapping[str, float | None] | None:
     """Return the drive of a run held back, its phase as the model has it where no one knows it."""
     if run.drive is None or run.drive.get("phi") is not None:
         return run.drive
-    known = found.held.fit.estimates
+    known = held.estimates
     phase = next((known[n].value for n in (f"phi[{place}]", "phi") if n in known), 0.0)
     return {**run.drive, "phi": phase}
 
@@ -170,7 +175,7 @@ class Strength:
     greatest_reading: float
 
 
-def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength:
+def strength_of(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -> Strength:
     """Return how strong an effect of a model is, from the motion with it and without it.
 
     Raises
@@ -178,15 +183,14 @@ def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength:
     InputError
         If a motion leaves the range of numbers.
     """
-    fit = best.trial.fit
     step = STEP * 2 * np.pi / fit.model.w0
     runs, states = [], []
-    count = -(-INSTANTS // len(evidence.fitted))
-    for k, run in enumerate(evidence.fitted):
+    count = -(-INSTANTS // len(fitted))
+    for k, run in enumerate(fitted):
         theta, velocity = fit.curves[k]
         known = np.flatnonzero(np.isfinite(theta))
         # Without a phase a drive is none; what is not known was fitted.
-        drive = run.drive and {**run.drive, "phi": _phase(best, run, k)}
+        drive = run.drive and {**run.drive, "phi": _phase(fit, run, k)}
         for at in known[np.linspace(0, known.size - 1, min(count, known.size)).astype(int)]:
             time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # no record has fewer
             runs.append(
@@ -195,7 +199,7 @@ def strength_of(evidence: Evidence, best: Found, effect: str) -> Strength:
                 )
             )
             states.append((float(theta[at]), float(velocity[at])))
-    motion = Motion.of(best)
+    motion = Motion.of(fit)
     torque, reading = acting(motion, effect, runs, states, step)
     return Strength(*(s for x in (torque, reading) for s in (_rms(x), float(np.abs(x).max()))))
 
@@ -219,9 +223,9 @@ def acting(
     return torque, reading
 
 
-def _phase(best: Found, run: FitRun, place: int) -> float:
+def _phase(fit: TrajectoryFit, run: FitRun, place: int) -> float:
     known = (run.drive or {}).get("phi")
-    fitted = best.trial.fit.estimates
+    fitted = fit.estimates
     names = (f"phi[{place}]", "phi")
     return next((fitted[n].value for n in names if n in fitted), 0.0) if known is None else known
 

@@ -11,10 +11,13 @@ import numpy as np
 from pendmap.identification.sensitivity import sensitivities
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.data import Evidence
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+    from pendmap.residuals.noise import Remainder
 
 __all__ = ["RunByRun", "run_by_run"]
 
@@ -27,23 +30,15 @@ BLIND: Final = 1e-9
 
 @dataclasses.dataclass(frozen=True)
 class RunByRun:
-    """Parameters run by run.
+    """Parameters run by run."""
 
-    Parameters
-    ----------
-    coefficients : mapping of str to list of (float, float)
-        For each parameter its value in each run with its standard error (SI), the others kept as
-        all runs together have them; an infinite error where the run does not show it.
-    uneven : float
-        Cochran's Q over all parameters together, less its degrees of freedom, over its standard
-        deviation: what the sum of squares would gain if each run had parameters of its own.
-    chance : float
-        That noise alone makes it so great.
-    """
-
+    # For each parameter its value in each run with its standard error (SI), the others kept as all
+    # runs together have them; an infinite error where the run does not show it.
     coefficients: dict[str, list[tuple[float, float]]]
+    # Cochran's Q over all parameters together, less its degrees of freedom, over its standard
+    # deviation: what the sum of squares would gain if each run had parameters of its own.
     uneven: float
-    chance: float
+    chance: float  # That noise alone makes it so great
 
     def shown(self, name: str) -> list[tuple[float, float]]:
         """Return values and standard errors of a parameter in the runs that show it, SI."""
@@ -70,32 +65,33 @@ class RunByRun:
         return math.sqrt(max(q - (len(shown) - 1), 0.0) / scale)
 
 
-def run_by_run(evidence: Evidence, trial: Trial) -> RunByRun:
+def run_by_run(
+    runs: Sequence[FitRun], fit: TrajectoryFit, noise: Remainder, level: float
+) -> RunByRun:
     """Return what each run would have, to first order from the fit of all.
 
     References
     ----------
     Cochran (1954), Biometrics 10, 101.
     """
-    noise = trial.remainder
-    found = sensitivities(trial.fit, evidence.fitted, (), trial.fit.model)
+    found = sensitivities(fit, runs, (), fit.model)
     sizes = np.linalg.norm(found.columns, axis=0)
     columns = found.columns / np.where(sizes > 0, sizes, 1.0)
     wanted: dict[str, list[tuple[float, float]]] = {name: [] for name in found.names}
     q, degrees = 0.0, -_rank(columns.T @ columns)
-    for k in range(len(evidence.fitted)):
+    for k in range(len(runs)):
         own = columns[found.run == k]
         pull, information = own.T @ found.residual[found.run == k], own.T @ own
         q += float(pull @ np.linalg.pinv(information, rcond=BLIND, hermitian=True) @ pull)
         degrees += _rank(information)
         for place, name in enumerate(found.names):
             seen = float(information[place, place])
-            value = trial.fit.estimates[name].value
+            value = fit.estimates[name].value
             if seen <= BLIND:
                 wanted[name].append((value, math.inf))
                 continue
             step = float(pull[place]) / seen / sizes[place]
-            wanted[name].append((value + step, math.sqrt(trial.level / seen) / sizes[place]))
+            wanted[name].append((value + step, math.sqrt(level / seen) / sizes[place]))
     degrees = max(degrees, 0)
     uneven = (q / noise.level - degrees) / math.sqrt(2 * degrees) if degrees else 0.0
     return RunByRun(wanted, uneven, noise.chance_of(q, degrees))

@@ -59,7 +59,7 @@ class Evidence:
         What the readings of each are worth.
     fitted, held : tuple of FitRun
         What models are fitted to, and what they are tried on; readings far denser than the motion
-        are means over blocks, :func:`pendmap.diagnosis.data.in_blocks`.
+        are means over blocks, :func:`pendmap.comparison.data.in_blocks`.
     fitted_of, held_of : tuple of int
         Which of ``runs`` each belongs to.
     inside : bool
