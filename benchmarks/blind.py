@@ -61,7 +61,8 @@ def drawn(count: int, seed: int, **further: int) -> list[blind_cases.Case]:
     return cases
 
 
-def _read(path: Path) -> list[dict[str, Any]]:
+def rows_of(path: Path) -> list[dict[str, Any]]:
+    """Return the results that a file holds."""
     if not path.exists():
         return []
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
@@ -85,7 +86,7 @@ def main() -> None:
     parser.add_argument("--report", action="store_true", help="only print what --out holds")
     parser.add_argument("--plot", type=Path, default=None, help="figure of the probabilities")
     given = parser.parse_args()
-    rows = _read(given.out)
+    rows = rows_of(given.out)
     drawn_before = rows[-1]["run"] if rows else secrets.randbits(32)
     seed = drawn_before if given.seed is None else given.seed
     if not given.report:

@@ -5,7 +5,8 @@
 The experiments are those of blind.py. Each is diagnosed with the thresholds as they are, and with
 one of them halved, then doubled. A verdict has changed where its word, its names or their reserve
 have. Most searches take the same way: a fit that was made before is remembered. A quarter of the
-experiments have disturbances that no effect describes.
+experiments have disturbances that no effect describes. Results are appended to ``--out``, and a run
+that was ended goes on where it stood.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import json
 import os
 import sys
 import tempfile
@@ -55,6 +57,8 @@ if TYPE_CHECKING:
 
 FIELDS = [field.name for field in dataclasses.fields(Thresholds)]
 FACTORS = (0.5, 2.0)
+RATE = 100.0
+"""Readings a second."""
 
 
 def changed(name: str, factor: float) -> Thresholds:
@@ -132,24 +136,25 @@ def memory() -> Iterator[None]:
             setattr(module, name, whole)
 
 
-def run(case: blind_cases.Case) -> dict[tuple[str, float], bool]:
-    """Return for each threshold and factor whether the verdict on an experiment changes."""
+def run(case: blind_cases.Case) -> dict[str, Any]:
+    """Return what is said of an experiment, as usual and with each threshold changed."""
     own = [effect.split(":")[0] for effect in case.effects] if case.what == "withheld" else []
     without = [name for name in own if name in library()]
     with tempfile.TemporaryDirectory() as folder:
         experiment, _ = blind_cases.record(case, Path(folder))
 
-        def said(thresholds: Thresholds) -> tuple[str, ...]:
+        def said(thresholds: Thresholds) -> list[str]:
             try:
                 found = diagnose(experiment, without=without, thresholds=thresholds)
             except InputError as error:
-                return ("refused", str(error))
+                return ["refused", str(error)]
             names = [effect.name + "?" * effect.approximate for effect in found.effects]
-            return (found.verdict, *names)
+            return [found.verdict, *names]
 
         with memory():
             usual = said(Thresholds())
-            return {(n, f): said(changed(n, f)) != usual for n in FIELDS for f in FACTORS}
+            others = {f"{n} {f:g}": said(changed(n, f)) for n in FIELDS for f in FACTORS}
+    return {"what": case.what, "seed": case.seed, "effects": case.effects, "": usual} | others
 
 
 def main() -> None:
@@ -158,22 +163,34 @@ def main() -> None:
     parser.add_argument("--experiments", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--out", type=Path, default=Path("thresholds.jsonl"))
     given = parser.parse_args()
     mess = given.experiments // 4
     cases = blind.drawn(given.experiments - mess, given.seed, mess=mess)
-    counts = dict.fromkeys(((name, factor) for name in FIELDS for factor in FACTORS), 0)
-    with ProcessPoolExecutor(given.workers) as pool:
-        for done, row in enumerate(pool.map(run, cases), 1):
-            for key, other in row.items():
-                counts[key] += other
-            note(f"{done} of {len(cases)}")
+    cases = [dataclasses.replace(case, rate=RATE) for case in cases]
+    rows = blind.rows_of(given.out)
+    known = {(row["what"], row["seed"]) for row in rows}
+    left = [case for case in cases if (case.what, case.seed) not in known]
+    with (
+        ProcessPoolExecutor(given.workers) as pool,
+        given.out.open("a", encoding="utf-8") as out,
+    ):
+        for done, row in enumerate(pool.map(run, left), 1):
+            out.write(json.dumps(row) + "\n")
+            out.flush()
+            rows.append(row)
+            note(f"{done} of {len(left)}")
     say(machine(("numpy", "scipy")))
-    say(f"seed      {given.seed}; verdicts that change, of {len(cases)}\n")
-    rows = [
-        [name, f"{getattr(Thresholds(), name):g}", *(str(counts[name, f]) for f in FACTORS)]
+    say(f"seed      {given.seed}; verdicts that change, of {len(rows)}\n")
+    lines = [
+        [
+            name,
+            f"{getattr(Thresholds(), name):g}",
+            *(str(sum(row[f"{name} {f:g}"] != row[""] for row in rows)) for f in FACTORS),
+        ]
         for name in FIELDS
     ]
-    say(table(["threshold", "value", "halved", "doubled"], rows))
+    say(table(["threshold", "value", "halved", "doubled"], lines))
 
 
 if __name__ == "__main__":

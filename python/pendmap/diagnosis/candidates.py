@@ -256,7 +256,7 @@ def _scan(entry: Mapping[str, Any]) -> NDArray[np.float64]:
     if entry["role"] == "place":
         return np.linspace(low, high, PLACES)
     if entry["role"] in {"frequency", "instant"}:
-        return np.linspace(low, high, SOUGHT)
+        return np.array([high])  # residuals show it
     if low > 0:
         return np.geomspace(low, high, MODES if entry["role"] == "mode" else SCANNED)
     width = (high - low) / SCANNED

@@ -122,8 +122,13 @@ def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds)
     return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: thresholds.shapes - 1]
 
 
-def without(evidence: Evidence, trial: Trial, dropped: Candidate, level: float) -> Trial | None:
-    """Return a trial's model without one of its effects, fitted from the trial's motion."""
+def without(
+    evidence: Evidence, trial: Trial, dropped: Candidate, level: float, target: float = math.inf
+) -> Trial | None:
+    """Return a trial's model without one of its effects, fitted from the trial's motion.
+
+    The fit is given up where it promises to end far above the sum of squares ``target``.
+    """
     model, free, start = _without(trial, dropped)
     chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
     try:
@@ -135,10 +140,11 @@ def without(evidence: Evidence, trial: Trial, dropped: Candidate, level: float) 
             start=start,
             windows=trial.fit.windows,
             least_gain=LITTLE * level,
+            target=target,
         )
     except InputError:
         return None
-    return within_physics(evidence, rest)
+    return None if rest.fit.given_up else within_physics(evidence, rest, target)
 
 
 def enlarged(
@@ -166,24 +172,29 @@ def replaced(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
 ) -> Trial | None:
     """Return a trial's model with another effect in the place of one, from the trial's motion.
 
-    The fit is given up where it promises to end far above the sum of squares ``target``; it is none
-    where it is above ``rest``, that of the model with neither.
+    The fit is given up where it promises to end far above the sum of squares ``target``; none where
+    it begins or ends above ``rest``, that of the model with neither.
     """
     model, free, start = _without(trial, dropped)
     score = scores.scores[place]
     other = score.candidate
-    try:
-        found = fitted(
+
+    def fit(steps: int) -> Trial:
+        return fitted(
             evidence,
             placed(model, [other]),
             [*free, *other.free, *other.adapted],
             (*(c for c in trial.chosen if c.name != dropped.name), other),
             start=start | score.start,
             windows=trial.fit.windows,
-            steps=FEW_STEPS,
+            steps=steps,
             least_gain=LITTLE * level,
             target=target,
         )
+
+    try:
+        found = fit(0)
+        found = found if found.chi2 > rest else fit(FEW_STEPS)
     except InputError:
         return None
     if found.chi2 > rest:

@@ -11,7 +11,8 @@
    much, if it closes its share of a gap that it does not close whole (with a frequency or an
    instant all of it), and if it loses on no held-out set.
 6. Accepted effects are dropped where they gain too little beside the others, and replaced by what
-   fits better; of fits that the records do not tell apart the simplest and commonest stands.
+   fits better by as much as in step 5; of fits that the records do not tell apart the simplest and
+   commonest stands. A model without an effect is never worse than one with fewer.
 7. Steps 2 to 6 are repeated until nothing is accepted.
 """
 

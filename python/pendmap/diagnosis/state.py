@@ -162,7 +162,8 @@ class State:
         way = key_of(trial.chosen), dropped.name
         if way not in self._rests:
             chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
-            self.keep(without(self.evidence, trial, dropped, self.level))
+            target = self._fewer(chosen).chi2
+            self.keep(without(self.evidence, trial, dropped, self.level, target))
             rest = self._fewer(chosen)
             if len(rest.chosen) < len(chosen):
                 # More parameters fit no worse: the motion was lost on the way.
@@ -280,7 +281,7 @@ class State:
             full.remainder.chance_of(gain, more, full.level if full.level < 1 else 0.0),
             float(fdtrc(more, readings, max(gain, 0.0) / more / full.level)),
         )
-        shapes = {each[0].name: len(each) for each in self._pool(rest)}
+        shapes = {each[0].name: max(len(each), each[0].choices) for each in self._pool(rest)}
         looks = max((shapes.get(c.name, 1) for c in full.chosen), default=1)
         return min(chance * len(shapes) * looks, 1.0)
 
