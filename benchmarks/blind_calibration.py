@@ -1,4 +1,4 @@
-"""The numbers of pendmap/diagnosis/calibration.py from blind experiments.
+"""Coefficients of pendmap/diagnosis/verdict.py from blind experiments.
 
     python benchmarks/blind_calibration.py blind.jsonl [more.jsonl ...]
 

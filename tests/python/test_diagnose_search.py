@@ -15,7 +15,8 @@ from pendmap import read_experiment, virtual_rig
 from pendmap.comparison.data import Evidence, evidence_of
 from pendmap.diagnosis.alternatives import standing_of
 from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.candidates import CORE
+from pendmap.diagnosis.candidates import CORE, Candidate
+from pendmap.diagnosis.fitted_model import with_candidates
 from pendmap.diagnosis.held import predictive
 from pendmap.diagnosis.prune import pruned
 from pendmap.diagnosis.search import search
@@ -146,7 +147,6 @@ def test_without_the_effect_its_rivals_are_behind_by_what_they_miss(
     (drag,) = best.chosen
     standing = standing_of(state, best, drag)
     rest = state.rest(best, drag)
-    assert rest is not None
     assert standing.gain == pytest.approx((rest.chi2 - best.chi2) / best.level)
     assert 0.9 < standing.closed <= 1.1
     behind = {r.candidate.name: r for r in standing.rivals}
@@ -154,6 +154,28 @@ def test_without_the_effect_its_rivals_are_behind_by_what_they_miss(
     cubic = behind["cubic_damping"]
     assert cubic.gain + cubic.behind == pytest.approx(standing.gain)
     assert cubic.alike is (cubic.behind < state.thresholds.alike)
+
+
+def test_a_model_without_an_effect_is_never_worse_than_one_with_fewer(
+    dragged: tuple[State, Trial | None], best: Trial, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known, _ = dragged
+    (drag,) = best.chosen
+    gain = Candidate("encoder_gain")
+    both = with_candidates(known.evidence, best, [gain], {gain.free[0]: 0.0}, level=known.level)
+    right = known.rest(both, gain)
+    # The fit without the gain is lost; the drag is fitted to the given model again.
+    monkeypatch.setattr("pendmap.diagnosis.state.without", lambda *_: None)
+    state = State(known.records, known.base, known.thresholds, 3, ())
+    state.evidence = known.evidence
+    rest = state.rest(both, gain)
+    assert rest.names == ("quadratic_drag",)
+    assert rest.chi2 == pytest.approx(right.chi2, rel=1e-3)
+    # Where that is lost too, the given model is the best one without the gain.
+    monkeypatch.setattr("pendmap.diagnosis.state.enlarged", lambda *_: None)
+    state = State(known.records, known.base, known.thresholds, 3, ())
+    assert state.rest(both, gain) is known.base
+    assert state.rest(best, drag) is known.base
 
 
 def test_a_fit_that_promises_far_less_than_its_target_is_given_up(tmp_path: Path) -> None:

@@ -210,6 +210,17 @@ fn derivatives_hold_where_the_pivot_gives_way() {
 }
 
 #[test]
+fn a_motion_that_asks_for_ever_shorter_steps_is_given_up() {
+    let start = [1.6, -0.1];
+    let mut record = record(undriven(0.02, 0.0), None, start, 10.0);
+    let stiff: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.2, 15.0, 1e4]);
+    record.pendulum = with(record.pendulum, &[stiff]);
+    let window = Window { record: 0, from: 0, to: record.times.len(), start };
+    let problem = Problem::new(vec![record], Vec::new(), TOLERANCE).expect("sound");
+    assert!(!line(&problem, &[], &window).chi2.is_finite());
+}
+
+#[test]
 fn derivatives_hold_for_an_accelerometer_where_the_pivot_gives_way() {
     let compliance: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.05, 5.3, 0.03]);
     let rubbing = with(undriven(0.02, 0.0).with_friction(0.06).expect("in range"), &[compliance]);

@@ -150,9 +150,10 @@ def without(
 def enlarged(
     evidence: Evidence, rest: Trial, trial: Trial, chosen: Sequence[Candidate], level: float
 ) -> Trial | None:
-    """Return a model with all chosen effects, from one with some and what a trial has of them."""
+    """Return a model with all chosen effects, from one with some and a trial's values of others."""
     added = [c for c in chosen if c.name not in rest.names]
-    start = {n: v for n, v in trial.start.items() if any(n in c.free for c in added)}
+    known = {name: trial.start.get(name, 0.0) for c in added for name in c.free}
+    start = known | {c.free[0]: KICK * known[c.free[0]] for c in added}
     try:
         found = with_candidates(evidence, rest, added, start, level=level)
     except InputError:
