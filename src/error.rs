@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What was wrong, and what is allowed.
+/// What was wrong, and what a value must be.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Error {
     /// A quantity is not finite, or outside its range.
@@ -11,7 +11,7 @@ pub enum Error {
         name: &'static str,
         /// What was given.
         value: f64,
-        /// What is allowed.
+        /// What it must be.
         allowed: &'static str,
     },
     /// A parameter of an effect is not finite, or outside its range.
@@ -34,7 +34,7 @@ pub enum Error {
     Formula {
         /// Its name.
         name: String,
-        /// What is wrong, where, and what is allowed.
+        /// What is wrong, where, and what must be there.
         why: String,
     },
     /// One thing said twice.
@@ -105,21 +105,22 @@ impl fmt::Display for Error {
         match self {
             Self::Range { name, value, allowed } => {
                 let value = short(*value);
-                write!(f, "{name} is {value}: allowed is {allowed}")
+                write!(f, "{name} must be {allowed}, got {value}")
             }
             Self::Parameter { effect, parameter, value, allowed: [low, high] } => {
                 let value = short(*value);
-                write!(f, "{effect}: {parameter} is {value}: allowed is {low} to {high}, finite")
+                let range = format!("a finite number from {low} to {high}");
+                write!(f, "{effect}: {parameter} must be {range}, got {value}")
             }
             Self::Effect { name } => {
                 write!(f, "no effect is named '{name}': pendmap effects lists them")
             }
             Self::Formula { name, why } => write!(f, "formula '{name}': {why}"),
             Self::Twice { name, other } => {
-                write!(f, "{name} and {other}: allowed is one of them, they are the same effect")
+                write!(f, "{name} and {other} are the same effect: one of them must be left out")
             }
             Self::NotMappable { effect, why } => {
-                write!(f, "{effect}: allowed in one trajectory, not in maps: {why}")
+                write!(f, "{effect} can be in one trajectory, not in maps: {why}")
             }
             Self::NoRest { why } => write!(f, "hanging at rest has no critical curves here: {why}"),
             Self::Lengths { given, names } => write!(
@@ -129,8 +130,8 @@ impl fmt::Display for Error {
             ),
             Self::Simd { name } => write!(
                 f,
-                "PENDMAP_SIMD is '{name}': allowed are avx512, avx2, sse and portable, as far as \
-                 this processor has them"
+                "PENDMAP_SIMD must be avx512, avx2, sse or portable, as far as this processor has \
+                 them, got '{name}'"
             ),
             Self::Tolerance { tol, reached } => write!(
                 f,
@@ -139,8 +140,8 @@ impl fmt::Display for Error {
             Self::Memory { what, count, needed, free } => {
                 write!(f, "{count} {what} need about {:.3} GB, ", needed / 1e9)?;
                 match free {
-                    Some(free) => write!(f, "{:.3} GB are free: allowed are fewer", free / 1e9),
-                    None => f.write_str("more than is free: allowed are fewer"),
+                    Some(free) => write!(f, "{:.3} GB are free: they must be fewer", free / 1e9),
+                    None => f.write_str("more than is free: they must be fewer"),
                 }
             }
             Self::Diverges => f.write_str(

@@ -75,13 +75,13 @@ def number(name: str, value: object) -> float:
     """
     value = _bare(value)
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise InputError(f"{name} is {shown(value)}: allowed is a number")
+        raise InputError(f"{name} must be a number, got {shown(value)}")
     try:
         result = float(value)
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise InputError(f"{name} is {shown(value)}: allowed is any finite number")
+        raise InputError(f"{name} must be a finite number, got {shown(value)}")
     return result
 
 
@@ -94,15 +94,15 @@ def whole(name: str, value: object, least: int, most: int) -> int:
         For anything else, ``2.0`` and a ``bool`` included.
     """
     value = _bare(value)
-    allowed = f"allowed is a whole number from {least} to {most}"
+    wanted = f"{name} must be a whole number from {least} to {most}"
     if isinstance(value, bool):
-        raise InputError(f"{name} is {value}: {allowed}")
+        raise InputError(f"{wanted}, got {value}")
     try:
         result = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
-        raise InputError(f"{name} is {shown(value)}: {allowed}") from None
+        raise InputError(f"{wanted}, got {shown(value)}") from None
     if not least <= result <= most:
-        raise InputError(f"{name} is {shown(result)}: {allowed}")
+        raise InputError(f"{wanted}, got {shown(result)}")
     return result
 
 
@@ -116,7 +116,7 @@ def flag(name: str, value: object) -> bool:
     """
     value = _bare(value)
     if not isinstance(value, bool):
-        raise InputError(f"{name} is {shown(value)}: allowed is True or False")
+        raise InputError(f"{name} must be True or False, got {shown(value)}")
     return value
 
 
@@ -129,7 +129,7 @@ def call(name: str, value: object, of: str = "two numbers, done and in all") -> 
         If it is something else.
     """
     if value is not None and not callable(value):
-        raise InputError(f"{name} is {shown(value)}: allowed is a function of {of}")
+        raise InputError(f"{name} must be a function of {of}, got {shown(value)}")
 
 
 def of_type(name: str, value: object, kind: type, example: str) -> None:
@@ -142,4 +142,4 @@ def of_type(name: str, value: object, kind: type, example: str) -> None:
     """
     if not isinstance(value, kind):
         article = ("an " if kind.__name__[0] in "AEIOU" else "a ") + kind.__name__
-        raise InputError(f"{name} is {shown(value)}: allowed is {article}, like {example}")
+        raise InputError(f"{name} must be {article}, like {example}, got {shown(value)}")

@@ -149,7 +149,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     p_max = checks.number("p_max", p_max)
     checks.call("progress", progress)
     if plane not in PLANES:
-        raise InputError(f"plane is {checks.shown(plane)}: allowed are {', '.join(PLANES)}")
+        raise InputError(f"plane must be one of {', '.join(PLANES)}, got {checks.shown(plane)}")
     workers = 0 if threads is None else checks.whole("threads", threads, 1, checks.MOST_THREADS)
     refine, inverted = checks.flag("refine", refine), checks.flag("inverted", inverted)
     _check_free(pendulum)
@@ -259,8 +259,8 @@ def _check_free(pendulum: Pendulum) -> None:
     """Refuse friction, under which no stability is lost."""
     if pendulum.theta_r > 0:
         raise InputError(
-            f"theta_r is {pendulum.theta_r:g}: friction holds hanging rest whatever the drive, and "
-            "it never loses its stability: allowed is 0"
+            f"theta_r must be 0, got {pendulum.theta_r:g}: friction holds hanging rest whatever "
+            "the drive, and it never loses its stability"
         )
 
 

@@ -29,7 +29,7 @@ def one_line(text: str) -> str:
 
 
 class InputError(ValueError):
-    """A value that was given is not allowed; the message names it and what is allowed."""
+    """A value that was given is not allowed; the message names it and what it must be."""
 
     def __init__(self, message: object = "") -> None:
         super().__init__(one_line(str(message)))

@@ -117,7 +117,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     theta, velocity = checks.number("theta", theta), checks.number("velocity", velocity)
     precision = checks.number("precision", precision)
     if not 0 < precision <= _MOST_PRECISION:
-        raise InputError(f"precision is {precision:g}: allowed is above 0 up to {_MOST_PRECISION}")
+        raise InputError(
+            f"precision must be a number above 0, up to {_MOST_PRECISION}, got {precision:g}"
+        )
     checks.call("progress", progress)
     choices: _core._ExponentChoices = {
         "precision": precision,

@@ -129,8 +129,8 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
     target = Path(path)
     suffix = target.suffix.lower()
     if suffix not in suffixes:
-        known = ", ".join(suffixes)
-        raise InputError(f"cannot write {str(target)!r}: suffix {suffix!r}, allowed are {known}")
+        known = " or ".join(suffixes)
+        raise InputError(f"cannot write {str(target)!r}: suffix must be {known}, got {suffix!r}")
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(target))
     with _named(target), _stage(target.parent) as stage:
@@ -198,9 +198,7 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
             while len(data) <= most and (read := stream.read(_PROBE)):
                 data += read
     if len(data) > most:
-        raise InputError(
-            f"{source}: is larger than {most / 2**20:g} MiB: allowed are smaller files"
-        )
+        raise InputError(f"{source}: must be a file up to {most / 2**20:g} MiB, it is larger")
     return bytes(data)
 
 
@@ -219,9 +217,9 @@ def check_regular(path: str | os.PathLike[str]) -> None:
 
 def _check_regular(source: Path, mode: int) -> None:
     if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "is a folder: allowed is a file", str(source))
+        raise IsADirectoryError(errno.EISDIR, "must be a file, it is a folder", str(source))
     if not stat.S_ISREG(mode):
-        raise InputError(f"{source}: is no file but a pipe or a device: allowed is a file")
+        raise InputError(f"{source}: must be a file, it is a pipe or a device")
 
 
 def _at_once(name: str, flags: int) -> int:

@@ -42,8 +42,8 @@ class Axis:
             object.__setattr__(self, name, checks.number(name, getattr(self, name)))
         if not 0 < self.high - self.low < math.inf:
             raise InputError(
-                f"bounds {self.low:g}:{self.high:g}: allowed are two finite bounds, the lower "
-                "first, and a finite distance"
+                "bounds must be two finite numbers, the lower first, and a finite distance apart, "
+                f"got {self.low:g}:{self.high:g}"
             )
         object.__setattr__(self, "count", checks.whole("count", self.count, 1, checks.MOST_CELLS))
 
@@ -176,7 +176,7 @@ def frequencies(values: ArrayLike) -> NDArray[np.float64]:
     good = array.ndim == 1 and 0 < array.size <= checks.MOST_CELLS
     if not (good and np.isfinite(array).all() and (array > 0).all() and (np.diff(array) > 0).all()):
         raise InputError(
-            f"omega is {checks.shown(values)}: allowed are numbers above 0 in ascending order"
+            f"omega must be numbers above 0 in ascending order, got {checks.shown(values)}"
         )
     return array
 
@@ -197,14 +197,12 @@ def starts(
             array: NDArray[np.float64] = np.ascontiguousarray(given, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             raise InputError(
-                f"{name} is {checks.shown(given)}: allowed is an array (N,) of numbers"
+                f"{name} must be an array (N,) of numbers, got {checks.shown(given)}"
             ) from None
         if np.ndim(given) != 1:
-            raise InputError(f"{name} has the shape {np.shape(given)}: allowed is (N,)")
+            raise InputError(f"{name} must have the shape (N,), got {np.shape(given)}")
         if not np.isfinite(array).all():
-            raise InputError(
-                f"{name} holds a value that is not finite: allowed are finite starts only"
-            )
+            raise InputError(f"{name} must hold finite starts only, got a value that is not finite")
         arrays.append(array)
     angles, speeds = arrays
     if angles.size != speeds.size:

@@ -128,7 +128,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         from_period = checks.whole("from_period", from_period, 0, checks.MOST_PERIODS)
     seed = checks.whole("seed", seed, 0, checks.MOST_SEED)
     if (theta is None) != (velocity is None):
-        raise InputError("theta and velocity: allowed is both or none of them")
+        raise InputError("both or none of theta and velocity must be given, got one")
     window = ""
     if theta is None or velocity is None:
         draw = np.random.default_rng(seed)

@@ -236,7 +236,7 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
     if count > _LISTED:
         lines.append(f"{count - _LISTED} more are in the result.")
     if pendulum.p == 0 and a["n"] > 1:
-        lines.append("Without drive nothing closes after more than one period: n = 1 is allowed.")
+        lines.append("Without drive nothing closes after more than one period: n must be 1.")
     if pendulum.p == 0 and pendulum.gamma == 0 and a["w"]:
         lines.append(
             "Without drive and damping rotations are there in curves, of any period: Newton's "

@@ -80,7 +80,7 @@ def wanted(name: str) -> list[str]:
     if text in FIGURES:
         return [text]
     there = f"{', '.join(key for key in FIGURES if key != TABLE)}, {TABLE} and all"
-    raise InputError(f"figure {name!r} is not one of the paper's: allowed are {there}")
+    raise InputError(f"figure must be one of the paper's ({there}), got {name!r}")
 
 
 @functools.lru_cache(maxsize=1)
@@ -139,7 +139,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
 
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:
-        raise InputError(f"key is {key!r}: allowed is one figure")
+        raise InputError(f"key must be one figure, got {key!r}")
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":

@@ -297,10 +297,10 @@ def _curves(
     by_name = {axis.name.lower(): axis for axis in axes}
     if set(by_name) != {"p", "omega"}:
         given = " and ".join(axis.name for axis in axes)
-        raise InputError(f"curves over {given}: allowed are p and omega")
+        raise InputError(f"curves must be over p and omega, got {given}")
     omega, p = by_name["omega"], by_name["p"]
     if omega.values.size == 1 or p.bare[-1] <= 0:
-        raise InputError("curves: allowed with ranges of omega and of p above 0")
+        raise InputError("curves must have ranges of omega and of p above 0")
     # A cell reaches half a spacing beyond its middle: the curves go to the edges of the picture.
     half = np.diff(omega.bare)[0] / 2
     low, high = omega.bare[0] - half, omega.bare[-1] + half

@@ -67,8 +67,8 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
         made = {name for functions in KINDS.values() for name in functions}
         raise InputError(
-            f"{target}: what shall be saved is not a result of pendmap: allowed are the datasets "
-            f"that {', '.join(sorted(made))} return"
+            f"{target}: what shall be saved is not a result of pendmap: it must be one of the "
+            f"datasets that {', '.join(sorted(made))} return"
         )
     if target.suffix.lower() == ".zarr":
         return _save_zarr(dataset, target)
@@ -118,9 +118,9 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
         If it cannot be read.
     """
     target = Path(path)
-    allowed = "allowed is a new folder, or a result of pendmap, which is replaced"
+    wanted = "must be a new folder, or a result of pendmap, which is replaced"
     if target.exists() and not target.is_dir():
-        raise InputError(f"{target}: is a file: {allowed}")
+        raise InputError(f"{target}: {wanted}; it is a file")
     if not target.exists() or not any(target.iterdir()):
         return
     try:
@@ -128,10 +128,10 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
     except (FileNotFoundError, ValueError):
         said = {}
     if not isinstance(said, dict) or not said.keys() >= _MARKS or said["kind"] not in [*KINDS]:
-        raise InputError(f"{target}: is a folder of something else: {allowed}")
+        raise InputError(f"{target}: {wanted}; it is a folder of something else")
     for entry in target.rglob("*"):
         if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):
-            raise InputError(f"{target}: holds {entry.name!r}, no part of a result: {allowed}")
+            raise InputError(f"{target}: {wanted}; it holds {entry.name!r}, no part of a result")
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -153,7 +153,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     if not source.exists():
         raise FileNotFoundError(2, "no such file", str(source))
     if source.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{source}: suffix {source.suffix!r}: allowed are {', '.join(SUFFIXES)}")
+        raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {source.suffix!r}")
     zarr = source.suffix.lower() == ".zarr"
     if not (zarr and source.is_dir()):
         check_regular(source)
@@ -184,7 +184,7 @@ def _check_result(dataset: xr.Dataset, source: Path) -> None:
     # What is lazily opened has a size, but takes no memory yet.
     if dataset.nbytes > _memory() / 2:
         size = f"{dataset.nbytes / 2**20:.0f} MiB"
-        raise InputError(f"{source}: unpacks to {size}: allowed is half of this memory")
+        raise InputError(f"{source}: must unpack to half of this memory at most, got {size}")
 
 
 def _memory() -> float:

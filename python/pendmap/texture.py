@@ -112,12 +112,12 @@ def numbered(labels: npt.ArrayLike) -> tuple[Labels, npt.NDArray[np.int64]]:
     """
     given = np.asarray(labels)
     if given.ndim != 2 or not given.size:  # noqa: PLR2004 (a plane)
-        raise InputError(f"labels have the shape {given.shape}: allowed is (M, N), both above 0")
+        raise InputError(f"labels must have the shape (M, N), both above 0, got {given.shape}")
     if given.dtype.kind not in "iu":
-        raise InputError(f"labels are {given.dtype}: allowed are whole numbers")
+        raise InputError(f"labels must be whole numbers, got {given.dtype}")
     known, place = np.unique(np.maximum(given, 0), return_inverse=True)
     if known.size > _MOST_LABELS:
-        raise InputError(f"labels are {known.size} different ones: allowed are {_MOST_LABELS}")
+        raise InputError(f"labels must be at most {_MOST_LABELS} different ones, got {known.size}")
     first = 0 if known[0] == 0 else 1
     cells = (place.reshape(given.shape) + first).astype(np.int16)
     return cells, known.astype(np.int64)

@@ -117,7 +117,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "of steps grows with its root"
         )
     if until <= 0:
-        raise InputError(f"until is {until:g}: allowed is a time above 0")
+        raise InputError(f"until must be a time above 0, got {until:g}")
     periods = until / model.period
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
@@ -128,8 +128,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     if periods * samples > 100 * _MOST_SAMPLES:
         most = 100 * _MOST_SAMPLES // samples * model.period
         raise InputError(
-            f"until is {until:g}: {periods:.3g} periods do not fit into memory: allowed is a time "
-            f"up to {most:.3g}"
+            f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
+            "fit into memory"
         )
     try:
         start = (theta, units.bare(velocity, VELOCITY))

@@ -285,14 +285,14 @@ def fitted_map(dataset: xr.Dataset) -> UncertaintyExponent | None:
 def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
     if "uncertainty_eps" not in dataset:
         raise InputError(
-            "this dataset has no counts of uncertain starts: allowed are maps of pendmap.basins "
+            "this dataset has no counts of uncertain starts: it must be a map of pendmap.basins "
             "of 10,000 cells or more whose labels tell basins apart, made with check=True; or "
             "dataset['label']"
         )
     if dataset["label"].size != dataset.attrs["cells"]:
         raise InputError(
-            "this is a part of a map, and the counts of uncertain starts are of the whole: allowed "
-            "are the whole map, or labels on a grid, dataset['label']"
+            "this is a part of a map, and the counts of uncertain starts are of the whole: it must "
+            "be the whole map, or labels on a grid, dataset['label']"
         )
     found = fitted_map(dataset)
     if found is None:

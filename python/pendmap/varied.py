@@ -112,11 +112,13 @@ def varied(
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else checks.shown(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
         few = dict(list(example.items())[:count])
-        raise InputError(f"what varies is {given or 'nothing'}: allowed is a mapping like {few}")
+        raise InputError(f"what varies must be a mapping like {few}, got {given or 'nothing'}")
     found = tuple(_one(model, name, given) for name, given in ranges.items())
     places = [one.index for one in found]
     if len(set(places)) < len(places):
-        raise InputError(f"{found[0].name} and {found[1].name} are one parameter: allowed are two")
+        raise InputError(
+            f"{found[0].name} and {found[1].name} must be two parameters, they are one"
+        )
     if "stroke_mm" in ranges and {"omega", "Omega", "frequency_hz"} & set(ranges):
         raise InputError(
             "stroke_mm beside a frequency that varies: p = Y Omega^2 / g must vary in their place"
@@ -165,9 +167,9 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
     if name not in powers and name not in shared:
-        allowed = ", ".join([*powers, *shared])
+        there = ", ".join([*powers, *shared])
         raise InputError(
-            f"{checks.shown(name)} is no parameter of this model: allowed are {allowed}"
+            f"{checks.shown(name)} is no parameter of this model: it must be one of {there}"
         )
     values = _values(name, given)
     if name in powers:
@@ -183,14 +185,14 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         entries = effects[which].definition["parameters"]
         if units.si and any(entry["power_of_w0_less"] == parameter for entry in entries):
             raise InputError(
-                f"{name} changes the units of others: allowed with a model without dimensions"
+                f"{name} changes the units of others: the model must be one without dimensions"
             )
         bared = [_set(effects[which], parameter, float(x)).bare(units) for x in values]
         plain = np.array([effect.parameters[parameter] for effect in bared])
         if units.si:
             unit = next(entry["unit"] for entry in entries if entry["name"] == parameter)
     if known.count(bare) > 1:
-        raise InputError(f"{name} is there {known.count(bare)} times: allowed is a single one")
+        raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
     for value in (plain[0], plain[-1]):
         _check(pendulum, bare, float(value), name)
     return Varied(name, values, known.index(bare), plain, unit)
@@ -205,13 +207,13 @@ def _laboratory(rig: Rig) -> dict[str, tuple[str, float]]:
 
 
 def _values(name: str, given: object) -> NDArray[np.float64]:
-    allowed = f"allowed is (first, last, how many), like {name}=(0.5, 2.0, 100)"
+    wanted = f"{name} must be (first, last, how many), like {name}=(0.5, 2.0, 100)"
     if not isinstance(given, tuple | list) or len(given) != 3:  # noqa: PLR2004
-        raise InputError(f"{name} is {checks.shown(given)}: {allowed}")
+        raise InputError(f"{wanted}, got {checks.shown(given)}")
     low, high = (checks.number(name, end) for end in given[:2])
     count = checks.whole(f"{name}: how many", given[2], 1, checks.MOST_CELLS)
     if not (low < high and math.isfinite(high - low)) and not (count == 1 and low == high):
-        raise InputError(f"{name} is {low:g} to {high:g}: {allowed}, the lower one first")
+        raise InputError(f"{wanted}, the lower one first, got {low:g} to {high:g}")
     if count == 1 and low < high:
         raise InputError(f"{name} is {low:g} to {high:g}: one value has one bound")
     return np.linspace(low, high, count)

@@ -119,7 +119,7 @@ impl Problem {
         let known: Vec<usize> = records.iter().map(|r| r.pendulum.parameters().len()).collect();
         for Free { places, start } in &free {
             if !start.is_finite() {
-                return Err(range("start of a free parameter", *start, "any finite number"));
+                return Err(range("start of a free parameter", *start, "a finite number"));
             }
             for (record, slot) in places {
                 let Some(known) = known.get(*record) else {

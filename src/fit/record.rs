@@ -82,7 +82,7 @@ impl Record {
                 return Err(Error::Lengths { given, names: ("times", name) });
             }
             if let Some(value) = values.iter().find(|value| !value.is_finite()) {
-                return Err(range("reading or weight", *value, "any finite number"));
+                return Err(range("reading or weight", *value, "a finite number"));
             }
         }
         if let Some(value) = self.weights.iter().find(|weight| **weight < 0.0) {

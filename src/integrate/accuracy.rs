@@ -68,7 +68,11 @@ pub fn choose(
     path: Path,
 ) -> Result<(Strobe, f64), Error> {
     if !(TOLERANCES[0]..=TOLERANCES[1]).contains(&tol) {
-        return Err(Error::Range { name: "tol", value: tol, allowed: "1e-13 to 1e-2" });
+        return Err(Error::Range {
+            name: "tol",
+            value: tol,
+            allowed: "a number from 1e-13 to 1e-2",
+        });
     }
     let measure = |steps: usize| {
         let strobe = Strobe::new(pendulum, steps, path);

@@ -179,14 +179,18 @@ fn check(request: &Request) -> Result<(), Error> {
     let Request { start, until, tol, samples, .. } = *request;
     for (name, value) in [("theta", start[0]), ("velocity", start[1])] {
         if !value.is_finite() {
-            return Err(Error::Range { name, value, allowed: "any finite number" });
+            return Err(Error::Range { name, value, allowed: "a finite number" });
         }
     }
     if !(until.is_finite() && until > 0.0) {
         return Err(Error::Range { name: "until", value: until, allowed: "a time above 0" });
     }
     if !(TOLERANCES[0]..=TOLERANCES[1]).contains(&tol) {
-        return Err(Error::Range { name: "tol", value: tol, allowed: "1e-13 to 1e-2" });
+        return Err(Error::Range {
+            name: "tol",
+            value: tol,
+            allowed: "a number from 1e-13 to 1e-2",
+        });
     }
     if samples == 0 {
         return Err(Error::Range { name: "samples", value: 0.0, allowed: "1 or more" });

@@ -57,7 +57,11 @@ const MOST_THREADS: usize = 256;
 pub fn pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
     if threads > MOST_THREADS {
         let value = threads as f64;
-        return Err(Error::Range { name: "threads", value, allowed: "1 to 256" });
+        return Err(Error::Range {
+            name: "threads",
+            value,
+            allowed: "a whole number from 1 to 256",
+        });
     }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

@@ -91,7 +91,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     pendulum.check_mappable()?;
     if !(1..=LONGEST).contains(&request.n) {
         let value = request.n as f64;
-        return Err(Error::Range { name: "n", value, allowed: "1 to 64" });
+        return Err(Error::Range { name: "n", value, allowed: "a whole number from 1 to 64" });
     }
     let cells = request.theta.count * request.velocity.count;
     memory::reckon("cells", cells, EACH)?;

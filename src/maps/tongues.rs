@@ -113,7 +113,7 @@ pub fn tongues(
         return Err(Error::Range { name: "p_max", value: p_max, allowed: "above 0, up to 100" });
     }
     if let Some(value) = omegas.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
-        return Err(Error::Range { name: "omega", value: *value, allowed: "above 0" });
+        return Err(Error::Range { name: "omega", value: *value, allowed: "a number above 0" });
     }
     let mut level = pendulum.clone();
     level.torque = 0.0;

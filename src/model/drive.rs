@@ -26,7 +26,7 @@ impl HarmonicDrive {
     /// # Errors
     /// [`Error::Range`] for the first value outside them.
     pub fn new(p: f64, omega: f64, phase: f64) -> Result<Self, Error> {
-        let finite = "any finite number";
+        let finite = "a finite number";
         for (name, value) in [("p", p), ("phase", phase)] {
             if !value.is_finite() {
                 return Err(Error::Range { name, value, allowed: finite });

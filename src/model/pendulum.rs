@@ -60,7 +60,7 @@ impl Pendulum {
             return Err(Error::Range { name: "gamma", value: gamma, allowed: "0 or more" });
         }
         if !torque.is_finite() {
-            let allowed = "any finite number";
+            let allowed = "a finite number";
             return Err(Error::Range { name: "torque", value: torque, allowed });
         }
         let drive = HarmonicDrive::new(p, omega, phase)?;

@@ -67,7 +67,7 @@ impl Recorded {
                 return Err(Error::Lengths { given, names: ("times", "the pivot's motion") });
             }
             if let Some(value) = values.iter().copied().find(|value| !value.is_finite()) {
-                let allowed = "any finite number";
+                let allowed = "a finite number";
                 return Err(Error::Range { name: "sample", value, allowed });
             }
             let order = match quantity {

@@ -153,8 +153,8 @@ fn windows(given: Vec<WindowTuple>, problem: &Problem) -> PyResult<Vec<Window>> 
             return Ok(Window { record, from, to, start: [theta, velocity] });
         }
         Err(PyValueError::new_err(format!(
-            "window of samples {from} to {to} of run {record}, which has {length}: allowed are \
-             samples of a run, the first before the last"
+            "window of run {record} must be samples of a run, the first before the last, got \
+             {from} to {to} of {length}"
         )))
     };
     given.into_iter().map(window).collect()

@@ -68,7 +68,7 @@ pub fn basins_list<'py>(
         return Err(Error::Lengths { given, names: ("theta", "velocity") }.into());
     }
     if let Some(value) = theta.iter().chain(velocity).find(|x| !x.is_finite()) {
-        let allowed = "finite starts only";
+        let allowed = "a finite number";
         return Err(Error::Range { name: "start", value: *value, allowed }.into());
     }
     // Angle and velocity, and all that a map and its dataset have of a start.

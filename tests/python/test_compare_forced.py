@@ -233,10 +233,10 @@ def test_cycles_are_moved_by_periods_and_turns() -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"members": 5}, "members is 5: allowed is a whole number from 20"),
-        ({"spread": -1.0}, "spread is -1: allowed is 0 to 1 rad"),
+        ({"members": 5}, "members must be a whole number from 20 to 100000, got 5"),
+        ({"spread": -1.0}, "spread must be a number from 0 to 1 rad, got -1"),
         ({"spread": math.nan}, "spread"),
-        ({"seed": -1}, "seed is -1"),
+        ({"seed": -1}, "seed must be .*, got -1"),
     ],
 )
 def test_odd_ensembles_are_refused(given: dict[str, float], said: str) -> None:

@@ -178,7 +178,7 @@ def test_what_is_read_is_not_replaced(
     run = pendmap_command("diagnose", *words)
     assert run.returncode == 2
     assert f"Invalid value for '{option}'" in run.stderr
-    assert "is an input, which would be lost: allowed is another file" in run.stderr
+    assert "is an input, which would be lost: it must be another file" in run.stderr
     assert run.stderr.count("\n") == 1
     assert content() == before
 
@@ -190,7 +190,7 @@ def test_a_model_without_dimensions_is_refused_with_what_makes_it_one_in_si(
     (tmp_path / "record.csv").write_text(csv(clean(duration=2.0)), encoding="utf-8")
     run = pendmap_command("diagnose", "record.csv", "--model", "bare.toml")
     assert run.returncode == 2
-    assert "bare.toml: has no dimensions: allowed is a model in SI: in [pendulum] w0" in run.stderr
+    assert "bare.toml: has no dimensions, it must be a model in SI: in [pendulum] w0" in run.stderr
     assert "from_toml" not in run.stderr
     assert run.stderr.count("\n") == 1
 

@@ -89,7 +89,7 @@ def test_functions_are_scored_beside(tmp_path: Path) -> None:
     ("function", "said"),
     [
         (lambda *_: np.zeros(3), "fails with ValueError"),
-        (lambda th, *_: th / 0.0, "allowed are finite numbers"),
+        (lambda th, *_: th / 0.0, "must return finite numbers"),
         (lambda th: th, "fails with TypeError"),
         (lambda th, _v, _t, _phase, own: own["sise"] * th, "fails with KeyError"),
         (lambda th, *_: 1.0 if th > 0 else 0.0, "fails with ValueError"),
@@ -124,7 +124,7 @@ def test_what_cannot_be_a_candidate_is_refused(tmp_path: Path) -> None:
         diagnose(records, effects=[lopsided])
     with pytest.raises(InputError, match="has one twice"):
         diagnose(records, effects=[Formula("one", "-k*v^3", {"k": -1})] * 2)
-    with pytest.raises(InputError, match="allowed is a list of Formula"):
+    with pytest.raises(InputError, match="must be a list of Formula"):
         diagnose(records, effects=3)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="allowed is a Formula, like"):
+    with pytest.raises(InputError, match="must be a Formula, like"):
         diagnose(records, effects=["bump"])  # type: ignore[list-item]

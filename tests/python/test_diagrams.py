@@ -93,7 +93,9 @@ def test_the_figure_names_its_attractors(diagram: xr.Dataset) -> None:
     assert "tumbling chaos" in texts
     assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["up \u2192", "\u2190 down"]
     assert made(diagram, "velocity").axes[0].get_ylabel()
-    with pytest.raises(pendmap.InputError, match="no layer 'labels'"):
+    with pytest.raises(
+        pendmap.InputError, match=r"layer must be one of .* in a diagram, got 'labels'"
+    ):
         made(diagram, "labels")
 
 
@@ -119,9 +121,18 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     assert told["points"] > 20
     assert {"kind", "w", "first", "last"} == told["branches"][0].keys()
     for words, wanted in (
-        (("bifurcation",), "what varies is nothing"),
-        (("bifurcation", "--p", "0:1:3", "--omega", "1:2:3"), "what varies is p, omega"),
-        (("bifurcation", "--p", "0:1:3", "--theta", "1"), "both, or neither"),
+        (
+            ("bifurcation",),
+            "what varies must be a mapping like {'p': (0.5, 2.0, 100)}, got nothing",
+        ),
+        (
+            ("bifurcation", "--p", "0:1:3", "--omega", "1:2:3"),
+            "what varies must be a mapping like {'p': (0.5, 2.0, 100)}, got p, omega",
+        ),
+        (
+            ("bifurcation", "--p", "0:1:3", "--theta", "1"),
+            "both or neither of --theta and --velocity must be given, got one",
+        ),
     ):
         refused = pendmap_command(*words)
         assert refused.returncode == 2, words

@@ -93,7 +93,7 @@ def test_what_is_refused_while_files_are_written_leaves_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def refused(*_: object) -> None:
-        raise InputError("time is 1e12: allowed is up to 9e9")
+        raise InputError("time must be up to 9e9, got 1e12")
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(viewer, "record", refused)

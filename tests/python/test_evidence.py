@@ -80,5 +80,7 @@ def test_without_noise_a_reading_is_worth_no_more_than_a_sensor_can_tell() -> No
 
 
 def test_too_few_samples_to_hold_any_back_are_refused() -> None:
-    with pytest.raises(InputError, match=r"too few samples.*201 samples or more"):
+    with pytest.raises(
+        InputError, match="one run must have 201 samples or more: there are too few"
+    ):
         evidence_of(Experiment(Path("there"), (run("a", "free", samples=150),)))

@@ -61,8 +61,8 @@ def test_the_colour_map_is_used(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "says"),
     [
-        ("a.jpg", {}, r"'\.jpg'.*\.png, \.svg, \.pdf"),
-        ("a", {}, r"suffix ''"),
+        ("a.jpg", {}, r"suffix must be \.png or \.svg or \.pdf, got '\.jpg'"),
+        ("a", {}, r"suffix must be .*, got ''"),
         ("a.png", {"layer": "exponent"}, "'exponent'.*labels, settle, turns"),
         ("a.png", {"layer": "colour"}, "'colour'"),
         ("a.png", {"colormap": "rainbowish"}, "'rainbowish'.*viridis"),

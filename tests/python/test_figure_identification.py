@@ -118,7 +118,7 @@ def test_sizes_that_may_be_chosen() -> None:
 
 @pytest.mark.parametrize("parts", [("decays",), ()])
 def test_unknown_parts_are_refused(parts: tuple[str, ...]) -> None:
-    with pytest.raises(pendmap.InputError, match="allowed are record, decrement"):
+    with pytest.raises(pendmap.InputError, match="must be among record, decrement"):
         drawn("whole", parts=parts)
 
 
@@ -128,7 +128,7 @@ def test_files_are_whole(tmp_path: Path) -> None:
             report("begins under 12 degrees"), tmp_path / f"a{suffix}", parts=("errors",)
         )
         assert path.stat().st_size > 5000
-    with pytest.raises(pendmap.InputError, match="allowed are"):
+    with pytest.raises(pendmap.InputError, match="suffix must be"):
         figures.draw_identification(report("begins under 12 degrees"), tmp_path / "a.gif")
     assert len(list(tmp_path.iterdir())) == len(figures.SUFFIXES)
 

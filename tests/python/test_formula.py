@@ -81,42 +81,45 @@ def test_a_formula_s_name_does_not_do_for_another(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     text = '[pendulum]\ngamma = 0.1\n[[effect]]\nname = "root_drag"\nparameters = { k = 1.0 }\n'
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match="name is 'root_drag': allowed is an effect"):
+    with pytest.raises(InputError, match="name must be an effect of the library, got 'root_drag'"):
         load_model(path)
     path.write_text(text + FILE, encoding="utf-8")
     with pytest.raises(InputError, match=r"this file's \[\[formula\]\] are bump, lean"):
         load_model(path)
-    with pytest.raises(InputError, match="allowed is root_drag"):
+    with pytest.raises(InputError, match="name must be root_drag, got 'other'"):
         Effect("other", {"k": 1.0}, formula=ROOT)
 
 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("x", "-k*thetta", {"k": 2}), r"unknown name 'thetta' at 4: allowed are theta, v, phase"),
-        (("x", "-k*v", {"k": 2}), r"units do not balance.*allowed is power = 1 for 'k'"),
+        (
+            ("x", "-k*thetta", {"k": 2}),
+            r"unknown name 'thetta' at 4: it must be one of theta, v, phase",
+        ),
+        (("x", "-k*v", {"k": 2}), r"units do not balance.*'k' must have power = 1"),
         (("x", "-k*v", {"k": {}}), "power is missing"),
-        (("x", "-k*v", {"k": {"power": "x"}}), "power is 'x': allowed is a number"),
+        (("x", "-k*v", {"k": {"power": "x"}}), "power must be a number, got 'x'"),
         (
             ("x", "-k*v", {"k": {"power": 1, "typical": 3}}),
-            r"typical is 3: allowed is \[low, high\]",
+            r"typical must be \[low, high\], got 3",
         ),
         (("x", "-k*v", {"k": {"power": 1, "typical": [3, 1]}}), "the lower first"),
         (("x", "-k*v", {"k": {"power": 1, "color": 3}}), "'color' is not known"),
-        (("x", "-k*v", {"k": {"power": 1, "unit": 3}}), "unit is 3: allowed is a text"),
+        (("x", "-k*v", {"k": {"power": 1, "unit": 3}}), "unit must be a text, got 3"),
         (("x", "-k*v", {"k": {"power": 1, "range": [1, 2]}}), "holds the typical"),
         (("x", "-k*v", {}), "with their powers of w0"),
         (("x", "-k*v", 3), "with their powers of w0"),
-        (("x", 3, {"k": 1}), "term is 3: allowed is a text"),
+        (("x", 3, {"k": 1}), "term must be a text, got 3"),
         (("magnet", "-k*v", {"k": 1}), "one of the library"),
         (("x y", "-k*v", {"k": 1}), "a letter, then letters"),
         (("w0", "-k*v", {"k": 1}), "a pendulum has a parameter of that name"),
         (("c_over_m", "-k*v", {"k": 1}), "a pendulum has a parameter of that name"),
-        (("x", "-v*v", {"v": 1}), "'v' has a meaning of its own"),
+        (("x", "-v*v", {"v": 1}), "'v' must be another, it has a meaning of its own"),
         (("x", "k", {"k": 2, "q": 0}), "parameter 'q' is not in the term"),
         (
             ("x", "a*b*c*d", {"b": 2, "c": 0, "d": 0, "e": 0}),
-            "has 4 parameters: allowed are 1 to 3",
+            "must have 1 to 3 parameters, got 4",
         ),
         (("x", "k*sign(theta)", {"k": 2}), "jumps where"),
         (("x", "k/theta", {"k": 2}), "is no finite number at theta = 0.000"),
@@ -149,7 +152,7 @@ def test_files_of_formulas(tmp_path: Path, pendmap_command: Run) -> None:
     for text, said in (
         ("", "has no table [[formula]]"),
         ("[[formula]]\nname = 'x'", "term is missing"),
-        (FILE + FILE, "the name bump is there twice"),
+        (FILE + FILE, "each name must be there once, bump is there twice"),
         ("[[formular]]\nname = 'x'", "formular is not known"),
         (FILE.replace("wrap(", "wrp("), "unknown function 'wrp' at 14"),
     ):
@@ -162,7 +165,7 @@ def test_files_of_formulas(tmp_path: Path, pendmap_command: Run) -> None:
 
 def test_maps_refuse_what_does_not_repeat() -> None:
     uneven = Formula("uneven", "-k*sin(theta/2)", {"k": 2})
-    with pytest.raises(InputError, match="uneven: allowed in one trajectory, not in maps"):
+    with pytest.raises(InputError, match="uneven can be in one trajectory, not in maps"):
         pendmap.basins(Pendulum(effects=(uneven(k=0.1),)), pendmap.Grid.square(10))
     assert pendmap.simulate(Pendulum(effects=(uneven(k=0.1),)), 1.0, 0.0, until=1.0) is not None
 
@@ -198,7 +201,7 @@ def test_a_function_is_read_as_what_it_computes(function: Callable[..., Any], po
     [
         (lambda th, v, t, ph, p: p["k"] if v > 0 else 0.0, "numpy.greater, which no formula has"),
         (lambda th, v, t, ph, p: p["k"] * np.interp(th, [0, 1], [0, 1]), "numpy.interp"),
-        (lambda th, v, t, ph, p: p["q"] * v, "asks for a parameter 'q': allowed are k"),
+        (lambda th, v, t, ph, p: p["q"] * v, "must ask for parameters among k, got 'q'"),
         (lambda th, v, t, ph, p: p["k"] * th.foo, "fails with AttributeError"),
         (lambda th, v: v, "fails with TypeError"),
         (lambda th, v, t, ph, p: None, "the value None"),

@@ -39,7 +39,9 @@ def test_an_experiment_gives_its_longest_free_run() -> None:
     assert report.best.estimates == same["combined_repaired"].estimates
     with pytest.raises(InputError, match="no run is free"):
         identify_experiment(experiment(*runs[2:]))
-    with pytest.raises(InputError, match="'best' is not known: allowed are trajectory, combined"):
+    with pytest.raises(
+        InputError, match=r"method must be one of trajectory, combined, .*, got 'best'"
+    ):
         identify(time, angle, methods=["best"])
 
 

@@ -164,7 +164,7 @@ def test_a_global_search_is_not_led_away_by_false_peaks() -> None:
     assert start.w0 == pytest.approx(6.2, rel=2e-3)
     assert start.c_over_m == pytest.approx(0.0496, rel=0.05)
     assert start.Tr == pytest.approx(0.08, rel=0.05)
-    with pytest.raises(InputError, match="allowed"):
+    with pytest.raises(InputError, match="peaks must be 4 or more"):
         global_start(Peaks.of([0.0, 1.0], [0.3, 0.2]))
 
 

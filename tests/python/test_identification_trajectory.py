@@ -213,14 +213,14 @@ def test_samples_not_trusted_do_not_count(decay: np.ndarray) -> None:
 def test_what_does_not_fit_together_is_refused(decay: np.ndarray) -> None:
     with pytest.raises(InputError, match="as many"):
         identify(TIME, decay[:-1])
-    with pytest.raises(InputError, match="sigma is -1"):
+    with pytest.raises(InputError, match=r"sigma must be .*, got -1"):
         identify(TIME, decay, sigma=-1)
     with pytest.raises(InputError, match="finite"):
         identify(TIME, np.where(TIME > 3, np.nan, decay))
     with pytest.raises(InputError, match="after the one before"):
         identify(TIME[::-1], decay[::-1], start={"w0": 6.0})
     run = FitRun(TIME, decay, 1e-3)
-    with pytest.raises(InputError, match=r"free has 'quadratic_drag.q'"):
+    with pytest.raises(InputError, match=r"free must be among .*, got 'quadratic_drag.q'"):
         fit_runs([run], Rig(w0=6.2), ["quadratic_drag.q"])
     short = identify(TIME[:40], decay[:40])
     assert not short.applicable
@@ -239,7 +239,7 @@ LAWS = {
 @pytest.mark.parametrize("window", [(0, 0, 21), (0, 9, 9), (1, 0, 20)])
 def test_windows_are_samples_of_their_runs(window: tuple[int, int, int]) -> None:
     run = FitRun(np.arange(20.0) * 0.05, 0.1 * np.cos(0.3 * np.arange(20)), 1e-3)
-    with pytest.raises(InputError, match="allowed are samples of a run"):
+    with pytest.raises(InputError, match="must be samples of a run"):
         fit_runs([run], Rig(w0=6.0), ["w0"], windows=((*window, 0.1, 0.0),))
 
 

@@ -168,11 +168,11 @@ def test_shares_of_the_pendulum_with_torque() -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        ({"tol": 1e-20}, "tol is"),
-        ({"tol": math.nan}, "tol is"),
-        ({"max_periods": 0}, "max_periods is 0"),
-        ({"threads": 0}, "threads is 0"),
-        ({"seed": -1}, "seed is -1"),
+        ({"tol": 1e-20}, "tol must be a number from 1e-13 to 1e-2, got 1e-20"),
+        ({"tol": math.nan}, "tol must be a finite number, got nan"),
+        ({"max_periods": 0}, "max_periods must be .*, got 0"),
+        ({"threads": 0}, "threads must be .*, got 0"),
+        ({"seed": -1}, "seed must be .*, got -1"),
     ],
 )
 def test_bad_choices_are_refused(words: dict[str, Any], complaint: str) -> None:
@@ -191,7 +191,7 @@ def test_bad_lists_are_refused() -> None:
         pendmap.basins_of(Pendulum(), [1.0, 2.0], [1.0])
     with pytest.raises(InputError, match="finite"):
         pendmap.basins_of(Pendulum(), [1.0, math.nan], [1.0, 1.0])
-    with pytest.raises(InputError, match="starts is 0"):
+    with pytest.raises(InputError, match=r"starts must be .*, got 0"):
         pendmap.basins_of(Pendulum(), [], [])
 
 
@@ -301,13 +301,14 @@ def test_an_instruction_set_that_is_asked_for_counts_for_one_command(
         cli.run()
     assert end.value.code == 2
     said = capsys.readouterr().err
-    assert "Invalid value for '--simd': 'mmx': allowed on this processor: " in said
+    assert "Invalid value for '--simd': must be one of " in said
+    assert " on this processor, got 'mmx'" in said
     assert said.count("\n") == 1
 
 
 def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(os.environ, "PENDMAP_SIMD", "mmx")
-    with pytest.raises(InputError, match="PENDMAP_SIMD is 'mmx'"):
+    with pytest.raises(InputError, match=r"PENDMAP_SIMD must be .*, got 'mmx'"):
         pendmap.basins(Pendulum(), Grid.square(5))
 
 

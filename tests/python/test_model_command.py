@@ -90,32 +90,41 @@ def test_what_is_typed_counts_instead_of_the_file(
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("--stroke-mm", 20), "--stroke-mm: allowed with --model of a file in SI; here --p"),
+        (("--stroke-mm", 20), "--stroke-mm must have --model of a file in SI; here it is --p"),
         (
             ("--frequency-hz", 2),
-            "--frequency-hz: allowed with --model of a file in SI; here --omega",
+            "--frequency-hz must have --model of a file in SI; here it is --omega",
         ),
         (
             ("--model", "model.toml", "--stroke-mm", 2, "--p", 1),
-            "--stroke-mm and --p: allowed is one",
+            "one of --stroke-mm and --p must be left out",
         ),
         (
             ("--model", "model.toml", "--frequency-hz", 2, "--omega", 1),
-            "--frequency-hz and --omega: allowed is one of them",
+            "one of --frequency-hz and --omega must be left out, got both",
         ),
-        (("--model", "model.toml", "--stroke-mm=-2"), "'--stroke-mm': -2: allowed is 0 or more"),
+        (("--model", "model.toml", "--stroke-mm=-2"), "'--stroke-mm': must be 0 or more, got -2"),
         (
             ("--model", "model.toml", "--frequency-hz", 0),
-            "'--frequency-hz': 0: allowed is a number",
+            "'--frequency-hz': must be a number above 0, got 0",
         ),
-        (("--model", "model.toml", "--gamma=-2"), "'--gamma': -2: allowed is 0 or more"),
-        (("--model", "model.toml", "--preset", "fig2a"), "--model and --preset: allowed is one"),
-        (("--model", "bare.toml", "--stroke-mm", 2), "bare.toml: has no dimensions: stroke_mm is"),
+        (("--model", "model.toml", "--gamma=-2"), "'--gamma': must be 0 or more, got -2"),
+        (
+            ("--model", "model.toml", "--preset", "fig2a"),
+            "one of --model and --preset must be left out",
+        ),
+        (
+            ("--model", "bare.toml", "--stroke-mm", 2),
+            "bare.toml: has no dimensions: stroke_mm must be",
+        ),
         (("--model", "bare.toml", "--p", 2), "bare.toml: p without omega"),
         (("--model", "absent.toml"), "absent.toml: No such file"),
-        (("--model", "."), ".: is a folder: allowed is a file"),
+        (("--model", "."), ".: must be a file, it is a folder"),
         (("--model", "model.nc", "--out", "model.nc"), "'--out': 'model.nc': is an input, which"),
-        (("--model", "a.zarr/model.toml", "--out", "a.zarr"), "a.zarr: is a folder of something"),
+        (
+            ("--model", "a.zarr/model.toml", "--out", "a.zarr"),
+            "a.zarr: must be a new folder, or a result of pendmap",
+        ),
     ],
 )
 def test_the_command_refuses_on_one_line(

@@ -124,12 +124,12 @@ def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
 @pytest.mark.parametrize(
     ("given", "match"),
     [
-        ({"n": 0}, "n is 0: allowed is a whole number from 1 to 64"),
+        ({"n": 0}, "n must be a whole number from 1 to 64, got 0"),
         ({"n": 65}, "1 to 64"),
-        ({"n": 1.5}, "n is 1.5"),
-        ({"w": math.nan}, "w is nan"),
+        ({"n": 1.5}, "n must be .*, got 1.5"),
+        ({"w": math.nan}, "w must be .*, got nan"),
         ({"grid": 3}, "Grid"),
-        ({"threads": 0}, "threads is 0"),
+        ({"threads": 0}, "threads must be .*, got 0"),
     ],
 )
 def test_what_is_refused(given: dict[str, Any], match: str) -> None:

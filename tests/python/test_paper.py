@@ -32,8 +32,8 @@ def test_a_figure_has_several_names(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("0", "'0' is not one"),
-        ("10", "'10' is not one"),
+        ("0", "got '0'"),
+        ("10", "got '10'"),
         ("x", "'x'"),
     ],
 )
@@ -43,7 +43,9 @@ def test_what_is_not_there_is_refused_in_one_line(
     run = pendmap_command("paper", name)
     assert run.returncode == 2
     assert says in run.stderr
-    assert "allowed are 1, 2, 3, 4, 5, 6, 7, 8, 9, table1 and all" in run.stderr
+    assert (
+        "must be one of the paper's (1, 2, 3, 4, 5, 6, 7, 8, 9, table1 and all), got" in run.stderr
+    )
     assert run.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
@@ -88,10 +90,10 @@ def test_the_table_is_printed(pendmap_command: Run, tmp_path: Path) -> None:
 def test_options_that_do_not_go_together(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("paper", "all", "--plot", "a.png")
     assert run.returncode == 2
-    assert "--plot is one file" in run.stderr
+    assert "--plot must have one figure, it is one file" in run.stderr
     run = pendmap_command("paper", "3", "--plot", "a.png", "--out", "there")
     assert run.returncode == 2
-    assert "--plot and --out: allowed is one of them" in run.stderr
+    assert "one of --plot and --out must be left out, got both" in run.stderr
     run = pendmap_command("paper", "10", "--out", "there")
     assert run.returncode == 2
     assert not list(tmp_path.iterdir())

@@ -109,15 +109,15 @@ def test_parameters_of_effects_vary_too() -> None:
 @pytest.mark.parametrize(
     ("ranges", "match"),
     [
-        ({"p": (0, 1, 3)}, "allowed is a mapping"),
+        ({"p": (0, 1, 3)}, "must be a mapping"),
         ({"p": (0, 1, 3), "Omega": (1, 2, 3)}, "'Omega' is no parameter of this model"),
-        ({"p": (0, 1, 3), "gamma": (-1, 2, 3)}, "gamma = -1: gamma is -1: allowed is 0 or more"),
-        ({"p": (0, 1, 3), "omega": (0, 2, 3)}, "omega is 0: allowed is a number above 0"),
+        ({"p": (0, 1, 3), "gamma": (-1, 2, 3)}, "gamma = -1: gamma must be 0 or more, got -1"),
+        ({"p": (0, 1, 3), "omega": (0, 2, 3)}, "omega must be a number above 0, got 0"),
         ({"p": (1, 0, 3), "omega": (1, 2, 3)}, "the lower one first"),
-        ({"p": (0, math.nan, 3), "omega": (1, 2, 3)}, "p is nan"),
-        ({"p": (0, 1, 0), "omega": (1, 2, 3)}, "how many is 0"),
+        ({"p": (0, math.nan, 3), "omega": (1, 2, 3)}, "p must be .*, got nan"),
+        ({"p": (0, 1, 0), "omega": (1, 2, 3)}, "how many must be .*, got 0"),
         ({"p": (0, 1), "omega": (1, 2, 3)}, "first, last, how many"),
-        ([1, 2], "allowed is a mapping"),
+        ([1, 2], "must be a mapping"),
     ],
 )
 def test_what_is_refused(ranges: Any, match: str) -> None:  # noqa: ANN401 (whatever was given)
@@ -128,12 +128,12 @@ def test_what_is_refused(ranges: Any, match: str) -> None:  # noqa: ANN401 (what
 @pytest.mark.parametrize(
     ("given", "match"),
     [
-        ({"starts": 0}, "starts is 0"),
-        ({"tol": math.nan}, "tol is nan"),
-        ({"tol": 1.0}, "tol is 1"),
-        ({"max_periods": 0}, "max_periods is 0"),
-        ({"threads": 0}, "threads is 0"),
-        ({"seed": -1}, "seed is -1"),
+        ({"starts": 0}, "starts must be .*, got 0"),
+        ({"tol": math.nan}, "tol must be .*, got nan"),
+        ({"tol": 1.0}, "tol must be .*, got 1"),
+        ({"max_periods": 0}, "max_periods must be .*, got 0"),
+        ({"threads": 0}, "threads must be .*, got 0"),
+        ({"seed": -1}, "seed must be .*, got -1"),
         ({"box": 3}, "box"),
     ],
 )
@@ -188,7 +188,9 @@ def test_the_figure_has_stripes_where_kinds_coexist(plane: xr.Dataset) -> None:
             assert set(said) <= seen
     for layer in ("exponent", "attractors", "period", "winding", "undecided", "share rest"):
         assert len(made(plane, layer).axes) == 2
-    with pytest.raises(pendmap.InputError, match="no layer 'nothing'"):
+    with pytest.raises(
+        pendmap.InputError, match=r"layer must be one of this map, .*, got 'nothing'"
+    ):
         made(plane, "nothing")
 
 
@@ -236,9 +238,12 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     assert json.loads(named.stdout)["columns"] == "omega"
     assert pendmap_command("plot", "map.nc", "--layer", "period", "--plot", "a.svg").returncode == 0
     for words, wanted in (
-        (("map", "--p", "1"), "what varies is nothing"),
+        (("map", "--p", "1"), "100), 'omega': (0.5, 3.0, 100)}, got nothing"),
         (("map", "--p", "0:1"), "A:B:N"),
-        (("map", "--p", "0:1:3", "--vary", "p", "0:1:4"), "twice"),
+        (
+            ("map", "--p", "0:1:3", "--vary", "p", "0:1:4"),
+            "--vary p must be given once, got it twice",
+        ),
         (("map", "--p", "0:1:3", "--vary", "drag", "0:1:4"), "drag"),
     ):
         refused = pendmap_command(*words)

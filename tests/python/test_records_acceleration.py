@@ -52,12 +52,21 @@ def test_the_angle_that_is_made_is_near(tmp_path: Path, release: float) -> None:
         ('direction = "tangential"', "distance_m missing"),
         ("distance_m = 0.1", "direction missing"),
         ('direction = "radial", distance_m = 0.1', "cannot tell left from right"),
-        ('direction = "up", distance_m = 0.1', 'allowed are "tangential", "radial", "angular"'),
-        (PLACE % -1, "distance_m is -1: allowed is more than 0"),
-        ('direction = "tangential", distance_m = "near"', "distance_m is 'near'"),
+        (
+            'direction = "up", distance_m = 0.1',
+            'must be one of "tangential", "radial", "angular", got',
+        ),
+        (
+            PLACE % -1,
+            "distance_m must be more than 0, up to 100, from the pivot to the sensor in m, got -1",
+        ),
+        (
+            'direction = "tangential", distance_m = "near"',
+            "distance_m must be a number, got 'near'",
+        ),
         (PLACE % 0.1 + ", gravity_removed = 1", "gravity_removed"),
-        ('direction = "angular", unit = "m/s2"', "allowed are rad/s2 and deg/s2"),
-        ('unit = "rad/s2", direction = "tangential"', "allowed are m/s2 and g"),
+        ('direction = "angular", unit = "m/s2"', "unit must be rad/s2 or deg/s2"),
+        ('unit = "rad/s2", direction = "tangential"', "unit must be m/s2 or g"),
         (PLACE % 0.1 + ", distanse = 1", "perhaps distance_m is meant"),
     ],
 )
@@ -84,7 +93,7 @@ def test_an_axis_along_the_rod_is_told_from_one_across(tmp_path: Path) -> None:
     for gravity, removed in ((GRAVITY, "false"), (0.0, "true")):
         time, _, force = readings("radial", gravity=gravity)
         place = f"{PLACE % 0.1}, gravity_removed = {removed}"
-        with pytest.raises(InputError, match="along the rod: allowed is the column of the axis"):
+        with pytest.raises(InputError, match="along the rod: it must be the column of the axis"):
             read(experiment(tmp_path, column(place), time, force))
 
 
@@ -124,7 +133,7 @@ def test_turns_over_the_top_and_forced_runs_are_refused(tmp_path: Path) -> None:
     there = experiment(tmp_path, column(PLACE % 0.1), time, force)
     with (there / "experiment.toml").open("a", encoding="utf-8") as file:
         file.write("drive = { p = 0.1, Omega = 12 }\n")
-    with pytest.raises(InputError, match="forced run holds the pivot's own: allowed is a free"):
+    with pytest.raises(InputError, match="forced run holds the pivot's own: it must be a free"):
         read(there)
 
 

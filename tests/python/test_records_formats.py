@@ -238,9 +238,12 @@ def test_a_pivot_without_unit_and_a_drive_that_is_not_there_are_said(tmp_path: P
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("hold_ot = true", "hold_ot is not known, perhaps hold_out is meant: allowed are file"),
-        ('pivot = "pivot_m"', "allowed is a table like pivot = { vertical"),
-        ("from_s = 19.999", "leave 1 sample:"),
+        (
+            "hold_ot = true",
+            "hold_ot is not known, perhaps hold_out is meant: it must be one of file",
+        ),
+        ('pivot = "pivot_m"', "must be a table like pivot = { vertical"),
+        ("from_s = 19.999", "must be times within .*, they leave 1 sample"),
     ],
 )
 def test_a_description_is_refused_in_true_words(tmp_path: Path, line: str, says: str) -> None:

@@ -250,7 +250,7 @@ def test_a_file_of_each_kind(tmp_path: Path) -> None:
     for name in re.findall(r"\]\(<(.*?)>\)", text):
         assert name.startswith("b_")
         assert (tmp_path / name).exists()
-    with pytest.raises(InputError, match=r"\.pdf.*\.html, \.md"):
+    with pytest.raises(InputError, match=r"suffix must be \.html or \.md, .*, got '\.pdf'"):
         figures.write_report(found, tmp_path / "c.pdf")
 
 

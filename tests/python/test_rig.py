@@ -136,14 +136,14 @@ def test_the_rig_shares_no_code_with_what_is_fitted() -> None:
 
 
 def test_requests_are_checked_in_python_too() -> None:
-    with pytest.raises(InputError, match="size is nan"):
+    with pytest.raises(InputError, match=r"size must be .*, got nan"):
         Request("hidden", size=math.nan)
-    with pytest.raises(InputError, match="noise is inf"):
+    with pytest.raises(InputError, match=r"noise must be .*, got inf"):
         make(Request("hidden", noise=math.inf))
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_no_parameter_of_an_effect_is_without_bound(name: str) -> None:
     for field in dataclasses.fields(EFFECTS[name]):
-        with pytest.raises(InputError, match=rf"{field.name} is 1e\+300: allowed is "):
+        with pytest.raises(InputError, match=rf"{field.name} must be .*, got 1e\+300"):
             make(Request("forced", effects=(f"{name},{field.name}=1e300",)))

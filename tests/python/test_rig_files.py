@@ -137,8 +137,11 @@ def test_the_list_names_every_effect(rig: Run) -> None:
         ("rig hidden --out x --counts=-4", "-4"),
         ("rig hidden --out x --rate 0", "0"),
         ("rig hidden --out x --size 0", "0"),
-        ("rig forced --out x --size 1e6", "no size of an effect is drawn here"),
-        ("rig hidden --out x --effect none --size 2", "no size of an effect is drawn here"),
+        ("rig forced --out x --size 1e6", "must be 1 where no size of an effect is drawn, got"),
+        (
+            "rig hidden --out x --effect none --size 2",
+            "must be 1 where no size of an effect is drawn, got",
+        ),
         ("rig hidden --out x --effect impulses,J=0.02 --size 2", "no size of an effect is drawn"),
         ("rig hidden --out x --noise 0 --correlation 0.5", "without noise"),
         ("rig hidden --out x --dropouts 0.9", "0.5"),

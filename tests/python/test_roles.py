@@ -148,6 +148,6 @@ def test_a_search_looks_where_is_typical(
 
 
 def test_a_role_that_does_not_exist_is_refused() -> None:
-    words = "parameter 'b': role is 'breadth': allowed is width, place, power, order, time constant"
+    words = "parameter 'b': role must be one of width, place, power, order, time constant"
     with pytest.raises(InputError, match=words):
         pendmap.Formula("mine", "-k*b*v", {"k": 1, "b": {"power": 0, "role": "breadth"}})

@@ -242,17 +242,20 @@ def test_critical_curves_of_some_frequencies() -> None:
 
 def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path) -> None:
     for part, says in (
-        (MAP.isel(theta=3), "theta is a single value here"),
-        (MAP.sel(theta=slice(7, 8)), "theta has no values here"),
+        (MAP.isel(theta=3), "theta must be a range here, got a single value"),
+        (MAP.sel(theta=slice(7, 8)), "theta must have one value at least in a selection, got none"),
         (DIAGRAM.isel(entry=slice(1, None)), "entry: a selection of it cannot be drawn"),
         (DIAGRAM.isel(kind=slice(1, None)), "kind: a selection of kinds cannot be drawn"),
         (PLANE.isel(set=slice(1, None)), "set: a selection of it cannot be drawn"),
-        (PLANE.isel(set=0), "regime_kinds is over nothing here: allowed is over set"),
+        (PLANE.isel(set=0), "regime_kinds must be over set here, .*, but is over nothing"),
         (MAP.isel(attractor=[0]), "attractor: a selection of it cannot be drawn"),
         (MAP.isel(attractor=[2], theta=slice(0, 4)), "attractor: a selection of it cannot be"),
-        (MAP.isel(attractor=0), "fraction is over nothing here: allowed is over attractor"),
-        (MAP.where(MAP["theta"] > 0, drop=True), "fraction is over attractor, theta here"),
-        (MAP[["label"]], "fraction is missing here: allowed is over attractor"),
+        (MAP.isel(attractor=0), "fraction must be over attractor here, .*, but is over nothing"),
+        (
+            MAP.where(MAP["theta"] > 0, drop=True),
+            "fraction must be over attractor here, .*, but is over attractor, theta",
+        ),
+        (MAP[["label"]], "fraction must be over attractor here, .*, but is missing"),
     ):
         for write, name in ((figures.draw, "a.png"), (viewer.record, "a.rrd")):
             with pytest.raises(InputError, match=says):

@@ -257,7 +257,7 @@ def test_added_damping_is_damping_and_effects_count() -> None:
 @pytest.mark.parametrize(
     ("given", "match"),
     [
-        ({"theta_r": 0.05}, "theta_r is 0.05: friction holds .*: allowed is 0"),
+        ({"theta_r": 0.05}, "theta_r must be 0, got 0.05: friction holds"),
         ({"effects": (Effect("coulomb_friction", {"theta_r": 0.05}),)}, "friction holds"),
         (
             {"effects": (Effect("lateral_drive", {"e": 0.1, "phase": 0.0}),)},
@@ -276,7 +276,7 @@ def test_what_has_no_critical_curves_is_refused(given: dict[str, Any], match: st
     [
         ({"omega": [2.0, 1.0]}, "ascending"),
         ({"omega": 0.0}, "above 0"),
-        ({"p_max": 0.0}, "p_max is 0"),
+        ({"p_max": 0.0}, "p_max must be .*, got 0"),
         ({"p_max": 101.0}, "up to 100"),
         ({"plane": "q-a"}, "e-alpha2"),
     ],

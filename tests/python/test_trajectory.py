@@ -96,13 +96,13 @@ def test_advance_counts_turns_as_a_trajectory_does() -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        ({"theta": math.nan}, "theta is"),
-        ({"velocity": math.inf}, "velocity is"),
-        ({"until": 0}, "until is"),
-        ({"until": math.inf}, "until is"),
+        ({"theta": math.nan}, "theta must be a finite number, got nan"),
+        ({"velocity": math.inf}, "velocity must be a finite number, got inf"),
+        ({"until": 0}, "until must be a time above 0, got 0"),
+        ({"until": math.inf}, "until must be a finite number, got inf"),
         ({"until": 1e12}, "do not fit"),
-        ({"tol": 1.0}, "tol is"),
-        ({"samples": 0}, "samples is"),
+        ({"tol": 1.0}, "tol must be a number from 1e-13 to 1e-2, got 1"),
+        ({"samples": 0}, "samples must be a whole number from 1 to .*, got 0"),
     ],
 )
 def test_bad_requests_are_refused(words: dict[str, Any], complaint: str) -> None:

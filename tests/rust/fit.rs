@@ -214,7 +214,7 @@ fn what_cannot_be_fitted_is_refused() {
     };
     assert!(refusal(&|r, _| r[0].times[3] = r[0].times[2]).contains("after the one before"));
     assert!(refusal(&|r, _| r[0].readings[3] = f64::NAN).contains("reading or weight"));
-    assert!(refusal(&|r, _| r[1].weights[3] = -1.0).contains("weight is -1"));
+    assert!(refusal(&|r, _| r[1].weights[3] = -1.0).contains("weight must be 0 or more, got -1"));
     assert!(refusal(&|r, _| r[1].weights.fill(0.0)).contains("trusted samples"));
     assert!(
         refusal(&|r, _| {

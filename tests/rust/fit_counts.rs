@@ -114,5 +114,10 @@ fn the_pull_is_the_slope_of_the_likelihood() {
 
 #[test]
 fn a_count_of_nothing_is_refused() {
-    assert!(Counts::new(0.0, &[1.0]).expect_err("refused").to_string().contains("count is 0"));
+    assert!(
+        Counts::new(0.0, &[1.0])
+            .expect_err("refused")
+            .to_string()
+            .contains("count must be a number above 0, got 0")
+    );
 }

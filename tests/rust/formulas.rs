@@ -267,7 +267,8 @@ fn maps_refuse_formulas_that_do_not_repeat() {
         let strobe = Strobe::new(&has(driven(0.1, 0.6, 2.0), own), 20, path());
         let error = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default());
         let line = error.map(|_| ()).expect_err(term).to_string();
-        assert!(line.starts_with("mine: ") && line.contains(why), "{line}");
+        let begin = "mine can be in one trajectory, not in maps: ";
+        assert!(line.starts_with(begin) && line.contains(why), "{line}");
     }
 }
 
@@ -292,24 +293,27 @@ fn two_corners_do_not_hinder_each_other() {
 #[test]
 fn what_is_wrong_is_said_in_one_line() {
     for (term, said) in [
-        ("-k*thetta", "unknown name 'thetta' at 4: allowed are theta, v, phase, t, w0, a, pi, k"),
+        (
+            "-k*thetta",
+            "unknown name 'thetta' at 4: it must be one of theta, v, phase, t, w0, a, pi, k",
+        ),
         ("-k*sine(v)", "unknown function 'sine' at 4"),
-        ("-k*(v", "ends at 6: allowed is ')'"),
+        ("-k*(v", "ends at 6: there must be ')'"),
         ("", "ends at 1"),
-        ("k v", "unexpected 'v' at 3: allowed is an operator or the end"),
+        ("k v", "unexpected 'v' at 3: there must be an operator or the end"),
         ("k*", "ends at 3"),
         ("k*$", "unexpected '$' at 3"),
         ("k*1e999", "1e999 at 3 is not a finite number"),
         ("k*1.2.3", "1.2.3 at 3 is not a finite number"),
         ("k*sqrt", "'sqrt' at 3 is a function"),
-        ("k*min(v)", "unexpected ')' at 8: allowed is ','"),
+        ("k*min(v)", "unexpected ')' at 8: there must be ','"),
         ("v*abs(v)", "parameter 'k' is not in the term"),
         ("-k*sign(theta)", "jumps where what is under sign(...) passes zero"),
         ("-k/theta", "is no finite number at theta = 0.000"),
         ("-k*log(v)", "is no finite number at theta"),
         ("-k*v^2", "its units do not balance"),
-        ("-k*v", "allowed is power = 1 for 'k'"),
-        ("-k*sqrt(abs(v))*sign(v)", "allowed is power = 1.5 for 'k'"),
+        ("-k*v", "'k' must have power = 1"),
+        ("-k*sqrt(abs(v))*sign(v)", "'k' must have power = 1.5"),
     ] {
         let error = Formula::new(&formula("mine", term, &[("k", 2.0)])).expect_err(term);
         let line = error.to_string();

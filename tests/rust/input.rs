@@ -1,4 +1,4 @@
-//! What is refused, and in which words: each names the value, what is wrong and what is allowed.
+//! What is refused, and in which words: each names the value, what it must be and what was got.
 
 use std::sync::atomic::AtomicBool;
 
@@ -26,16 +26,16 @@ fn pendulums() {
     let make =
         |gamma, p, omega, phase, torque| refusal(Pendulum::new(gamma, p, omega, phase, torque));
     let (nan, inf) = (f64::NAN, f64::INFINITY);
-    assert_eq!(make(-0.1, 1.0, 2.0, 0.0, 0.0), "gamma is -0.1: allowed is 0 or more");
-    assert_eq!(make(nan, 1.0, 2.0, 0.0, 0.0), "gamma is NaN: allowed is 0 or more");
-    assert_eq!(make(inf, 1.0, 2.0, 0.0, 0.0), "gamma is inf: allowed is 0 or more");
-    assert_eq!(make(0.1, nan, 2.0, 0.0, 0.0), "p is NaN: allowed is any finite number");
-    assert_eq!(make(0.1, -inf, 2.0, 0.0, 0.0), "p is -inf: allowed is any finite number");
-    assert_eq!(make(0.1, 1.0, 0.0, 0.0, 0.0), "omega is 0: allowed is a number above 0");
-    assert_eq!(make(0.1, 1.0, -2.0, 0.0, 0.0), "omega is -2: allowed is a number above 0");
-    assert_eq!(make(0.1, 1.0, nan, 0.0, 0.0), "omega is NaN: allowed is a number above 0");
-    assert_eq!(make(0.1, 1.0, 2.0, inf, 0.0), "phase is inf: allowed is any finite number");
-    assert_eq!(make(0.1, 1.0, 2.0, 0.0, nan), "torque is NaN: allowed is any finite number");
+    assert_eq!(make(-0.1, 1.0, 2.0, 0.0, 0.0), "gamma must be 0 or more, got -0.1");
+    assert_eq!(make(nan, 1.0, 2.0, 0.0, 0.0), "gamma must be 0 or more, got NaN");
+    assert_eq!(make(inf, 1.0, 2.0, 0.0, 0.0), "gamma must be 0 or more, got inf");
+    assert_eq!(make(0.1, nan, 2.0, 0.0, 0.0), "p must be a finite number, got NaN");
+    assert_eq!(make(0.1, -inf, 2.0, 0.0, 0.0), "p must be a finite number, got -inf");
+    assert_eq!(make(0.1, 1.0, 0.0, 0.0, 0.0), "omega must be a number above 0, got 0");
+    assert_eq!(make(0.1, 1.0, -2.0, 0.0, 0.0), "omega must be a number above 0, got -2");
+    assert_eq!(make(0.1, 1.0, nan, 0.0, 0.0), "omega must be a number above 0, got NaN");
+    assert_eq!(make(0.1, 1.0, 2.0, inf, 0.0), "phase must be a finite number, got inf");
+    assert_eq!(make(0.1, 1.0, 2.0, 0.0, nan), "torque must be a finite number, got NaN");
     assert!(
         HarmonicDrive::new(1.0, 2.0, 0.0).is_ok()
             && Pendulum::new(0.0, -1.0, 2.0, 9.0, -3.0).is_ok()
@@ -45,13 +45,13 @@ fn pendulums() {
 #[test]
 fn axes() {
     let make = |low, high, count| refusal(Axis::new("velocity", low, high, count));
-    let order = "allowed is two finite bounds, the lower one first";
-    assert_eq!(make(1.0, -1.0, 10), format!("velocity is -1: {order}"));
-    assert_eq!(make(2.0, 2.0, 10), format!("velocity is 2: {order}"));
-    assert_eq!(make(f64::NAN, 1.0, 10), format!("velocity is NaN: {order}"));
-    assert_eq!(make(0.0, f64::INFINITY, 10), format!("velocity is inf: {order}"));
-    assert_eq!(make(-1.0, 1.0, 0), "velocity is 0: allowed is 1 to 100000 cells");
-    assert_eq!(make(-1.0, 1.0, 100_001), "velocity is 100001: allowed is 1 to 100000 cells");
+    let order = "velocity must be two finite bounds, the lower one first";
+    assert_eq!(make(1.0, -1.0, 10), format!("{order}, got -1"));
+    assert_eq!(make(2.0, 2.0, 10), format!("{order}, got 2"));
+    assert_eq!(make(f64::NAN, 1.0, 10), format!("{order}, got NaN"));
+    assert_eq!(make(0.0, f64::INFINITY, 10), format!("{order}, got inf"));
+    assert_eq!(make(-1.0, 1.0, 0), "velocity must be 1 to 100000 cells, got 0");
+    assert_eq!(make(-1.0, 1.0, 100_001), "velocity must be 1 to 100000 cells, got 100001");
 }
 
 #[test]
@@ -61,19 +61,22 @@ fn trajectories() {
         refusal(simulate(&driven(0.1, 1.0, 2.0), &request, &AtomicBool::new(false)))
     };
     let nan = f64::NAN;
-    assert_eq!(
-        go(Request { start: [nan, 0.0], ..good }),
-        "theta is NaN: allowed is any finite number"
-    );
+    assert_eq!(go(Request { start: [nan, 0.0], ..good }), "theta must be a finite number, got NaN");
     assert_eq!(
         go(Request { start: [0.0, f64::INFINITY], ..good }),
-        "velocity is inf: allowed is any finite number"
+        "velocity must be a finite number, got inf"
     );
-    assert_eq!(go(Request { until: -1.0, ..good }), "until is -1: allowed is a time above 0");
-    assert_eq!(go(Request { until: nan, ..good }), "until is NaN: allowed is a time above 0");
-    assert_eq!(go(Request { tol: 0.1, ..good }), "tol is 0.1: allowed is 1e-13 to 1e-2");
-    assert_eq!(go(Request { tol: nan, ..good }), "tol is NaN: allowed is 1e-13 to 1e-2");
-    assert_eq!(go(Request { samples: 0, ..good }), "samples is 0: allowed is 1 or more");
+    assert_eq!(go(Request { until: -1.0, ..good }), "until must be a time above 0, got -1");
+    assert_eq!(go(Request { until: nan, ..good }), "until must be a time above 0, got NaN");
+    assert_eq!(
+        go(Request { tol: 0.1, ..good }),
+        "tol must be a number from 1e-13 to 1e-2, got 0.1"
+    );
+    assert_eq!(
+        go(Request { tol: nan, ..good }),
+        "tol must be a number from 1e-13 to 1e-2, got NaN"
+    );
+    assert_eq!(go(Request { samples: 0, ..good }), "samples must be 1 or more, got 0");
     assert!(simulate(&driven(0.1, 1.0, 2.0), &good, &AtomicBool::new(false)).is_ok());
     let stopped = simulate(&driven(0.1, 1.0, 2.0), &good, &AtomicBool::new(true));
     assert_eq!(stopped.err(), Some(Error::Interrupted));
@@ -116,11 +119,11 @@ fn arrays_of_different_lengths() {
 fn tolerances() {
     let starts = spread(100, 3.0, 3.0);
     let range = |tol: f64| refusal(choose(&driven(0.1, 1.0, 2.0), &starts, tol, path()));
-    assert_eq!(range(0.5), "tol is 0.5: allowed is 1e-13 to 1e-2");
-    assert_eq!(range(0.0), "tol is 0: allowed is 1e-13 to 1e-2");
-    assert_eq!(range(-1e-6), "tol is -1e-6: allowed is 1e-13 to 1e-2");
-    assert_eq!(range(1e300), "tol is 1e300: allowed is 1e-13 to 1e-2");
-    assert_eq!(range(f64::NAN), "tol is NaN: allowed is 1e-13 to 1e-2");
+    assert_eq!(range(0.5), "tol must be a number from 1e-13 to 1e-2, got 0.5");
+    assert_eq!(range(0.0), "tol must be a number from 1e-13 to 1e-2, got 0");
+    assert_eq!(range(-1e-6), "tol must be a number from 1e-13 to 1e-2, got -1e-6");
+    assert_eq!(range(1e300), "tol must be a number from 1e-13 to 1e-2, got 1e300");
+    assert_eq!(range(f64::NAN), "tol must be a number from 1e-13 to 1e-2, got NaN");
     // Chaos makes more of rounding errors than 1e-13 within five periods.
     let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, path()).expect_err("refused");
     let Error::Tolerance { tol, reached } = error else { panic!("{error}") };
@@ -138,8 +141,8 @@ fn instruction_sets() {
     }
     let error = "avx1024".parse::<Path>().expect_err("refused");
     assert_eq!(error, Error::Simd { name: "avx1024".to_owned() });
-    let expected = "PENDMAP_SIMD is 'avx1024': allowed are avx512, avx2, sse and portable, as far \
-                    as this processor has them";
+    let expected = "PENDMAP_SIMD must be avx512, avx2, sse or portable, as far as this processor has \
+                    them, got 'avx1024'";
     assert_eq!(error.to_string(), expected);
     assert!("AVX2".parse::<Path>().is_err() && "".parse::<Path>().is_err());
     assert!(Path::Portable.available());
@@ -152,9 +155,9 @@ fn maps() {
         refusal(basins(&pendulum, starts, &options, &Control::default()))
     };
     let options = Options::default();
-    assert_eq!(go(&Starts::List(Vec::new()), options), "starts is 0: allowed is 1 or more");
+    assert_eq!(go(&Starts::List(Vec::new()), options), "starts must be 1 or more, got 0");
     let tol = Options { tol: 1.0, ..options };
-    assert_eq!(go(&plane(10), tol), "tol is 1: allowed is 1e-13 to 1e-2");
+    assert_eq!(go(&plane(10), tol), "tol must be a number from 1e-13 to 1e-2, got 1");
     assert_eq!(Error::Interrupted.to_string(), "interrupted");
     let error = Error::Threads("no more".to_owned());
     assert_eq!(error.to_string(), "threads: no more");
@@ -167,10 +170,10 @@ fn maps() {
 fn more_memory_than_there_is() {
     let why = refusal(memory::reckon("cells", usize::MAX / 16, 8));
     assert!(why.starts_with("1152921504606846975 cells need about 9223372036.855 GB, "), "{why}");
-    assert!(why.ends_with(" free: allowed are fewer"), "{why}");
+    assert!(why.ends_with(" free: they must be fewer"), "{why}");
     let mut list = vec![0_u64];
     let why = refusal(memory::room("periods", &mut list, usize::MAX / 16));
-    assert!(why.ends_with(" free: allowed are fewer"), "{why}");
+    assert!(why.ends_with(" free: they must be fewer"), "{why}");
     memory::reckon("cells", 1000, 8).expect("enough");
     memory::room("periods", &mut list, 1000).expect("enough");
     assert!(list.capacity() > 1000);

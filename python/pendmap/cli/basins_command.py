@@ -59,7 +59,9 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     outputs = Outputs.take(given, "basins", reads=[file])
     theta, velocity, count = (given.pop(name) for name in ("theta", "velocity", "grid"))
     if count is not None and (theta is not None or velocity is not None):
-        raise click.UsageError("--grid: allowed alone; --theta and --velocity name their own cells")
+        raise click.UsageError(
+            "--grid must be given alone; --theta and --velocity name their own cells"
+        )
 
     from pendmap import _core
     from pendmap.grid import Axis, Grid

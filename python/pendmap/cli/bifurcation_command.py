@@ -34,7 +34,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     ranges = given.pop("ranges")
     theta, velocity = given.pop("theta"), given.pop("velocity")
     if (theta is None) != (velocity is None):
-        raise click.UsageError("--theta and --velocity: allowed are both, or neither")
+        raise click.UsageError("both or neither of --theta and --velocity must be given, got one")
     start = None if theta is None else (theta, velocity)
     model = model_from(given)
     outputs = Outputs.take(given, "bifurcation", reads=[file])

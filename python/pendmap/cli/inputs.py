@@ -36,7 +36,7 @@ def keep_inputs(
             if output is not None and output.exists() and any(_takes(output, p) for p in read):
                 raise click.UsageError(
                     f"Invalid value for '{option}': {str(output)!r}: is an input, which would be "
-                    "lost: allowed is another file"
+                    "lost: it must be another file"
                 )
 
 

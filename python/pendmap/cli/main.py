@@ -54,8 +54,10 @@ _COMMANDS = {
 }
 
 
-_NAMED = re.compile(r"(?P<name>\w+) is (?P<rest>[^:]+: .*)", re.DOTALL)
-"""How everything below names what it refuses: ``gamma is -1: allowed is 0 or more``."""
+_NAMED = re.compile(
+    r"(?P<name>\w+) (?:is (?=[^:]+: )|(?=must (?:be|have|hold) ))(?P<rest>.*)", re.DOTALL
+)
+"""How everything below names what it refuses: ``gamma must be 0 or more, got -1``."""
 
 
 class _ReaderGone(Exception):  # noqa: N818 (nothing is wrong)

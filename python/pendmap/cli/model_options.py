@@ -54,7 +54,7 @@ def varied_model_options(function: Command) -> Command:
                 ranges[name], given[name] = value, None
             for other, span in value if name == "vary" else ():
                 if other in ranges:
-                    raise click.UsageError(f"--vary {other}: is there twice, allowed is once")
+                    raise click.UsageError(f"--vary {other} must be given once, got it twice")
                 ranges[other] = span
         given.pop("vary")
         frequency = next((n for n in ("omega", "Omega", "frequency_hz") if n in ranges), None)
@@ -128,14 +128,14 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     typed = {name: given.pop(name, None) for name in (*_BARE, *_SI)}
     typed = {name: value for name, value in typed.items() if value is not None}
     if model is not None and preset is not None:
-        raise click.UsageError("--model and --preset: allowed is one of them")
+        raise click.UsageError("one of --model and --preset must be left out, got both")
     for one, other in _SAME.items():
         option = f"--{one.replace('_', '-')}"
         if one in typed and other in typed:
-            raise click.UsageError(f"{option} and --{other}: allowed is one of them")
+            raise click.UsageError(f"one of {option} and --{other} must be left out, got both")
         if one in typed and model is None:
             raise click.UsageError(
-                f"{option}: allowed with --model of a file in SI; here --{other}"
+                f"{option} must have --model of a file in SI; here it is --{other}"
             )
     for name in _SI:
         if name in typed:
@@ -150,7 +150,7 @@ def rig_from(path: Path) -> Rig:
     model = load_model(path)
     if not isinstance(model, Rig):
         raise InputError(
-            f"{path}: has no dimensions: allowed is a model in SI: in [pendulum] w0 in rad/s, "
+            f"{path}: has no dimensions, it must be a model in SI: in [pendulum] w0 in rad/s, "
             "c_over_m = gamma w0 and Tr = theta_r w0^2 in the place of gamma and theta_r; pendmap "
             "identify writes one"
         )

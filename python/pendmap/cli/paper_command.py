@@ -65,9 +65,9 @@ def command(  # noqa: PLR0913 (an option each)
 
     keys = paper_figures.wanted(" ".join(figure))
     if plot is not None and out is not None:
-        raise click.UsageError("--plot and --out: allowed is one of them")
+        raise click.UsageError("one of --plot and --out must be left out, got both")
     if plot is not None and len(keys) > 1:
-        raise click.UsageError("--plot is one file: allowed with one figure; --out takes a folder")
+        raise click.UsageError("--plot must have one figure, it is one file; --out takes a folder")
     if out is not None:
         out.mkdir(exist_ok=True)  # the folder above is there, as for every other file
     folder = out or Path()

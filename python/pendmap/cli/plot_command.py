@@ -47,7 +47,7 @@ def command(  # noqa: PLR0913 (the options above)
     """Draw a result again, in another size, colours or layer, without computing."""
     inches = _size(size)
     if not file.name:
-        raise click.UsageError(f"{str(file)!r}: is a folder: allowed is a result, .nc or .zarr")
+        raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
     target = out or OutputFile([".png"]).convert(file.with_suffix(".png"), None, None)
 
     from pendmap import figures
@@ -79,7 +79,7 @@ def _size(text: str | None) -> tuple[float, float] | None:
     try:
         width, height = (float(part) for part in text.lower().split("x"))
     except ValueError:
-        raise click.UsageError(f"--size {text!r}: allowed is WIDTHxHEIGHT in inches") from None
+        raise click.UsageError(f"--size must be WIDTHxHEIGHT in inches, got {text!r}") from None
     if not (1 <= width <= 100 and 1 <= height <= 100):  # noqa: PLR2004
-        raise click.UsageError(f"--size {text!r}: allowed are 1 to 100 inches")
+        raise click.UsageError(f"--size must be 1 to 100 inches, got {text!r}")
     return width, height

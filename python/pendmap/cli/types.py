@@ -53,7 +53,7 @@ class _Number(click.ParamType[float]):
         except (ValueError, ZeroDivisionError):
             self.fail(f"{value!r} is not a number (pi is understood)", param, ctx)
         if not math.isfinite(number):
-            self.fail(f"{value!r}: allowed is any finite number", param, ctx)
+            self.fail(f"must be a finite number, got {value!r}", param, ctx)
         return number
 
 
@@ -74,8 +74,8 @@ class Whole(click.ParamType[int]):
         except ValueError:
             number = self.least - 1
         if not self.least <= number <= self.most:
-            allowed = f"allowed is a whole number from {self.least} to {self.most}"
-            self.fail(f"{shown(value)}: {allowed}", param, ctx)
+            wanted = f"must be a whole number from {self.least} to {self.most}"
+            self.fail(f"{wanted}, got {shown(value)}", param, ctx)
         return number
 
 
@@ -97,19 +97,19 @@ class _Axis(click.ParamType[AxisText]):
     ) -> AxisText:
         if isinstance(value, AxisText):
             return value
-        wanted = f"allowed is A:B:N, {self.says}"
+        wanted = f"must be A:B:N, {self.says}"
         parts = str(value).split(":")
         if len(parts) != 3:  # noqa: PLR2004
-            self.fail(f"{value!r}: {wanted}", param, ctx)
+            self.fail(f"{wanted}, got {value!r}", param, ctx)
         try:
             low, high, count = _number(parts[0]), _number(parts[1]), int(parts[2])
         except (ValueError, ZeroDivisionError):
-            self.fail(f"{value!r}: {wanted}", param, ctx)
+            self.fail(f"{wanted}, got {value!r}", param, ctx)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
         if not 1 <= count <= MOST_CELLS:
             self.fail(
-                f"{value!r}: {count} {self.counts}, allowed are 1 to {MOST_CELLS}", param, ctx
+                f"must have 1 to {MOST_CELLS} {self.counts}, got {count}: {value!r}", param, ctx
             )
         return AxisText(low, high, count)
 
@@ -139,19 +139,19 @@ class _Values(click.ParamType[list[float]]):
         """Return N values from A to B, both included, or the only one."""
         if isinstance(value, list):
             return value
-        wanted = "allowed is A:B:N, N values from A to B, both included, or a single value"
+        wanted = "must be A:B:N, N values from A to B, both included, or a single value"
         parts = str(value).split(":")
         try:
             ends = [_number(part) for part in parts[:2]]
             count = int(parts[2]) if len(parts) == 3 else 1  # noqa: PLR2004
         except (ValueError, ZeroDivisionError):
-            self.fail(f"{value!r}: {wanted}", param, ctx)
+            self.fail(f"{wanted}, got {value!r}", param, ctx)
         if len(parts) not in {1, 3}:
-            self.fail(f"{value!r}: {wanted}", param, ctx)
+            self.fail(f"{wanted}, got {value!r}", param, ctx)
         if not all(math.isfinite(end) for end in ends) or ends[0] > ends[-1]:
             self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
         if not 1 <= count <= MOST_CELLS:
-            self.fail(f"{value!r}: {count} values, allowed are 1 to {MOST_CELLS}", param, ctx)
+            self.fail(f"must have 1 to {MOST_CELLS} values, got {count}: {value!r}", param, ctx)
         low, high = ends[0], ends[-1]
         if count == 1 and low != high:
             self.fail(f"{value!r}: one value has one bound", param, ctx)
@@ -173,8 +173,8 @@ class InstructionSet(click.ParamType[str]):
 
         available = _core.simd_available()
         if value not in available:
-            allowed = f"allowed on this processor: {', '.join(available)}"
-            self.fail(f"{shown(value)}: {allowed}", param, ctx)
+            wanted = f"must be one of {', '.join(available)} on this processor"
+            self.fail(f"{wanted}, got {shown(value)}", param, ctx)
         return str(value)
 
 
@@ -194,8 +194,8 @@ class OutputFile(click.ParamType[Path]):
         if not path.name:
             self.fail(f"{str(value)!r}: is a folder, or no file's name", param, ctx)
         if path.suffix.lower() not in self.suffixes:
-            allowed = ", ".join(self.suffixes)
-            self.fail(f"{str(path)!r}: suffix {path.suffix!r}, allowed are {allowed}", param, ctx)
+            known = " or ".join(self.suffixes)
+            self.fail(f"{str(path)!r}: suffix must be {known}, got {path.suffix!r}", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
         if path.is_dir() and path.suffix.lower() != ".zarr":
@@ -225,7 +225,7 @@ class ReportFile(OutputFile):
         if path.suffix and not path.is_dir():
             return super().convert(value, param, ctx)
         if path.exists() and not path.is_dir():
-            self.fail(f"{str(path)!r}: is a file: allowed is a folder, .html or .md", param, ctx)
+            self.fail(f"{str(path)!r}: must be a folder, .html or .md, it is a file", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
         inside = path / "report.html" if path.is_dir() else path.with_suffix(".html")
@@ -250,7 +250,7 @@ def _library(path: Path) -> None:
     except Exception as error:
         raise InputError(
             f"{str(path)!r}: {suffix} needs {extra}, which cannot be imported "
-            f"({type(error).__name__}: {error}): allowed is to install it, or another output"
+            f"({type(error).__name__}: {error}): it must be installed, or another output chosen"
         ) from error
     if suffix == ".zarr":
         from pendmap.store import check_replaceable

@@ -121,26 +121,25 @@ def evidence_of(experiment: Experiment) -> Evidence:
     """
     runs = tuple(run for run in experiment.runs if not run.peaks_only)
     if not runs:
-        raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
+        raise InputError(f"{experiment.path}: one run or more must have samples, none has")
     experiment.refuse_still(runs)
     runs = tuple(run for run in runs if run.moves)
     made = [run for run in runs if run.accelerometer is not None]
     if made:
         raise InputError(
             f"{made[0].name}: its angle is made of an acceleration, whose own errors are not among"
-            " the effects: allowed is a record with an angle"
+            " the effects: it must be a record with an angle"
         )
     rated = [run for run in runs if run.gyroscope is not None]
     if rated:
         raise InputError(
-            f"{rated[0].name}: its angle is a velocity integrated, whose errors add up: allowed is"
+            f"{rated[0].name}: its angle is a velocity integrated, whose errors add up: it must be"
             " a record with an angle"
         )
     adrift = [run for run in runs if run.kind == "forced" and not (run.drive or run.pivot)]
     if adrift:
         raise InputError(
-            f"{adrift[0].name}: is forced, and nothing says what drives it: allowed is a run with"
-            " drive or pivot"
+            f"{adrift[0].name}: a forced run must have drive or pivot, nothing says what drives it"
         )
     readings = _readings(runs)
     every = [
@@ -150,7 +149,9 @@ def evidence_of(experiment: Experiment) -> Evidence:
     if marked:
         others = [k for k in range(len(runs)) if k not in marked]
         if not others:
-            raise InputError(f"{experiment.path}: all runs are held out: allowed is fewer")
+            raise InputError(
+                f"{experiment.path}: at least one run must be fitted, all are held out"
+            )
         fitted, held = [every[k] for k in others], [every[k] for k in marked]
         return Evidence(
             experiment,
@@ -230,8 +231,8 @@ def _stretched(
             held_of.append(k)
     if not held:
         raise InputError(
-            f"{experiment.path}: too few samples, none of them can be held back: allowed is a run "
-            f"of {LEAST} samples or more"
+            f"{experiment.path}: one run must have {LEAST} samples or more: there are too few, "
+            "none of them can be held back"
         )
     return Evidence(
         experiment,

@@ -194,8 +194,8 @@ def _start(evidence: Evidence) -> Rig:
             )
     if known is None:
         raise InputError(
-            f"{evidence.experiment.path}: no free run shows a natural frequency: allowed is one of "
-            "two half swings or more, or w0 under [rig]"
+            f"{evidence.experiment.path}: one free run must show a natural frequency, in two "
+            "half swings or more, or w0 must be given under [rig]; none shows it"
         )
     return Rig(w0=known, c_over_m=0.01 * known, gravity=evidence.experiment.gravity)
 

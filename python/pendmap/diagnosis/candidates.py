@@ -195,20 +195,20 @@ def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
     for effect in effects:
         if not isinstance(effect, Formula):
             raise InputError(
-                f"effects is {checks.shown(effect)}: allowed is a Formula, like Formula('mine', "
-                "'-k*v^5', {'k': -3})"
+                "effects must be a Formula, like Formula('mine', '-k*v^5', {'k': -3}), got "
+                f"{checks.shown(effect)}"
             )
         if not effect.proportional:
             size = effect.entry["parameters"][0]["name"]
             raise InputError(
                 f"formula '{effect.name}' is not proportional to its first parameter {size}: "
-                "allowed as a candidate is a term whose first parameter is its size"
+                "the first parameter of a candidate must be the size of its term"
             )
         formulas.append(effect)
     names = [formula.name for formula in formulas]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
-        raise InputError(f"effects has {twice[0]} twice: allowed is each name once")
+        raise InputError(f"effects must have each name once, it has {twice[0]} twice")
     return tuple(formulas)
 
 

@@ -296,6 +296,6 @@ def _followed(experiment: Experiment) -> Iterator[None]:
         if str(error).startswith(str(experiment.path)):
             raise
         raise InputError(
-            f"{experiment.path}: no model follows these records: {error}. A run under a drive is "
-            'allowed with the drive, in an experiment.toml: kind = "forced"'
+            f"{experiment.path}: no model follows these records: {error}. A run under a drive "
+            'must have the drive, in an experiment.toml: kind = "forced"'
         ) from None

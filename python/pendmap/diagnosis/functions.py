@@ -74,13 +74,13 @@ class TorqueFunction:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
-            raise InputError(f"name is {checks.shown(self.name)}: allowed is a text")
+            raise InputError(f"name must be a text, got {checks.shown(self.name)}")
         if not callable(self.function):
             shown = checks.shown(self.function)
-            raise InputError(f"function is {shown}: allowed is a function of five arguments")
+            raise InputError(f"function must be a function of five arguments, got {shown}")
         if not isinstance(self.parameters, Mapping):
             shown = checks.shown(self.parameters)
-            raise InputError(f"parameters is {shown}: allowed is a mapping of numbers")
+            raise InputError(f"parameters must be a mapping of numbers, got {shown}")
         kept = {str(n): checks.number(str(n), value) for n, value in self.parameters.items()}
         object.__setattr__(self, "parameters", kept)
 
@@ -101,14 +101,14 @@ class TorqueFunction:
         except Exception as error:  # noqa: BLE001 (whatever a user's function may raise)
             said = " ".join(str(error).split())
             raise InputError(
-                f"function '{self.name}' fails with {type(error).__name__}: {said}: allowed is a "
-                "function of arrays that returns an array as long"
+                f"function '{self.name}' must take arrays and return an array as long, it "
+                f"fails with {type(error).__name__}: {said}"
             ) from None
         if not np.isfinite(values).all():
             k = int(np.flatnonzero(~np.isfinite(values))[0])
             raise InputError(
-                f"function '{self.name}' is {values[k]} at theta = {theta[k]:.4g} rad, "
-                f"v = {place['velocity'][k]:.4g} rad/s: allowed are finite numbers"
+                f"function '{self.name}' must return finite numbers, got {values[k]} at "
+                f"theta = {theta[k]:.4g} rad, v = {place['velocity'][k]:.4g} rad/s"
             )
         return values
 
@@ -147,7 +147,7 @@ def divided(effects: object) -> tuple[list[TorqueFunction], list[Any]]:
     """
     if not isinstance(effects, list | tuple):
         shown = checks.shown(effects)
-        raise InputError(f"effects is {shown}: allowed is a list of Formula and TorqueFunction")
+        raise InputError(f"effects must be a list of Formula and TorqueFunction, got {shown}")
     functions = [effect for effect in effects if isinstance(effect, TorqueFunction)]
     return functions, [effect for effect in effects if not isinstance(effect, TorqueFunction)]
 

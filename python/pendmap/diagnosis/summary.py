@@ -353,7 +353,7 @@ def confined(found: Discrepancy) -> Iterator[str]:
     """Yield which effects of the model no map over initial conditions can have."""
     for effect in found.best.trial.fit.model.effects:
         if effect.definition["mappable"] == "no":
-            yield f"{effect.name}: allowed in simulate, compare and diagnose; no map has it"
+            yield f"{effect.name}: simulate, compare and diagnose can have it; no map has it"
 
 
 def zeroed(found: Discrepancy) -> Iterator[str]:

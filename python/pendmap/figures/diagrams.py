@@ -45,7 +45,7 @@ def figure(
     """Return the figure of a bifurcation diagram; see :func:`pendmap.figures.draw`."""
     shown = layer or _LAYERS[0]
     if shown not in _LAYERS:
-        raise InputError(f"no layer {shown!r} in this diagram: allowed are {', '.join(_LAYERS)}")
+        raise InputError(f"layer must be one of {', '.join(_LAYERS)} in a diagram, got {shown!r}")
     if colormap is not None:
         raise InputError(f"colormap {colormap!r}: a bifurcation diagram has no colour map")
     every = drawn.families(dataset)

@@ -94,7 +94,7 @@ def _chosen(parts: Sequence[str] | None) -> list[Block]:
     unknown = [name for name in names if name not in _BLOCKS]
     if unknown or not names:
         what = repr(unknown[0]) if unknown else "nothing"
-        raise InputError(f"parts has {what}: allowed are {', '.join(PARTS)}")
+        raise InputError(f"parts must be among {', '.join(PARTS)}, got {what}")
     return [_BLOCKS[name] for name in PARTS if name in names]
 
 

@@ -159,10 +159,10 @@ def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
 
     target = Path(path)
     if target.suffix.lower() not in {"", *report.SUFFIXES} and not target.is_dir():
-        allowed = ", ".join(report.SUFFIXES)
+        known = " or ".join(report.SUFFIXES)
         raise InputError(
-            f"cannot write {str(target)!r}: suffix {target.suffix!r}, allowed are {allowed}, or a "
-            "folder"
+            f"cannot write {str(target)!r}: suffix must be {known}, or it must be a folder, got "
+            f"{target.suffix!r}"
         )
     return report.write(found, target)
 
@@ -194,7 +194,7 @@ def draw_runs(
         If the file cannot be written.
     """
     if not runs:
-        raise InputError("runs is []: allowed is one record or more")
+        raise InputError("runs must hold one record or more, got []")
     return written(path, lambda dpi: figure(runs, title=title, subtitle=subtitle, dpi=dpi))
 
 

@@ -46,7 +46,7 @@ def figure(  # noqa: PLR0913 (all of these a user may choose)
     """
     plane = layer or str(dataset.attrs.get("plane", PLANES[0]))
     if plane not in PLANES:
-        raise InputError(f"no layer {plane!r}: allowed are {', '.join(PLANES)}")
+        raise InputError(f"layer must be one of {', '.join(PLANES)}, got {plane!r}")
     if colormap is not None:
         raise InputError(f"colormap {colormap!r}: a figure of critical curves has no colour map")
     chart = drawn.chart(dataset, plane, NEAR)

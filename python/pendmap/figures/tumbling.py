@@ -43,7 +43,7 @@ def figure(
     wide = (width - sheets.LEFT - sheets.RIGHT - (count - 1) * _GAP_X) / count
     high = (height - sheets.TOP - sheets.BOTTOM - 2 * _GAP_Y) / sum(_ROWS)
     if min(wide, high) < _LEAST:
-        raise InputError(f"size {size} leaves no room for the panels: allowed is a larger one")
+        raise InputError(f"size {size} leaves no room for the panels; it must be larger")
     gammas = sorted({float(run.attrs["gamma"]) for run in runs})
     damping = ", ".join(f"{gamma:g}" for gamma in gammas)
     periods, points = (min(run.sizes["period"] for run in runs), CURVE), runs[0].sizes["period"]

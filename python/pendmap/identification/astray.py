@@ -52,7 +52,7 @@ def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> Non
         if rms > min(MISSED * scatter, FAR):
             raise InputError(
                 f"{path}: no model follows these records: of {run.name or 'a run'} {rms:.3g} rad "
-                f"rms are missed, of a motion of {scatter:.3g}: allowed are free decays of one "
-                "pendulum, and a run under a drive with the drive, in an experiment.toml: kind = "
-                '"forced"'
+                f"rms are missed, of a motion of {scatter:.3g}: they must be free decays of one "
+                "pendulum, and a run under a drive must have the drive, in an experiment.toml: "
+                'kind = "forced"'
             )

@@ -182,7 +182,7 @@ def compare(
     checks.call("progress", progress)
     sampled = [run for run in experiment.runs if not run.peaks_only]
     if not sampled:
-        raise InputError(f"{experiment.path}: no run has samples: allowed is one or more")
+        raise InputError(f"{experiment.path}: one run or more must have samples, none has")
     experiment.refuse_still(sampled)
     many = ensemble or Ensemble()
     free: list[RunComparison] = []

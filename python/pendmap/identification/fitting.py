@@ -269,7 +269,7 @@ def prepared(
 ) -> tuple[Conversion, list[dict[str, Any]]]:
     """Return the free parameters, and the runs as the core takes them."""
     if not runs:
-        raise InputError("runs is empty: allowed is one record or more")
+        raise InputError("runs must hold one record or more, got none")
     rigs = [rig_of(run, model) for run in runs]
     given = [bare_run(run, rig, units) for run, rig in zip(runs, rigs, strict=True)]
     return Conversion(free_quantities(runs, rigs, free, start), units), given

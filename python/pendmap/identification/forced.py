@@ -74,7 +74,7 @@ class Ensemble:
     def __post_init__(self) -> None:
         checks.whole("members", self.members, 20, 100_000)
         if not 0 <= checks.number("spread", self.spread) <= 1:
-            raise InputError(f"spread is {self.spread:g}: allowed is 0 to 1 rad")
+            raise InputError(f"spread must be a number from 0 to 1 rad, got {self.spread:g}")
         checks.whole("seed", self.seed, 0, checks.MOST_SEED)
 
 

@@ -94,7 +94,7 @@ def free_quantities(
         for own, where in parts:
             places = [(k, place) for k in where if (place := _place_of(name, rigs[k])) is not None]
             if not places:
-                raise InputError(f"free has {checks.shown(name)}: allowed are {known}")
+                raise InputError(f"free must be among {known}, got {checks.shown(name)}")
             power, less = _power_of(name, rigs[places[0][0]], names)
             quantities.append(Quantity(own, power, places, math.nan, less=less))
     if "phi" not in names:

@@ -142,7 +142,7 @@ def fit_together(
         If the first gives no start and none is given.
     """
     if not runs:
-        raise InputError("runs is empty: allowed is one record or more")
+        raise InputError("runs must hold one record or more, got none")
     readings = [reading_of_run(run) for run in runs]
     fit, worth = fit_from_start(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],

@@ -77,11 +77,11 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
         If one is not known.
     """
     if isinstance(methods, str):
-        raise InputError(f"methods is {methods!r}: allowed is a list of names, like [{methods!r}]")
+        raise InputError(f"methods must be a list of names, like [{methods!r}], got {methods!r}")
     names = list(METHODS) if methods is None else list(dict.fromkeys(methods))
     unknown = [name for name in names if name not in METHODS]
     if unknown:
-        raise InputError(f"method {unknown[0]!r} is not known: allowed are {', '.join(METHODS)}")
+        raise InputError(f"method must be one of {', '.join(METHODS)}, got {unknown[0]!r}")
     return names
 
 
@@ -124,7 +124,7 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
     """
     names = check_names(methods)
     if samples(time, theta, trusted)[0].size == 0:
-        raise InputError("time has no sample that may be used: allowed is a record of a decay")
+        raise InputError("time must have samples of a decay, got none that may be used")
     elapsed, first = from_first(time)
     if any(METHODS[name].reads_peaks for name in names):
         if peaks is None:

@@ -81,7 +81,9 @@ class Peaks:
         """Return peaks that somebody else has measured; absolute values get alternating signs."""
         t, a = np.asarray(time, float), np.asarray(amplitude, float)
         if t.ndim != 1 or t.shape != a.shape:
-            raise InputError(f"{t.shape} times of {a.shape} peaks: allowed are as many of each")
+            raise InputError(
+                f"times and peaks must be as many, got {t.shape} times of {a.shape} peaks"
+            )
         if a.size > 1 and np.all(a[:-1] > 0):
             a = a * (-1.0) ** np.arange(a.size)
         index = np.arange(t.size)
@@ -133,12 +135,14 @@ def samples(
     t, x = np.asarray(time, float), np.asarray(theta, float)
     good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
-        raise InputError(f"time {t.shape}, theta {x.shape}, trusted {good.shape}: allowed are rows")
+        raise InputError(
+            f"time, theta, trusted must be rows, got {t.shape}, {x.shape}, {good.shape}"
+        )
     t, x = t[good], x[good]
     if not (np.isfinite(t).all() and np.isfinite(x).all()):
-        raise InputError("time or theta is not finite: allowed are finite numbers where trusted")
+        raise InputError("time and theta must be finite numbers where trusted, one is not")
     if np.any(np.diff(t) <= 0):
-        raise InputError("time does not increase: allowed are increasing times")
+        raise InputError("time must increase, it does not")
     return t, x
 
 

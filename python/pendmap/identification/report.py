@@ -140,8 +140,7 @@ def decay_of(experiment: Experiment) -> Run:
     free = [run for run in experiment.runs if run.kind == "free" and not run.hold_out]
     if not free:
         raise InputError(
-            f"{experiment.path}: no run is free and not held out: allowed is an experiment with a "
-            "free decay"
+            f"{experiment.path}: must have a free decay, no run is free and not held out"
         )
     experiment.refuse_still(free)
     return max((run for run in free if run.moves), key=_length)
@@ -192,7 +191,7 @@ def identify_experiment(
         name = effect if isinstance(effect, str) else effect.name
         if definition(name)["group"] == "drive":
             raise InputError(
-                f"effect {name} acts on the drive: allowed is one that acts on free decays, of "
+                f"effect {name} acts on the drive: it must be one that acts on free decays, of "
                 "damping, torque or reading"
             )
     run = decay_of(experiment)

@@ -169,7 +169,7 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
     theta = _floats("theta", run.theta)
     sigma = np.broadcast_to(np.asarray(run.sigma, dtype=np.float64), time.shape)
     if not (np.all(np.isfinite(sigma)) and np.all(sigma > 0)):
-        raise InputError("sigma is not above 0 everywhere: allowed are finite numbers above 0")
+        raise InputError("sigma must be finite numbers above 0, it is not everywhere")
     weight = 1.0 / (sigma if run.count is None else _before_rounding(sigma, run.count))
     if run.trusted is not None:
         weight = np.where(np.asarray(run.trusted, dtype=bool), weight, 0.0)
@@ -216,7 +216,7 @@ def _bare_pivot(pivot: Pivot, rig: Rig, units: Units) -> dict[str, Any]:
     powers = {"acceleration": 0, "velocity": 1, "position": 2}
     if pivot.quantity not in powers:
         raise InputError(
-            f"quantity is {checks.shown(pivot.quantity)}: allowed are {', '.join(powers)}"
+            f"quantity must be one of {', '.join(powers)}, got {checks.shown(pivot.quantity)}"
         )
     factor = units.w0 ** powers[pivot.quantity] / rig.gravity
 
@@ -234,7 +234,7 @@ def _bare_pivot(pivot: Pivot, rig: Rig, units: Units) -> dict[str, Any]:
 def _floats(what: str, values: object) -> NDArray[np.float64]:
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.ndim != 1:
-        raise InputError(f"{what} has {array.ndim} dimensions: allowed is 1")
+        raise InputError(f"{what} must have 1 dimension, got {array.ndim}")
     return array
 
 

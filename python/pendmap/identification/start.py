@@ -118,7 +118,7 @@ def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
     """
     turned = peaks.turned
     if len(turned) < 4:  # noqa: PLR2004
-        raise InputError(f"{len(turned)} peaks: allowed are 4 or more for a global search")
+        raise InputError(f"peaks must be 4 or more for a global search, got {len(turned)}")
     numbers = turned.index - turned.index[0]
     count = int(numbers[-1]) + 1
     some = np.unique(np.linspace(0, len(turned) - 1, _MOST_PEAKS).round().astype(int))
@@ -185,7 +185,7 @@ def _guess(time: Floats, theta: Floats, peaks: Peaks) -> StartingValues:
         far = int(np.argmax(np.abs(theta)))
         passed = np.flatnonzero(theta[far:] * theta[far] < 0)
         if passed.size == 0:
-            raise InputError("the record does not swing: allowed is a decay with a zero crossing")
+            raise InputError("the record must be a decay with a zero crossing, it does not swing")
         amplitude = min(abs(float(theta[far])), 3.1)
         quarter = float(time[far + passed[0]] - time[far])
         w0 = float(ellipk(math.sin(amplitude / 2) ** 2)) / quarter

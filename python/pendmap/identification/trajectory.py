@@ -177,9 +177,9 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
             f"time has {time.shape} values and theta {theta.shape}: they must be as many"
         )
     if not (np.all(np.isfinite(time)) and np.all(np.isfinite(theta))):
-        raise InputError("time or theta is not finite: allowed are finite numbers")
+        raise InputError("time and theta must be finite numbers, one is not")
     if sigma is not None and checks.number("sigma", sigma) <= 0:
-        raise InputError(f"sigma is {sigma:g}: allowed is a number above 0")
+        raise InputError(f"sigma must be a number above 0, got {sigma:g}")
     good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if good.shape != time.shape:
         raise InputError("trusted and time differ in length: they must be as many")

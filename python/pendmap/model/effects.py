@@ -59,7 +59,7 @@ def definition(name: object) -> dict[str, Any]:
         near = difflib.get_close_matches(str(name), known, n=1)
         hint = f", perhaps {near[0]}" if near else ""
         raise InputError(
-            f"name is {checks.shown(name)}: allowed is an effect of the library{hint}; "
+            f"name must be an effect of the library, got {checks.shown(name)}{hint}; "
             "pendmap effects lists all"
         )
     return known[name]
@@ -104,7 +104,7 @@ class Effect:
 
     def __post_init__(self) -> None:
         if self.formula is not None and self.formula.name != self.name:
-            raise InputError(f"name is {checks.shown(self.name)}: allowed is {self.formula.name}")
+            raise InputError(f"name must be {self.formula.name}, got {checks.shown(self.name)}")
         names = [entry["name"] for entry in self.definition["parameters"]]
         given = _mapping(f"{self.name}: parameters", self.parameters, names)
         missing = [name for name in names if name not in given]
@@ -120,7 +120,9 @@ class Effect:
         if self.probability is not None:
             share = checks.number(f"{self.name}: probability", self.probability)
             if not 0 <= share <= 1:
-                raise InputError(f"{self.name}: probability is {share:g}: allowed is 0 to 1")
+                raise InputError(
+                    f"{self.name}: probability must be a number from 0 to 1, got {share:g}"
+                )
             object.__setattr__(self, "probability", share)
         if self.approximate is not None:
             checks.flag(f"{self.name}: approximate", self.approximate)
@@ -236,20 +238,20 @@ class Effect:
 def _mapping(what: str, value: object, names: list[str]) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
         raise InputError(
-            f"{what} is {checks.shown(value)}: allowed is a mapping of {', '.join(names)}"
+            f"{what} must be a mapping of {', '.join(names)}, got {checks.shown(value)}"
         )
     unknown = [name for name in value if name not in names]
     if unknown:
         raise InputError(
-            f"{what}: {checks.shown(unknown[0])} is not known: allowed are {', '.join(names)}"
+            f"{what}: {checks.shown(unknown[0])} is not known: it must be one of {', '.join(names)}"
         )
     return value
 
 
 def _interval(what: str, value: object) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        raise InputError(f"{what} is {checks.shown(value)}: allowed is [low, high]")
+        raise InputError(f"{what} must be [low, high], got {checks.shown(value)}")
     low, high = (checks.number(what, bound) for bound in value)
     if low > high:
-        raise InputError(f"{what} is [{low:g}, {high:g}]: allowed is [low, high], the lower first")
+        raise InputError(f"{what} must be [low, high], the lower first, got [{low:g}, {high:g}]")
     return low, high

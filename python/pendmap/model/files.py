@@ -139,7 +139,7 @@ def _check_top(content: dict[str, Any]) -> None:
     if unknown:
         shown = f"[{unknown[0]}]" if isinstance(content[unknown[0]], dict) else unknown[0]
         tables = "[pendulum], [[formula]], [[effect]], [covariance], [provenance]"
-        raise InputError(f"{shown} is not known: allowed are {tables} and format_version")
+        raise InputError(f"{shown} is not known: it must be one of {tables} and format_version")
     version = content.get("format_version", _FORMAT)
     checks.whole("format_version", version, 1, _FORMAT)
     _check_notes({name: content[name] for name in _NOTES if name in content})
@@ -147,12 +147,14 @@ def _check_top(content: dict[str, Any]) -> None:
 
 def _check_notes(notes: object) -> None:
     if not isinstance(notes, Mapping):
-        raise InputError(f"notes is {checks.shown(notes)}: allowed is a mapping")
+        raise InputError(f"notes must be a mapping, got {checks.shown(notes)}")
     for name, table in notes.items():
         if name not in _NOTES:
-            raise InputError(f"{checks.shown(name)} is not known: allowed are {', '.join(_NOTES)}")
+            raise InputError(
+                f"{checks.shown(name)} is not known: it must be one of {', '.join(_NOTES)}"
+            )
         if not isinstance(table, Mapping):
-            raise InputError(f"{name} is {checks.shown(table)}: allowed is a table [{name}]")
+            raise InputError(f"{name} must be a table [{name}], got {checks.shown(table)}")
 
 
 def _is_si(table: dict[str, Any]) -> bool:
@@ -164,7 +166,7 @@ def _is_si(table: dict[str, Any]) -> bool:
     bare = [key for key in table if key in _ONLY_BARE]
     if si and bare:
         raise InputError(
-            f"{bare[0]} has no dimensions and {si[0]} is in SI: allowed is one kind; "
+            f"{bare[0]} has no dimensions and {si[0]} is in SI: both must be of one kind; "
             f"{bare[0]} is {COUNTERPARTS[bare[0]][0]} in SI"
         )
     return bool(si)
@@ -179,11 +181,11 @@ def _instead(key: str) -> str:
     stem = key.rsplit("_", 1)[0]
     for known, unit in quantities.SI_UNITS.items():
         if known.rsplit("_", 1)[0] in (key, stem) or known == stem:
-            return f": allowed is {known}, in {unit}"
+            return f": it must be {known}, in {unit}"
     near = difflib.get_close_matches(key, (*_BARE, *_SI), n=1, cutoff=0.7)
     nearest = f", perhaps {near[0]} is meant" if near else ""
     without = ", ".join(_BARE)
-    return f"{nearest}: allowed are {without}, or in SI {', '.join(_SI)}"
+    return f"{nearest}: it must be one of {without}, or in SI {', '.join(_SI)}"
 
 
 def _own_name(name: str) -> str:
@@ -217,7 +219,7 @@ def _pendulum(
     for name in typed:
         if name not in COUNTERPARTS:
             raise InputError(
-                f"has no dimensions: {name} is allowed beside a model in SI; here it is p or omega"
+                f"has no dimensions: {name} must be given with a model in SI; here it is p or omega"
             )
     numbers = {name: checks.number(name, value) for name, value in table.items()}
     zeta = numbers.pop("zeta", None)
@@ -235,7 +237,7 @@ def _pendulum(
 
 def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, ...]:
     if not isinstance(tables, list):
-        raise InputError(f"effect is {checks.shown(tables)}: allowed is [[effect]], one table each")
+        raise InputError(f"effect must be [[effect]], one table each, got {checks.shown(tables)}")
     effects = []
     for count, table in enumerate(tables, 1):
         try:
@@ -247,20 +249,22 @@ def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, .
 
 def _effect(table: object, formulas: Mapping[str, Formula]) -> Effect:
     if not isinstance(table, dict):
-        raise InputError(f"{checks.shown(table)}: allowed is a table")
+        raise InputError(f"must be a table, got {checks.shown(table)}")
     unknown = [key for key in table if key not in _EFFECT]
     if unknown:
-        raise InputError(f"{_shown(unknown[0])} is not known: allowed are {', '.join(_EFFECT)}")
+        raise InputError(
+            f"{_shown(unknown[0])} is not known: it must be one of {', '.join(_EFFECT)}"
+        )
     for key, example in (("name", '"quadratic_drag"'), ("parameters", "{ q = 0.01 }")):
         if key not in table:
-            raise InputError(f"{key} is missing: allowed is like {key} = {example}")
+            raise InputError(f"{key} must be given, like {key} = {example}")
     name = table["name"]
     formula = formulas.get(name) if isinstance(name, str) else None
     try:
         return Effect(**table, formula=formula)
     except InputError as error:
         own = ", ".join(formulas)
-        if formula is None and formulas and str(error).startswith("name is"):
+        if formula is None and formulas and str(error).startswith("name must be"):
             raise InputError(f"{error}, and this file's [[formula]] are {own}") from None
         raise
 

@@ -110,12 +110,12 @@ class Formula:
         for what in ("name", "term", "revealed_by"):
             if not isinstance(getattr(self, what), str):
                 shown = checks.shown(getattr(self, what))
-                raise InputError(f"formula: {what} is {shown}: allowed is a text")
+                raise InputError(f"formula: {what} must be a text, got {shown}")
         if not isinstance(self.parameters, Mapping) or not self.parameters:
             shown = checks.shown(self.parameters)
             raise InputError(
-                f"formula '{self.name}': parameters is {shown}: allowed is like {{'k': 1.5}}, with "
-                "their powers of w0"
+                f"formula '{self.name}': parameters must be like {{'k': 1.5}}, with their powers "
+                f"of w0, got {shown}"
             )
         names = list(self.parameters)
         try:
@@ -124,8 +124,8 @@ class Formula:
             raise InputError(f"formula '{self.name}': {error}") from None
         if self.name in _TAKEN:
             raise InputError(
-                f"formula '{self.name}': a pendulum has a parameter of that name: allowed is "
-                "another"
+                f"formula '{self.name}': the name must be another, a pendulum has a parameter of "
+                "that name"
             )
         key = (self.name, self.term, self.revealed_by, parts)
         try:
@@ -187,7 +187,7 @@ class Formula:
         called = str(getattr(function, "__name__", "")) if name is None else name
         if not callable(function):
             shown = checks.shown(function)
-            raise InputError(f"function is {shown}: allowed is a function of five arguments")
+            raise InputError(f"function must be a function of five arguments, got {shown}")
         if not isinstance(parameters, Mapping):
             return cls(called, "0", parameters)  # which says what is wrong with them
         return cls(called, term_of(function, parameters, called), parameters)
@@ -208,24 +208,24 @@ def formulas_of(tables: object) -> dict[str, Formula]:
         If one is not as :class:`Formula` wants it, or a name is there twice.
     """
     if not isinstance(tables, list):
-        raise InputError(
-            f"formula is {checks.shown(tables)}: allowed is [[formula]], one table each"
-        )
+        raise InputError(f"formula must be [[formula]], one table each, got {checks.shown(tables)}")
     found: dict[str, Formula] = {}
     for count, table in enumerate(tables, 1):
         where = f"[[formula]] {count}"
         if not isinstance(table, dict):
-            raise InputError(f"{where}: {checks.shown(table)}: allowed is a table")
+            raise InputError(f"{where} must be a table, got {checks.shown(table)}")
         unknown = [key for key in table if key not in _FORMULA]
         if unknown:
-            allowed = ", ".join(_FORMULA)
-            raise InputError(f"{where}: {unknown[0]} is not known: allowed are {allowed}")
+            known = ", ".join(_FORMULA)
+            raise InputError(f"{where}: {unknown[0]} is not known: it must be one of {known}")
         missing = [key for key in _FORMULA[:3] if key not in table]
         if missing:
             raise InputError(f"{where}: {missing[0]} is missing: a formula needs it")
         formula = Formula(**table)
         if formula.name in found:
-            raise InputError(f"{where}: the name {formula.name} is there twice: allowed is once")
+            raise InputError(
+                f"{where}: each name must be there once, {formula.name} is there twice"
+            )
         found[formula.name] = formula
     return found
 
@@ -250,7 +250,7 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
     if "pendulum" not in content:
         unknown = [key for key in content if key not in ("formula", "format_version")]
         if unknown:
-            raise InputError(f"{shown}: {unknown[0]} is not known: allowed are tables [[formula]]")
+            raise InputError(f"{shown}: {unknown[0]} is not known: all must be tables [[formula]]")
     if not content.get("formula"):
         raise InputError(f"{shown}: has no table [[formula]]")
     try:
@@ -261,13 +261,13 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
 
 def _parameter(name: object, given: object, names: list[Any]) -> _ParameterKey:
     if not isinstance(name, str):
-        raise InputError(f"parameter {checks.shown(name)}: allowed is a name")
+        raise InputError(f"parameter must be a name, got {checks.shown(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
     unknown = [key for key in said if key not in _PARAMETER]
     if unknown:
         raise InputError(
-            f"parameter '{name}': {checks.shown(unknown[0])} is not known: allowed are "
-            f"{', '.join(_PARAMETER)}"
+            f"parameter '{name}': {checks.shown(unknown[0])} is not known: it must be one "
+            f"of {', '.join(_PARAMETER)}"
         )
     if "power" not in said:
         raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
@@ -288,15 +288,16 @@ def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | Non
     if match is None or match[1] not in names or match[1] == name:
         others = " or ".join(f'"2 - {n}"' for n in names if n != name)
         raise InputError(
-            f"parameter '{name}': power is {checks.shown(value)}: allowed is a number"
+            f"parameter '{name}': power must be a number"
             + (f", or {others}" if others else "")
+            + f", got {checks.shown(value)}"
         )
     return 2.0, names.index(match[1])
 
 
 def _text(name: str, what: str, value: object) -> str:
     if not isinstance(value, str):
-        raise InputError(f"parameter '{name}': {what} is {checks.shown(value)}: allowed is a text")
+        raise InputError(f"parameter '{name}': {what} must be a text, got {checks.shown(value)}")
     return value
 
 
@@ -304,10 +305,10 @@ def _role(name: str, value: object, *, first: bool) -> str:
     """Return a role that is known; the first parameter, and no other, is the size."""
     from pendmap import _core  # noqa: PLC0415 (only models with formulas need it)
 
-    allowed = [role for role in _core.roles() if (role == "size") == first]
-    if value not in allowed:
+    known = [role for role in _core.roles() if (role == "size") == first]
+    if value not in known:
         raise InputError(
-            f"parameter '{name}': role is {checks.shown(value)}: allowed is {', '.join(allowed)}"
+            f"parameter '{name}': role must be one of {', '.join(known)}, got {checks.shown(value)}"
         )
     return str(value)
 
@@ -319,7 +320,7 @@ def _unit(power: float, less: int | None, names: list[Any]) -> str:
 def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
         shown = checks.shown(value)
-        raise InputError(f"parameter '{name}': {what} is {shown}: allowed is [low, high]")
+        raise InputError(f"parameter '{name}': {what} must be [low, high], got {shown}")
     low, high = value
     infinite = what == "range"
     ends = (

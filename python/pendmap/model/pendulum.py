@@ -89,9 +89,9 @@ class Pendulum:
             object.__setattr__(self, name, checks.number(name, getattr(self, name)))
         for name in ("gamma", "theta_r"):
             if getattr(self, name) < 0:
-                raise InputError(f"{name} is {getattr(self, name):g}: allowed is 0 or more")
+                raise InputError(f"{name} must be 0 or more, got {getattr(self, name):g}")
         if self.omega <= 0:
-            raise InputError(f"omega is {self.omega:g}: allowed is a number above 0")
+            raise InputError(f"omega must be a number above 0, got {self.omega:g}")
         own = {name: (name, getattr(self, name)) for name in self.numbers()}
         object.__setattr__(self, "effects", checked_effects(self.effects, own))
         if self.effects:
@@ -216,7 +216,7 @@ def checked_effects(
         If one is no effect, or says what a parameter says already.
     """
     if not isinstance(effects, list | tuple):
-        raise InputError(f"{what} is {checks.shown(effects)}: allowed is a tuple of Effect")
+        raise InputError(f"{what} must be a tuple of Effect, got {checks.shown(effects)}")
     for effect in effects:
         checks.of_type(what, effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
         if effect.formula is not None:
@@ -228,7 +228,7 @@ def checked_effects(
             if value != 0:
                 raise InputError(
                     f"{called} is {value:g} beside the effect {effect.name}: they are the same, "
-                    f"allowed is one of them (the other one left out, or {called} = 0)"
+                    f"one of them must be left out (or {called} = 0)"
                 )
     return tuple(effects)
 

@@ -71,11 +71,11 @@ def check(name: str, value: object) -> float:
     number = checks.number(name, value)
     low, high = _W0
     if name == "w0" and not low <= number <= high:
-        raise InputError(f"w0 is {number:g}: allowed is {low:g} to {high:g} rad/s")
+        raise InputError(f"w0 must be a number from {low:g} to {high:g} rad/s, got {number:g}")
     if name in _POSITIVE and number <= 0:
-        raise InputError(f"{name} is {number:g}: allowed is a number above 0")
+        raise InputError(f"{name} must be a number above 0, got {number:g}")
     if name in _NOT_NEGATIVE and number < 0:
-        raise InputError(f"{name} is {number:g}: allowed is 0 or more")
+        raise InputError(f"{name} must be 0 or more, got {number:g}")
     return number
 
 
@@ -135,7 +135,9 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
         if name not in checked:
             continue
         if "Omega" not in result:
-            raise InputError(f"{name} has no frequency: allowed beside it is Omega or frequency_hz")
+            raise InputError(
+                f"{name} has no frequency: it must have Omega or frequency_hz beside it"
+            )
         said = f"{name} = {checked[name]:g}, Omega = {result['Omega']:g} and gravity = {gravity:g}"
         ways[f"Y Omega^2/g of {said}"] = checked[name] * metre * result["Omega"] ** 2 / gravity
     return result | _settled("p", ways)
@@ -164,6 +166,7 @@ def one(name: str, ways: Mapping[str, float]) -> float:
         if abs(second - value) > _AGREE * max(abs(value), abs(second)):
             said = f"{name} is {value:.6g}" + ("" if first == name else f" by {first}")
             raise InputError(
-                f"{said}, but {second:.6g} by {other}: they contradict, allowed is one of them"
+                f"{said}, but {second:.6g} by {other}: they contradict, one of them must be left "
+                "out"
             )
     return value

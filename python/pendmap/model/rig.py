@@ -113,15 +113,15 @@ class Rig:
         own = {bare: (si, getattr(self, si)) for bare, (si, _) in COUNTERPARTS.items()}
         object.__setattr__(self, "effects", checked_effects(self.effects, own))
         if self.Omega == 0 and (self.p != 0 or any(effect.drives for effect in self.effects)):
-            raise InputError("Omega is 0: allowed is a number above 0 where something is driven")
+            raise InputError("Omega must be a number above 0 where something is driven, got 0")
         try:
             _ = self.pendulum
         except InputError as error:
             raise InputError(f"{error} (without dimensions, w0 is {self.w0:g})") from None
         except ArithmeticError:
             raise InputError(
-                f"effects have powers of w0 = {self.w0:g} that are no numbers: allowed are smaller "
-                "exponents"
+                f"effects must have smaller exponents: their powers of w0 = {self.w0:g} are no "
+                "numbers"
             ) from None
 
     @classmethod
@@ -161,11 +161,11 @@ class Rig:
         >>> round(rig.w0, 4), round(rig.p, 4), round(rig.pendulum.gamma, 4)
         (6.2642, 0.2906, 0.02)
         """
-        allowed = [*(name for ways in quantities.GROUPS.values() for name in ways)]
-        allowed += quantities.OPTIONAL
-        unknown = [name for name in given if name not in allowed]
+        known = [*(name for ways in quantities.GROUPS.values() for name in ways)]
+        known += quantities.OPTIONAL
+        unknown = [name for name in given if name not in known]
         if unknown:
-            raise InputError(f"{unknown[0]} is not known: allowed are {', '.join(allowed)}")
+            raise InputError(f"{unknown[0]} is not known: it must be one of {', '.join(known)}")
         return cls(**quantities.resolve(given), effects=effects, notes=notes or {})
 
     @classmethod

@@ -19,7 +19,7 @@ __all__ = ["term_of"]
 _SUM, _PRODUCT, _POWER, _WHOLE = range(4)
 """How strongly a text is bound together; what binds less is put in brackets."""
 
-_ALLOWED: Final = (
+_USABLE: Final = (
     "arithmetic and numpy's sqrt, exp, log, sin, cos, tan, tanh, abs, sign, square, minimum, "
     "maximum"
 )
@@ -135,17 +135,17 @@ def term_of(function: Callable[..., Any], parameters: Iterable[str], name: str) 
         found = _text(function(*variables, known))
     except _UnreadableError as error:
         raise InputError(
-            f"function '{name}' uses {error}, which no formula has: allowed are {_ALLOWED}"
+            f"function '{name}' uses {error}, which no formula has: it must use {_USABLE}"
         ) from None
     except KeyError as error:
         raise InputError(
-            f"function '{name}' asks for a parameter {error}: allowed are {', '.join(known)}"
+            f"function '{name}' must ask for parameters among {', '.join(known)}, got {error}"
         ) from None
     except Exception as error:  # noqa: BLE001 (whatever a user's function may raise)
         said = " ".join(str(error).split())
         raise InputError(
-            f"function '{name}' fails with {type(error).__name__}: {said}: allowed is a function "
-            "of theta, v, t, phase, parameters"
+            f"function '{name}' must take theta, v, t, phase, parameters, it fails with "
+            f"{type(error).__name__}: {said}"
         ) from None
     return found.text
 

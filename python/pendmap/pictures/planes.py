@@ -226,8 +226,8 @@ def named(dataset: xr.Dataset, name: str) -> str:
     shares = [f"share {kind}" for kind in dataset["kind"].values]
     known = [one for one in LAYERS if one != "certainty" or one in dataset]
     if name not in known and name not in shares:
-        allowed = ", ".join([*known, *shares])
-        raise InputError(f"no layer {name!r} in this map: allowed are {allowed}")
+        layers = ", ".join([*known, *shares])
+        raise InputError(f"layer must be one of this map, {layers}, got {name!r}")
     return name
 
 

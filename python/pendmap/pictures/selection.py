@@ -79,18 +79,18 @@ def shown(dataset: xr.Dataset) -> xr.Dataset:
     for name in axes:
         if name not in dataset.dims:
             raise InputError(
-                f"{name} is a single value here: allowed is a range of it, like"
+                f"{name} must be a range here, got a single value: select like"
                 f" isel({name}=slice(3, 4))"
             )
         if not dataset.sizes[name]:
-            raise InputError(f"{name} has no values here: allowed is a selection with one at least")
+            raise InputError(f"{name} must have one value at least in a selection, got none")
     over = _OVER.get(kind, {}) | dict.fromkeys(_CELLS.get(kind, ()), axes)
     for name, dimensions in over.items():
         if name not in dataset or set(dataset[name].dims) != set(dimensions):
             there = f"is over {_listed(dataset[name].dims)}" if name in dataset else "is missing"
             raise InputError(
-                f"{name} {there} here: allowed is over {_listed(dimensions)},"
-                " as isel and sel of ranges leave it"
+                f"{name} must be over {_listed(dimensions)} here, as isel and sel of ranges leave"
+                f" it, but {there}"
             )
     dataset = _rising(dataset, _KEYS.get(kind, ()))
     dataset = dataset.transpose(*_TABLES, *axes, *_COLUMNS, ..., missing_dims="ignore")
@@ -137,7 +137,7 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
     ids = dataset["id"].values.astype(int)
     present = np.unique(label)
     if not np.isin(present[present > 0], ids).all():
-        raise InputError("attractor: a selection of it cannot be drawn; allowed is one of an axis")
+        raise InputError("attractor: a selection of it cannot be drawn; it must be one of an axis")
     if label.size == whole:
         return dataset
     counts = np.zeros(int(ids.max(initial=0)) + 2, dtype=np.int64)
@@ -186,7 +186,7 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     if "entry_value" not in dataset:  # of an earlier version, and whole
         return dataset.assign(entry_value=("entry", values[dataset["entry_cell"].values]))
     if dataset["entry_kind"].values.max(initial=-1) != dataset.sizes["kind"] - 1:
-        raise InputError("kind: a selection of kinds cannot be drawn; allowed is one of values")
+        raise InputError("kind: a selection of kinds cannot be drawn; it must be one of values")
     owner = _places(dataset, "entry", dataset["point_entry"].values)
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
     kept = np.isin(dataset["entry_value"].values, values)
@@ -230,7 +230,7 @@ def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.N
     place = np.searchsorted(own, numbers)
     found = own[np.minimum(place, own.size - 1)] == numbers if own.size else numbers < 0
     if not (found | (numbers < 0)).all():
-        raise InputError(f"{table}: a selection of it cannot be drawn; allowed is one of an axis")
+        raise InputError(f"{table}: a selection of it cannot be drawn; it must be one of an axis")
     return np.where(numbers < 0, -1, place)
 
 

@@ -89,15 +89,15 @@ def place_of(table: Mapping[str, object], where: str) -> Place:
     direction, distance = table.get("direction"), table.get("distance_m")
     removed = table.get("gravity_removed")
     if direction is not None and direction not in DIRECTIONS:
-        allowed = ", ".join(f'"{name}"' for name in DIRECTIONS)
+        known = ", ".join(f'"{name}"' for name in DIRECTIONS)
         shown = checks.shown(direction)
-        raise InputError(f"{where}: direction is {shown}: allowed are {allowed}")
+        raise InputError(f"{where}: direction must be one of {known}, got {shown}")
     if distance is not None:
         distance = checks.number(f"{where}: distance_m", distance)
         if not 0 < distance <= _LONGEST:
             raise InputError(
-                f"{where}: distance_m is {distance:g}: allowed is more than 0, up to"
-                f" {_LONGEST:g}, from the pivot to the sensor in m"
+                f"{where}: distance_m must be more than 0, up to {_LONGEST:g}, from the pivot to"
+                f" the sensor in m, got {distance:g}"
             )
     if removed is not None:
         removed = checks.flag(f"{where}: gravity_removed", removed)
@@ -106,12 +106,12 @@ def place_of(table: Mapping[str, object], where: str) -> Place:
         angular = spelling(unit) in ANGULAR_ACCELERATIONS
         if angular and direction in {"tangential", "radial"}:
             raise InputError(
-                f"{where}: unit is {unit!r} and direction {direction!r}: allowed are m/s2 and g, or"
-                ' direction = "angular"'
+                f"{where}: unit must be m/s2 or g with direction {direction!r}, got {unit!r}, which"
+                ' needs direction = "angular"'
             )
         if direction == "angular" and not angular:
             raise InputError(
-                f"{where}: unit is {unit!r} and direction 'angular': allowed are rad/s2 and deg/s2"
+                f"{where}: unit must be rad/s2 or deg/s2 with direction 'angular', got {unit!r}"
             )
     return Place(direction, distance, removed)
 

@@ -76,7 +76,7 @@ def _finite(work: Work, what: str, *values: Floats) -> None:
     good = np.all([np.isfinite(v) for v in values], axis=0)
     missing = np.flatnonzero(~good)
     if missing.size and missing.size == good.size:
-        raise InputError(f"{work.where}: no row has a number for the {what}: allowed are numbers")
+        raise InputError(f"{work.where}: the {what} must be numbers, no row has a number for it")
     if missing.size:
         text = f"{counted(missing.size, 'row')} without a number for the {what} left out"
         work.say("angle-missing", text, mended=True, at=missing)
@@ -90,8 +90,8 @@ def _sane(work: Work) -> None:
     if np.mean(huge) > MOST:
         largest = float(np.max(np.abs(work.theta)))
         raise InputError(
-            f"{work.where}: angles of up to {largest:.3g} rad are too large for a pendulum: allowed"
-            f" are {LARGEST:g} rad; a scale may stand in [columns] of experiment.toml"
+            f"{work.where}: angles must be up to {LARGEST:g} rad, got {largest:.3g} rad, too large"
+            " for a pendulum; a scale may stand in [columns] of experiment.toml"
         )
     if huge.any():
         text = f"{counted(int(huge.sum()), 'number')} beyond {LARGEST:g} rad left out"
@@ -132,17 +132,17 @@ def _accelerated(work: Work) -> None:
     if sensor is None:
         raise InputError(
             f"{work.where}: an acceleration alone tells no angle, where the sensor sits is not"
-            f" known: {work.place_missing} missing in [columns] of experiment.toml: allowed is like"
+            f" known: {work.place_missing} missing in [columns] of experiment.toml: it must be like"
             f" {LIKE}, or {beside}"
         )
     if sensor.direction == "radial":
         raise InputError(
-            f"{work.where}: a radial acceleration alone cannot tell left from right: allowed is"
+            f"{work.where}: a radial acceleration alone cannot tell left from right: it must be"
             f" the tangential one, or {beside}"
         )
     if work.plan.kind == "forced":
         raise InputError(
-            f"{work.where}: an acceleration alone on a forced run holds the pivot's own: allowed is"
+            f"{work.where}: an acceleration alone on a forced run holds the pivot's own: it must be"
             f" a free decay, or {beside}"
         )
     _finite(work, "acceleration", work.extra["acceleration"])

@@ -155,7 +155,7 @@ def _place(name: str, table: Table, where: str) -> int:
     near = difflib.get_close_matches(name, table.names, 1, 0.6)
     perhaps = f", perhaps {near[0]!r} is meant" if near else ""
     raise InputError(
-        f"{where}: no column {checks.shown(name)}{perhaps}: allowed are {_listed(table)}"
+        f"{where}: no column {checks.shown(name)}{perhaps}: it must be one of {_listed(table)}"
     )
 
 
@@ -174,15 +174,15 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
         )
     if not any(channel in places for channel in ANGLES):
         raise InputError(
-            f"{where}: no column of angles: allowed is theta_rad or one like it; there are"
+            f"{where}: no column of angles: there must be theta_rad or one like it; there are"
             f" {_listed(table)}; {advice}"
         )
     for one, other in (("time", "angle"), ("pixel_x", "pixel_y")):
         if one in places and places[one] == places.get(other):
             name = table.names[places[one]]
-            raise InputError(f"{where}: {one} and {other} are both {name!r}: allowed are two")
+            raise InputError(f"{where}: {one} and {other} must be two columns, both are {name!r}")
     if ("pixel_x" in places) != ("pixel_y" in places):
-        raise InputError(f"{where}: pixel_x without pixel_y: allowed are both or neither")
+        raise InputError(f"{where}: both or neither of pixel_x and pixel_y must be given, got one")
 
 
 def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)

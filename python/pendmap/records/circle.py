@@ -47,7 +47,7 @@ def circle_angle(time: Floats, x: Floats, y: Floats, where: str) -> CircleAngle:
     middle = np.array([np.median(x), np.median(y)])
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if not size or not math.isfinite(size):
-        raise InputError(f"{where}: pixel_x and pixel_y do not move: allowed is a swing")
+        raise InputError(f"{where}: pixel_x and pixel_y must show a swing, they do not move")
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
     a, b, radius = _algebraic(u, v)
     kept = np.ones(u.size, bool)
@@ -58,7 +58,7 @@ def circle_angle(time: Floats, x: Floats, y: Floats, where: str) -> CircleAngle:
         kept = away <= limit
     if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(
-            f"{where}: pixel_x and pixel_y lie on no circle: allowed are places of a bob"
+            f"{where}: pixel_x and pixel_y must be places of a bob, they lie on no circle"
         )
     speed = np.hypot(np.gradient(u, time), np.gradient(v, time))
     quick = speed >= np.quantile(speed, 0.8)

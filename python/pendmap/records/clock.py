@@ -62,7 +62,7 @@ def mend(work: Work) -> None:
     _coarse(work)
     _ordered(work)
     if work.time.size < 2 or not work.time[-1] > work.time[0]:
-        raise InputError(f"{work.where}: the times do not increase: allowed are times in order")
+        raise InputError(f"{work.where}: the times must be in order, they do not increase")
     _spacing(work)
 
 
@@ -87,7 +87,7 @@ def cut_at_pauses(work: Work) -> None:
 def _finite(work: Work) -> None:
     missing = np.flatnonzero(~np.isfinite(work.time))
     if missing.size == work.time.size:
-        raise InputError(f"{work.where}: has no row with a time: allowed are numbers")
+        raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
     if missing.size:
         text = f"{counted(missing.size, 'row')} without a time left out"
         work.say("time-missing", text, mended=True, at=missing)
@@ -217,8 +217,8 @@ def _ordered(work: Work) -> None:
         return
     if out.size > MOST_OUT * work.time.size:
         raise InputError(
-            f"{work.where}: {out.size} of {work.time.size} times are out of order, and in order the"
-            " angles make no motion: allowed are times in order"
+            f"{work.where}: the times must be in order, {out.size} of {work.time.size} are out"
+            " of order, and in order the angles make no motion"
         )
     text = f"{counted(out.size, 'time stamp')} out of order, left out"
     work.say("time-backwards", text, mended=True, at=out)

@@ -138,7 +138,7 @@ def _description(content: dict[str, Any]) -> Description:
     _keys(content, _TOP, "", "[rig], [columns], [reader] and [[run]]")
     runs = content.get("run")
     if not isinstance(runs, list) or not runs:
-        raise InputError('has no [[run]]: allowed is one or more, each with file = "run_00.csv"')
+        raise InputError('must have one [[run]] or more, each with file = "run_00.csv", got none')
     plans = []
     for count, table in enumerate(runs, 1):
         where = f"[[run]] {count}"
@@ -154,7 +154,7 @@ def _description(content: dict[str, Any]) -> Description:
     )
 
 
-def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, allowed: str = "") -> None:
+def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, among: str = "") -> None:
     for key in table:
         if key in known:
             continue
@@ -164,14 +164,14 @@ def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, allowed:
         shown = key if key.isidentifier() else checks.shown(key)
         place = f"{where}: " if where else ""
         raise InputError(
-            f"{place}{shown} is not known{perhaps}: allowed are {allowed or ', '.join(known)}"
+            f"{place}{shown} is not known{perhaps}: it must be one of {among or ', '.join(known)}"
         )
 
 
 def _table(value: object, where: str, example: str = "") -> dict[str, Any]:
     if not isinstance(value, dict):
         like = f" like {example}" if example else ""
-        raise InputError(f"{where} is {checks.shown(value)}: allowed is a table{like}")
+        raise InputError(f"{where} must be a table{like}, got {checks.shown(value)}")
     return value
 
 
@@ -189,20 +189,20 @@ def _rig(table: dict[str, Any]) -> dict[str, Any]:
 def _number(name: str, value: object) -> float:
     number = checks.number(name, value)
     if abs(number) > _LARGEST:
-        raise InputError(f"{name} is {number:g}: allowed is up to {_LARGEST:g}")
+        raise InputError(f"{name} must be a number up to {_LARGEST:g}, got {number:g}")
     return number
 
 
 def _positive(name: str, value: object) -> float:
     number = _number(name, value)
     if number < 1 / _LARGEST:
-        raise InputError(f"{name} is {number:g}: allowed is more than 0, {1 / _LARGEST:g} at least")
+        raise InputError(f"{name} must be more than 0, at least {1 / _LARGEST:g}, got {number:g}")
     return number
 
 
 def _text(name: str, value: object) -> str:
     if not isinstance(value, str) or not value:
-        raise InputError(f"{name} is {checks.shown(value)}: allowed is a text")
+        raise InputError(f"{name} must be a text, got {checks.shown(value)}")
     return value
 
 
@@ -211,8 +211,8 @@ def _column(channel: str, value: object) -> Column:
     if isinstance(value, str):
         return Column(name=_text(where, value))
     if not isinstance(value, dict):
-        allowed = f'allowed is a table like {channel} = {{ name = "...", unit = "..." }}'
-        raise InputError(f"{where} is {checks.shown(value)}: {allowed}")
+        like = f'{channel} = {{ name = "...", unit = "..." }}'
+        raise InputError(f"{where} must be a table like {like}, got {checks.shown(value)}")
     own = {"acceleration": _PLACE, "trigger": _TRIGGER}.get(channel, ())
     _keys(value, (*_COLUMN, *own), where)
     name = _text(f"{where}: name", value["name"]) if "name" in value else None
@@ -221,13 +221,13 @@ def _column(channel: str, value: object) -> Column:
     if "scale" in value:
         scale = _number(f"{where}: scale", value["scale"])
         if scale == 0:
-            raise InputError(f"{where}: scale is 0: allowed is any other number")
+            raise InputError(f"{where}: scale must be any number but 0, got 0")
     zero = _number(f"{where}: zero", value.get("zero", 0.0))
     place = place_of(value, where) if channel == "acceleration" else Place()
     edge = value.get("edge")
     if edge is not None and edge not in _EDGES:
-        allowed = " or ".join(f'"{each}"' for each in _EDGES)
-        raise InputError(f"{where}: edge is {checks.shown(edge)}: allowed is {allowed}")
+        known = " or ".join(f'"{each}"' for each in _EDGES)
+        raise InputError(f"{where}: edge must be {known}, got {checks.shown(edge)}")
     phase = _number(f"{where}: phase", value["phase"]) if "phase" in value else None
     column = Column(name, unit, scale, zero, place, edge, phase)
     if unit is not None and scale is None:
@@ -239,16 +239,18 @@ def _reader(table: dict[str, Any]) -> Reader:
     _keys(table, _READER, "[reader]")
     delimiter, decimal = table.get("delimiter"), table.get("decimal")
     if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1):
-        allowed = 'one character, like ";" or "\\t"'
-        raise InputError(f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is {allowed}")
+        wanted = 'one character, like ";" or "\\t"'
+        raise InputError(f"[reader]: delimiter must be {wanted}, got {checks.shown(delimiter)}")
     if decimal not in (None, ".", ","):
-        raise InputError(f'[reader]: decimal is {checks.shown(decimal)}: allowed is "." or ","')
+        raise InputError(f'[reader]: decimal must be "." or ",", got {checks.shown(decimal)}')
     if delimiter is not None and delimiter in '"\r\n\0+-.0123456789eE':
         raise InputError(
-            f"[reader]: delimiter is {checks.shown(delimiter)}: allowed is what numbers do not need"
+            f"[reader]: delimiter must be what numbers do not need, got {checks.shown(delimiter)}"
         )
     if delimiter is not None and delimiter == decimal:
-        raise InputError("[reader]: delimiter and decimal are the same: allowed are different ones")
+        raise InputError(
+            f"[reader]: delimiter and decimal must be different, got {decimal!r} for both"
+        )
     skip = checks.whole("[reader]: skip_rows", table.get("skip_rows", 0), 0, _MOST_SKIPPED)
     return Reader(delimiter, decimal, skip)
 
@@ -256,22 +258,22 @@ def _reader(table: dict[str, Any]) -> Reader:
 def _run(table: dict[str, Any], where: str) -> RunPlan:
     _keys(table, _RUN, where)
     if "file" not in table:
-        raise InputError(f'{where}: file is missing: allowed is like file = "run_00.csv"')
+        raise InputError(f'{where}: file must be given, like file = "run_00.csv"')
     drive = _drive(table["drive"], where) if "drive" in table else None
     pivot, factor = _pivot(table["pivot"], where) if "pivot" in table else (None, 1.0)
     kind = table.get("kind", "forced" if drive or pivot else "free")
     if kind not in ("free", "forced"):  # whatever it is, a list too
-        raise InputError(f'{where}: kind is {checks.shown(kind)}: allowed is "free" or "forced"')
+        raise InputError(f'{where}: kind must be "free" or "forced", got {checks.shown(kind)}')
     if kind == "free" and drive:
-        raise InputError(f'{where}: kind is "free" and there is a drive: allowed is one of them')
+        raise InputError(f'{where}: kind must be "forced" where there is a drive, got "free"')
     if drive and pivot:
-        raise InputError(f"{where}: drive and pivot: allowed is one of them")
+        raise InputError(f"{where}: one of drive and pivot must be left out, got both")
     limits = {}
     for name in ("from_s", "to_s"):
         limits[name] = _number(f"{where}: {name}", table[name]) if name in table else None
     low, high = limits["from_s"], limits["to_s"]
     if low is not None and high is not None and low >= high:
-        raise InputError(f"{where}: from_s is {low:g}: allowed is less than to_s, {high:g}")
+        raise InputError(f"{where}: from_s must be less than to_s = {high:g}, got {low:g}")
     return RunPlan(
         file=_text(f"{where}: file", table["file"]),
         kind=kind,
@@ -290,13 +292,14 @@ def _drive(value: object, where: str) -> dict[str, float | None]:
     for name in _MEASURED:
         if name in table:
             raise InputError(
-                f"{where}: drive: {name} is not known: allowed are p = Y Omega^2/g, of the pivot's"
-                " amplitude Y in m (stroke_mm / 1000), and Omega = 2 pi f in rad/s, of f in Hz"
+                f"{where}: drive: {name} is not known: it must be given as p = Y Omega^2/g, of the"
+                " pivot's amplitude Y in m (stroke_mm / 1000), and Omega = 2 pi f in rad/s, of f in"
+                " Hz"
             )
     _keys(table, _DRIVE, f"{where}: drive")
     for name in ("p", "Omega"):
         if name not in table:
-            raise InputError(f"{where}: drive: {name} is missing: allowed is like {_DRIVE_LIKE}")
+            raise InputError(f"{where}: drive: {name} must be given, like {_DRIVE_LIKE}")
     numbers: dict[str, float | None] = {
         name: _number(f"{where}: drive: {name}", value) for name, value in table.items()
     }
@@ -309,7 +312,7 @@ def _pivot(value: object, where: str) -> tuple[dict[str, str], float]:
     table = _table(value, f"{where}: pivot", _PIVOT_LIKE)
     _keys(table, _PIVOT, f"{where}: pivot")
     if not {"vertical", "horizontal"} & set(table):
-        raise InputError(f"{where}: pivot names no column: allowed is like {_PIVOT_LIKE}")
+        raise InputError(f"{where}: pivot must name a column, like {_PIVOT_LIKE}, got none")
     scale = _positive(f"{where}: pivot: scale", table.get("scale", 1.0))
     sign = _number(f"{where}: pivot: sign", table.get("sign", 1))
     if abs(sign) != 1:
@@ -322,5 +325,5 @@ def _pivot(value: object, where: str) -> tuple[dict[str, str], float]:
     if named.get("unit", "m/s2") not in PIVOT_UNITS:
         shown = checks.shown(named["unit"])
         known = ", ".join(PIVOT_UNITS)
-        raise InputError(f"{where}: pivot: unit is {shown}: allowed are {known}")
+        raise InputError(f"{where}: pivot: unit must be one of {known}, got {shown}")
     return named, sign * scale

@@ -229,7 +229,7 @@ class Experiment:
         if any(run.moves for run in runs):
             return
         why = next((f.text for f in self._said() if f.what in NOTHING), "no sample is trusted")
-        raise InputError(f"{self.path}: nothing to fit: {why}: allowed is a record of a motion")
+        raise InputError(f"{self.path}: must be a record of a motion, got nothing to fit: {why}")
 
     def _said(self) -> Iterator[Finding]:
         yield from self.findings

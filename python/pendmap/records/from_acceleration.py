@@ -109,8 +109,8 @@ def angle_from(
     waves = [wave for part in each for wave in part]
     if len(waves) < FEWEST:
         raise InputError(
-            f"{where}: the acceleration shows {len(waves)} half swings: allowed are {FEWEST} and"
-            " more where no angle is beside it"
+            f"{where}: the acceleration must show {FEWEST} half swings or more where no angle is"
+            f" beside it, got {len(waves)}"
         )
     found = dataclasses.replace(accelerometer, w0=_frequency(waves, accelerometer))
     largest = max(wave.top for wave in waves)
@@ -136,7 +136,7 @@ def _refuse_radial(reading: Floats, middle: float, sensor: Accelerometer, where:
     else:
         why = f"its readings lie on one side, {low:.3g} to {high:.3g} m/s^2, as those along the rod"
     raise InputError(
-        f'{where}: direction is "tangential", but {why}: allowed is the column of the axis across'
+        f'{where}: direction is "tangential", but {why}: it must be the column of the axis across'
         " the rod"
     )
 
@@ -176,7 +176,7 @@ def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak:
         raise InputError(
             f"{where}: distance_m is {sensor.distance_m:g}, that of the centre of oscillation,"
             " g/w0^2 from the pivot, where gravity and the swing cancel: nothing but damping is"
-            " felt there; allowed is another place on the rod, or an angle beside it"
+            " felt there; it must be another place on the rod, or have an angle beside it"
         )
     if away > DIM:
         return ""
@@ -207,7 +207,7 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
             continue
         raise InputError(
             f"{where}: the pendulum turns over the top, which an acceleration alone does not show:"
-            " allowed is an angle or a velocity beside it, or a later from_s"
+            " it must have an angle or a velocity beside it, or a later from_s"
         )
 
 

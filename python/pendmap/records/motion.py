@@ -59,7 +59,7 @@ def moves(work: Work) -> bool:
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
-        raise InputError(f"{work.where}: the angle never changes: allowed is a motion")
+        raise InputError(f"{work.where}: must be a motion, the angle never changes")
     noise, limit = _limits(work)
     good = work.theta[work.trusted]
     still = good.size < 4 or (noise > 0.7 * float(np.std(good)) and np.ptp(good) < SMALL)

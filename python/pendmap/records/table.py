@@ -27,11 +27,11 @@ HUGEST: Final = 1e18
 """Largest number that can be a reading: nanoseconds since 1970 are 2e18, all else is less."""
 
 _KNOWN: Final = {
-    b"\x1f\x8b": "compressed: allowed is the file unpacked",
-    b"\x89HDF": "an HDF5 file: allowed are CSV and Parquet",
-    b"CDF\x01": "a NetCDF file: allowed are CSV and Parquet",
-    b"%PDF": "a PDF file: allowed are CSV and Parquet",
-    b"MATLAB 5.0": "a MATLAB file: allowed are CSV and Parquet",
+    b"\x1f\x8b": "must be unpacked, it is compressed",
+    b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
+    b"CDF\x01": "must be CSV or Parquet, it is a NetCDF file",
+    b"%PDF": "must be CSV or Parquet, it is a PDF file",
+    b"MATLAB 5.0": "must be CSV or Parquet, it is a MATLAB file",
 }
 
 
@@ -47,12 +47,12 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     """
     where = str(path)
     if path.is_dir():
-        raise InputError(f"{where}: is a folder: allowed is a file")
+        raise InputError(f"{where}: must be a file, it is a folder")
     data = read_whole(path, MOST_BYTES)
     digest = hashlib.sha256(data).hexdigest()
     for mark, what in _KNOWN.items():
         if data.startswith(mark):
-            raise InputError(f"{where}: is {what}")
+            raise InputError(f"{where}: {what}")
     if data[:4] in ENGINES:
         table = read_workbook(data, reader, where)
     elif data.startswith(b"PAR1") or path.suffix.lower() in {".parquet", ".pq"}:
@@ -73,7 +73,7 @@ def _parquet(data: bytes, where: str) -> Table:
     except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
         raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None
     if not columns or columns[0].size == 0:
-        raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
+        raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
     values = np.column_stack(columns)
     values[~np.isfinite(values)] = np.nan
     order = np.arange(values.shape[0])

@@ -99,14 +99,14 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
     """
     findings: list[Finding] = []
     if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
-        raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
+        raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return data.decode("utf-16", errors="replace"), findings
     nuls = data.count(b"\0")
     if nuls > MOST_NULS * len(data) and data[1::2].count(b"\0") > 0.9 * nuls:
         return data.decode("utf-16-le", errors="replace"), findings
     if nuls > MOST_NULS * len(data):
-        raise InputError(f"{where}: is no text: allowed are CSV (or other text) and Parquet")
+        raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
     if nuls:
         data = data.replace(b"\0", b"")
         text = f"{counted(nuls, 'NUL byte')} left out"
@@ -116,7 +116,7 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     if len(_CONTROLS.findall(text)) > MOST_CONTROLS * len(text):
-        raise InputError(f"{where}: is no text: allowed are CSV (or other text) and Parquet")
+        raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
     return text, findings
 
 
@@ -149,12 +149,12 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     lines = [(k, line) for k, line in enumerate(re.split(r"\r\n|\n|\r", text), 1) if line.strip()]
     lines = [(k, line) for k, line in lines if k > reader.skip_rows]
     if not lines:
-        raise InputError(f"{where}: is empty: allowed is a file with rows of numbers")
+        raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
     long = sum(len(line) > LONGEST for _, line in lines)
     if long > ENOUGH * len(lines):
         raise InputError(
-            f"{where}: has lines of more than {LONGEST} characters: allowed are tables of up to "
-            f"{MOST_COLUMNS} columns"
+            f"{where}: must be a table of up to {MOST_COLUMNS} columns, got lines of more than "
+            f"{LONGEST} characters"
         )
     # A line without a number is left out with those that cannot be read.
     lines = [(k, line if len(line) <= LONGEST else "?") for k, line in lines] if long else lines
@@ -168,8 +168,8 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     names, headed = _header([line for _, line in lines[:first]], delimiter, width)
     if headed and len(names) != width:
         raise InputError(
-            f"{where}: {len(names)} columns have names and {width} have numbers: allowed are as"
-            " many; decimal commas need another delimiter, like ;"
+            f"{where}: as many columns must have names as numbers, got {len(names)} with names and"
+            f" {width} with numbers; decimal commas need another delimiter, like ;"
         )
     dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
     if dropped and not (findings and len(dropped) == 1):
@@ -252,7 +252,7 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
             return alone
     advice = "; what it is separated by may stand in [reader] of experiment.toml" if found else ""
     raise InputError(
-        f"{where}: has no rows of numbers: allowed is CSV with a time and an angle{advice}"
+        f"{where}: must be CSV with a time and an angle, got no rows of numbers{advice}"
     )
 
 

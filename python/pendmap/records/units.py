@@ -70,12 +70,12 @@ class Channel:
             return self.units[spelled]
         if spelled in _RAW:
             raise InputError(
-                f"{where}: unit is {unit!r}: allowed beside it is scale, {self.unit} per {unit},"
+                f"{where}: unit {unit!r} must have a scale beside it, {self.unit} per {unit},"
                 " in [columns] of experiment.toml"
             )
         raise InputError(
-            f"{where}: unit is {unit!r}: allowed are {', '.join(self.units)}, or a scale,"
-            f" {self.unit} per unit"
+            f"{where}: unit must be one of {', '.join(self.units)}, or have a scale,"
+            f" {self.unit} per unit, got {unit!r}"
         )
 
     def has(self, unit: str) -> bool:

@@ -167,8 +167,8 @@ class Work:
         self.keep((self.time >= low) & (self.time <= high))
         if self.time.size < FEWEST:
             raise InputError(
-                f"{self.where}: from_s and to_s leave {counted(self.time.size, 'sample')}: allowed"
-                f" are times within {first:g} to {last:g} s"
+                f"{self.where}: from_s and to_s must be times within {first:g} to {last:g} s, they"
+                f" leave {counted(self.time.size, 'sample')}"
             )
 
     def refuse_short(self) -> None:
@@ -182,8 +182,8 @@ class Work:
         least = _FEWEST_PEAKS if self.peaks_only else FEWEST
         if self.time.size < least:
             raise InputError(
-                f"{self.where}: has {counted(self.time.size, 'sample')} with time and angle:"
-                f" allowed are {least} and more"
+                f"{self.where}: must have {least} samples or more with time and angle, got"
+                f" {counted(self.time.size, 'sample')}"
             )
 
     def pivot(self) -> dict[str, Floats] | None:

@@ -55,7 +55,7 @@ def check_address(address: str) -> tuple[str, int]:
     """
     host, colon, port = address.rpartition(":")
     if not (colon and host and port.isdecimal() and 0 < int(port) <= _PORTS):
-        raise InputError(f"address is {address!r}: allowed is HOST:PORT, such as {ADDRESS}")
+        raise InputError(f"address must be HOST:PORT, such as {ADDRESS}, got {address!r}")
     host = host.strip("[]")
     try:
         with socket.create_connection((host, int(port)), _PROBE):

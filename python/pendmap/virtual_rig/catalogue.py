@@ -78,7 +78,7 @@ def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> lis
         one that leaves no trace in such runs.
     """
     if NONE in asked and len(asked) > 1:
-        raise InputError("effect none: allowed alone only")
+        raise InputError("effect none must be alone, got others beside it")
     made: list[Effect] = []
     for text in asked:
         if text == NONE:
@@ -120,7 +120,7 @@ def _parse(text: str) -> tuple[str, dict[str, float]]:
         except ValueError:
             equals = ""
         if not equals:
-            raise InputError(f"effect {text!r}: {part!r} is not a parameter: allowed is NAME=VALUE")
+            raise InputError(f"effect {text!r}: a parameter must be NAME=VALUE, got {part!r}")
     if name == ANY and given:
         raise InputError(f"effect {text!r}: any takes no parameters")
     return name.strip(), given
@@ -132,4 +132,4 @@ def _near(name: str) -> str:
 
     close = difflib.get_close_matches(name, EFFECTS, n=3)
     known = f"did you mean {', '.join(close)}? " if close else ""
-    return f"{known}allowed are any, none and what pendmap rig --list shows"
+    return f"{known}it must be any, none or one that pendmap rig --list shows"

@@ -152,15 +152,17 @@ class Effect:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = float(getattr(self, field.name))
-            what = f"effect {self.title}: {field.name} is {value:g}"
+            what = f"effect {self.title}: {field.name} must be"
             if not math.isfinite(value):
-                raise InputError(f"{what}: allowed is any finite number")
+                raise InputError(f"{what} a finite number, got {value:g}")
             about = field.metadata
             least = about.get("least", -about["most"] if self.signed else 0.0)
             if not least <= value <= about["most"]:
-                raise InputError(f"{what}: allowed is {least:g} to {about['most']:g}")
+                raise InputError(
+                    f"{what} a number from {least:g} to {about['most']:g}, got {value:g}"
+                )
             if about.get("whole") and value != round(value):
-                raise InputError(f"{what}: allowed are whole numbers")
+                raise InputError(f"{what} a whole number, got {value:g}")
             object.__setattr__(self, field.name, value)
 
     @property
@@ -185,8 +187,8 @@ class Effect:
         known = {field.name: field.metadata for field in dataclasses.fields(cls)}
         for name in given:
             if name not in known:
-                allowed = ", ".join(known) or "none"
-                raise InputError(f"effect {cls.full_name()} has no parameter {name!r}: {allowed}")
+                has = ", ".join(known) or "none"
+                raise InputError(f"effect {cls.full_name()} has no parameter {name!r}: {has}")
         values = {}
         for name, about in known.items():
             # Drawn even where it is given, so that the other draws stay what they were.

@@ -57,10 +57,10 @@ class Parameters:
     def __post_init__(self) -> None:
         for name, value in dataclasses.asdict(self).items():
             if not math.isfinite(value):
-                raise InputError(f"{name} is {value}: allowed is any finite number")
+                raise InputError(f"{name} must be a finite number, got {value}")
             if value < 0 or (name == "w0" and value == 0):
-                allowed = "a number above 0" if name == "w0" else "0 or more"
-                raise InputError(f"{name} is {value:g}: allowed is {allowed}")
+                wanted = "a number above 0" if name == "w0" else "0 or more"
+                raise InputError(f"{name} must be {wanted}, got {value:g}")
 
 
 class Equation:
@@ -107,8 +107,7 @@ class Equation:
             if value < 0:
                 names = ", ".join(effect.title for effect in self.effects)
                 raise InputError(
-                    f"{names}: {name} would fall to {value:.3g}: allowed are effects that leave"
-                    " it 0 or more"
+                    f"{names}: effects must leave {name} 0 or more, it would fall to {value:.3g}"
                 )
 
     def motion(  # noqa: PLR0913, PLR0917 (the state of a lane has that many parts)

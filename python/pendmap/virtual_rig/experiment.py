@@ -99,26 +99,26 @@ class Request:
         self._refuse_rig()
         if self.preset not in PRESETS:
             known = ", ".join(PRESETS)
-            raise InputError(f"experiment {self.preset!r} is not known: allowed are {known}")
+            raise InputError(f"experiment must be one of {known}, got {self.preset!r}")
         if self.seed < 0:
-            raise InputError(f"seed is {self.seed}: allowed is 0 or more")
+            raise InputError(f"seed must be 0 or more, got {self.seed}")
         if not (math.isfinite(self.size) and self.size > 0):
-            raise InputError(f"size is {self.size:g}: allowed is a finite number above 0")
+            raise InputError(f"size must be a finite number above 0, got {self.size:g}")
         if self.duration is not None and not 1 <= self.duration <= 3600:  # noqa: PLR2004
-            raise InputError(f"duration is {self.duration:g}: allowed is 1 to 3600 s")
+            raise InputError(f"duration must be a number from 1 to 3600 s, got {self.duration:g}")
         if not 0 <= self.mess <= 100:  # noqa: PLR2004 (said in the docstring)
             raise InputError(f"mess must be a number from 0 to 100, got {self.mess:g}")
         self._refuse_idle()
         self._refuse_plans()
         free, forced = self.runs
         if min(free, forced) < 0 or not 1 <= free + forced <= 99:  # noqa: PLR2004
-            raise InputError(f"{free} free and {forced} forced runs: allowed are 1 to 99 together")
+            raise InputError(f"runs must be 1 to 99 together, got {free} free and {forced} forced")
         seconds = self.duration or PRESETS[self.preset].duration[1]
         seconds = max((plan.duration for plan in self.plans), default=seconds)
         if self.rate * seconds * (free + forced) > _MOST_SAMPLES:
             raise InputError(
-                f"rate is {self.rate:g}: with {free + forced} runs of {seconds:g} s allowed is up"
-                f" to {_MOST_SAMPLES / seconds / (free + forced):.4g} Hz"
+                f"rate must be up to {_MOST_SAMPLES / seconds / (free + forced):.4g} Hz with"
+                f" {free + forced} runs of {seconds:g} s, got {self.rate:g}"
             )
 
     def _refuse_rig(self) -> None:
@@ -127,34 +127,36 @@ class Request:
         for name, (low, high, unit) in ranges.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise InputError(f"{name} is {value:g}: allowed is {low:g} to {high:g} {unit}")
+                raise InputError(
+                    f"{name} must be a number from {low:g} to {high:g} {unit}, got {value:g}"
+                )
 
     def _refuse_idle(self) -> None:
         """Refuse what is asked for and would change nothing."""
         asked = self.effects or PRESETS[self.preset].effects
         if self.size != 1 and not any(draws_size(text) for text in asked):
             raise InputError(
-                f"size is {self.size:g}: no size of an effect is drawn here: allowed with an "
-                "effect whose size is not given"
+                f"size must be 1 where no size of an effect is drawn, got {self.size:g}: it must "
+                "have an effect whose size is not given"
             )
         if self.noise == 0 and self.correlation != 0:
             raise InputError(
-                f"correlation is {self.correlation:g}: without noise there is nothing to "
-                "correlate: allowed with noise above 0"
+                f"correlation must be 0 where noise is 0, got {self.correlation:g}: without noise "
+                "there is nothing to correlate"
             )
 
     def _refuse_plans(self) -> None:
         asked = [n for n in ("free", "forced", "duration") if getattr(self, n) is not None]
         if self.plans and asked:
-            raise InputError(f"{asked[0]} is given beside plans: allowed is one of them")
+            raise InputError(f"one of {asked[0]} and plans must be left out, got both")
         for k, plan in enumerate(self.plans):
             numbers = (plan.theta, plan.velocity, plan.p, plan.frequency, plan.phase, plan.lab_time)
             if plan.kind not in {"free", "forced"}:
-                raise InputError(f"plan {k}: kind is {plan.kind!r}: allowed are free, forced")
+                raise InputError(f"plan {k}: kind must be free or forced, got {plan.kind!r}")
             if not (1 <= plan.duration <= 3600 and all(map(math.isfinite, numbers))):  # noqa: PLR2004
                 raise InputError(
-                    f"plan {k}: a duration of {plan.duration:g} s from {plan.theta:g} rad: allowed "
-                    "are 1 to 3600 s, and finite numbers"
+                    f"plan {k}: duration must be a number from 1 to 3600 s, and all numbers "
+                    f"finite, got {plan.duration:g} s from {plan.theta:g} rad"
                 )
 
     @property
@@ -295,7 +297,7 @@ def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
     drawn = math.exp(rng.uniform(math.log(low), math.log(high)))
     noise = drawn if request.noise is None else request.noise
     if not (math.isfinite(noise) and 0 <= noise <= 180):  # noqa: PLR2004 (degrees)
-        raise InputError(f"noise is {noise:g}: allowed is 0 to 180 degrees")
+        raise InputError(f"noise must be a number from 0 to 180 degrees, got {noise:g}")
     shared = {field.name for field in dataclasses.fields(Sensor)} - {"noise"}
     settings: dict[str, Any] = {name: getattr(request, name) for name in shared}
     return Sensor(noise=math.radians(noise), **settings)

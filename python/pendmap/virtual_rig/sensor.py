@@ -72,8 +72,8 @@ class Sensor:
         for name, (low, high, unit) in ranges.items():
             value = getattr(self, name)
             if not math.isfinite(value) or not low <= value <= high:
-                allowed = f"{low:g} to {high:g} {unit}".strip()
-                raise InputError(f"{name} is {value:g}: allowed is {allowed}")
+                wanted = f"a number from {low:g} to {high:g} {unit}".strip()
+                raise InputError(f"{name} must be {wanted}, got {value:g}")
 
     @property
     def count(self) -> float:

@@ -68,14 +68,16 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
         raise NotADirectoryError(errno.ENOTDIR, "is not a folder", str(folder))
     full = folder.is_dir() and any(folder.iterdir())
     if full and not replace:
-        raise InputError(f"{folder}: is not empty: allowed is a new or empty folder, or --replace")
+        raise InputError(
+            f"{folder}: is not empty: without --replace it must be a new or empty folder"
+        )
     if full and not (truth.is_file() and all(_FILES.fullmatch(f.name) for f in folder.iterdir())):
         raise InputError(
             f"{folder}: is not an experiment of the virtual rig alone, with its truth beside it: "
             "--replace replaces nothing else"
         )
     if truth.exists() and not replace:
-        raise InputError(f"{truth}: exists: allowed is another folder, or --replace")
+        raise InputError(f"{truth}: exists: without --replace it must be another folder")
     check_room(truth)
     return Places(folder, truth)
 

@@ -293,27 +293,27 @@ fn is_name(name: &str) -> bool {
 }
 
 fn check_names(spec: &Spec) -> Result<(), String> {
-    let allowed = "a letter, then letters, digits and _";
+    let letters = "a letter, then letters, digits and _";
     if !is_name(&spec.name) {
-        return Err(format!("its name: allowed is {allowed}"));
+        return Err(format!("its name must be {letters}"));
     }
     if Kind::named(&spec.name).is_ok() {
-        return Err("its name is one of the library: allowed is another".to_owned());
+        return Err("its name must be another, it is one of the library".to_owned());
     }
     let count = spec.parameters.len();
     if !(1..=MOST_PARAMETERS).contains(&count) {
         return Err(format!(
-            "has {count} parameters: allowed are 1 to {MOST_PARAMETERS}; other numbers may stand in \
+            "must have 1 to {MOST_PARAMETERS} parameters, got {count}; other numbers may stand in \
              the term"
         ));
     }
     for (k, parameter) in spec.parameters.iter().enumerate() {
         let name = &parameter.name;
         if !is_name(name) {
-            return Err(format!("parameter '{name}': allowed is {allowed}"));
+            return Err(format!("parameter '{name}' must be {letters}"));
         }
         if parse::is_taken(name) {
-            return Err(format!("parameter '{name}' has a meaning of its own: allowed is another"));
+            return Err(format!("parameter '{name}' must be another, it has a meaning of its own"));
         }
         if spec.parameters[..k].iter().any(|p| p.name == *name) {
             return Err(format!("parameter '{name}' is there twice"));
@@ -321,14 +321,14 @@ fn check_names(spec: &Spec) -> Result<(), String> {
         let ([low, high], [least, greatest]) = (parameter.typical, parameter.range);
         if !(low < high && low.is_finite() && high.is_finite()) {
             return Err(format!(
-                "parameter '{name}': typical is [{low}, {high}]: allowed are two numbers, the lower \
-                 first"
+                "parameter '{name}': typical must be two numbers, the lower first, got [{low}, \
+                 {high}]"
             ));
         }
         if !(least <= low && high <= greatest) {
             return Err(format!(
-                "parameter '{name}': range is [{least}, {greatest}]: allowed is one that holds the \
-                 typical [{low}, {high}]"
+                "parameter '{name}': range must be one that holds the typical [{low}, {high}], got \
+                 [{least}, {greatest}]"
             ));
         }
         if !parameter.power.is_finite() || parameter.less.is_some_and(|p| p >= count || p == k) {
@@ -354,7 +354,7 @@ fn check_term(tree: &Tree, parameters: &[Parameter]) -> Result<(), String> {
         abrupt |= function == Function::Sign && inner.moves() && !inner.is_velocity();
     });
     if abrupt {
-        return Err("jumps where what is under sign(...) passes zero: allowed is sign(v), or \
+        return Err("jumps where what is under sign(...) passes zero: it must be sign(v), or \
                     tanh(x/width) for sign(x)"
             .to_owned());
     }
@@ -375,7 +375,7 @@ fn check_term(tree: &Tree, parameters: &[Parameter]) -> Result<(), String> {
         let unit = "the term is an acceleration in rad/s^2, v a velocity, t a time";
         match power {
             Some(power) => format!(
-                "its units do not balance: {unit}; allowed is power = {power} for '{}'",
+                "its units do not balance: {unit}; '{}' must have power = {power}",
                 parameters[0].name
             ),
             None => format!(

@@ -44,12 +44,12 @@ pub fn is_taken(name: &str) -> bool {
 /// The tree of `text`, in which the names `parameters` are known besides.
 ///
 /// # Errors
-/// What is wrong, where (in characters from 1), and what is allowed there.
+/// What is wrong, where (in characters from 1), and what must be there.
 pub fn parse(text: &str, parameters: &[String]) -> Result<Tree, String> {
     let characters: Vec<char> = text.chars().collect();
     if characters.len() > LONGEST {
         let count = characters.len();
-        return Err(format!("has {count} characters: allowed are {LONGEST}"));
+        return Err(format!("must have at most {LONGEST} characters, got {count}"));
     }
     let tokens = tokens(&characters)?;
     let mut parser = Parser { tokens, next: 0, depth: 0, parameters };
@@ -105,8 +105,8 @@ fn tokens(characters: &[char]) -> Result<Vec<(Token, usize)>, String> {
             Token::Mark(c)
         } else {
             let shown = c.escape_debug();
-            let allowed = "numbers, names, + - * / ^ ( ) and commas";
-            return Err(format!("unexpected '{shown}' at {}: allowed are {allowed}", begin + 1));
+            let known = "numbers, names, + - * / ^ ( ) and commas";
+            return Err(format!("unexpected '{shown}' at {}: there must be {known}", begin + 1));
         };
         found.push((token, begin + 1));
     }
@@ -138,14 +138,14 @@ impl Parser<'_> {
         token
     }
 
-    fn unexpected(&self, token: &Token, allowed: &str) -> String {
+    fn unexpected(&self, token: &Token, wanted: &str) -> String {
         let shown = match token {
-            Token::End => return format!("ends at {}: allowed is {allowed}", self.place()),
+            Token::End => return format!("ends at {}: there must be {wanted}", self.place()),
             Token::Number(value) => value.to_string(),
             Token::Name(name) => name.clone(),
             Token::Mark(mark) => mark.to_string(),
         };
-        format!("unexpected '{shown}' at {}: allowed is {allowed}", self.place())
+        format!("unexpected '{shown}' at {}: there must be {wanted}", self.place())
     }
 
     fn expect(&mut self, mark: char) -> Result<(), String> {
@@ -162,7 +162,9 @@ impl Parser<'_> {
         self.depth += 1;
         if self.depth > 2 * DEEPEST {
             let place = self.place();
-            return Err(format!("is nested too deeply at {place}: allowed are {DEEPEST} brackets"));
+            return Err(format!(
+                "is nested too deeply at {place}: it must have at most {DEEPEST} brackets"
+            ));
         }
         let mut left = self.signed()?;
         loop {
@@ -188,7 +190,9 @@ impl Parser<'_> {
         self.depth += 1;
         if self.depth > 2 * DEEPEST {
             let place = self.place();
-            return Err(format!("is nested too deeply at {place}: allowed are {DEEPEST} brackets"));
+            return Err(format!(
+                "is nested too deeply at {place}: it must have at most {DEEPEST} brackets"
+            ));
         }
         let tree = match self.peek() {
             Token::Mark('-') => {
@@ -246,13 +250,13 @@ impl Parser<'_> {
             return Ok(Tree::Number(std::f64::consts::PI));
         }
         if FUNCTIONS.iter().any(|(known, _)| *known == name) || OF_TWO.contains(&name) {
-            return Err(format!("'{name}' at {place} is a function: allowed is {name}(...)"));
+            return Err(format!("'{name}' at {place} is a function: it must be {name}(...)"));
         }
         let mut known: Vec<&str> = VARIABLES.iter().map(|(known, _)| *known).collect();
         known.push(CONSTANT);
         known.extend(self.parameters.iter().map(String::as_str));
         let known = known.join(", ");
-        Err(format!("unknown name '{name}' at {place}: allowed are {known}"))
+        Err(format!("unknown name '{name}' at {place}: it must be one of {known}"))
     }
 
     fn called(&mut self, name: &str, place: usize) -> Result<Tree, String> {
@@ -261,7 +265,7 @@ impl Parser<'_> {
             let known: Vec<&str> =
                 FUNCTIONS.iter().map(|(known, _)| *known).chain(OF_TWO).collect();
             let known = known.join(", ");
-            return Err(format!("unknown function '{name}' at {place}: allowed are {known}"));
+            return Err(format!("unknown function '{name}' at {place}: it must be one of {known}"));
         }
         self.next += 1;
         let first = self.sum(0)?;
