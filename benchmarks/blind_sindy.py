@@ -175,7 +175,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("sindy.jsonl"), help="SINDy's answers")
     given = parser.parse_args()
     if not given.blind.exists():
-        parser.error(f"{given.blind}: there is no such file: allowed is one that blind.py wrote")
+        parser.error(f"{given.blind}: there must be such a file, written by blind.py")
     rows = [row for row in _read(given.blind) if row["what"] in KINDS and "error" not in row]
     rows = rows[: given.limit]
     answers = {row["seed"]: row for row in _read(given.out)}
@@ -213,7 +213,7 @@ def _read(path: Path) -> list[dict[str, Any]]:
         found = [json.loads(line) for line in whole if line.endswith("\n")]
         _ = [(row["what"], row["seed"]) for row in found]
     except (ValueError, TypeError, KeyError):
-        sys.exit(f"{path}: is no list of experiments: allowed is a file that blind.py wrote")
+        sys.exit(f"{path}: must be a file that blind.py wrote, got no list of experiments")
     return found
 
 

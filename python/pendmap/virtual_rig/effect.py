@@ -114,7 +114,7 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
 ) -> Any:  # noqa: ANN401 (of a field)
     """Describe a parameter that says what form an effect has.
 
-    It is drawn uniformly between ``low`` and ``high``; allowed is ``least`` to ``most``, by
+    It is drawn uniformly between ``low`` and ``high``; it may be from ``least`` to ``most``, by
     default up to :data:`MOST` times the larger of them, of either sign.
     """
     most = MOST * max(abs(low), abs(high)) if most is None else most
