@@ -49,11 +49,6 @@ def baseline(
 
     Of a given model the natural frequency, viscous damping and sizes of effects are fitted, Coulomb
     friction and a constant torque only if it has them. Effects of ``without`` are not in the core.
-
-    Raises
-    ------
-    InputError
-        If no free run shows a natural frequency and none is known.
     """
     if model is not None:
         own = _unfolded(model)

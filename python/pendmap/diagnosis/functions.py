@@ -157,11 +157,6 @@ def call_once(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
 
     Angles and velocities that are exactly 0 are left out: a motion passes them between two
     readings, where a reading in counts stays, and a function may be of no value there.
-
-    Raises
-    ------
-    InputError
-        As of :meth:`TorqueFunction.torque`.
     """
     for run in runs if functions else ():
         time, theta = run.time[run.trusted], run.theta[run.trusted]

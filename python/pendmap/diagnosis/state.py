@@ -235,13 +235,7 @@ class State:
         return self._held[id(trial)]
 
     def found(self, trial: Trial) -> Found:
-        """Return a model with its hold-out results.
-
-        Raises
-        ------
-        InputError
-            If its motion is lost on what was held back.
-        """
+        """Return a model with its hold-out results; an InputError where its motion is lost."""
         held = self.held(trial)
         return Found(trial, held if held is not None else tried(self.evidence, trial))
 

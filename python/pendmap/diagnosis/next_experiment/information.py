@@ -205,11 +205,6 @@ class Prospects:
     """Proposals run through by the model found, and what they would say.
 
     A proposal in which the model is lost is left out; ``reasons`` has how many, and why.
-
-    Raises
-    ------
-    InputError
-        If the model is lost in all of the menu.
     """
 
     def __init__(
