@@ -11,11 +11,12 @@ import pytest
 
 from hidden import diagnosed
 from pendmap.diagnosis.thresholds import Thresholds
+from pendmap.diagnosis.verdict import probabilities
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-CHANCE, SURE = Thresholds().rest, Thresholds().sure
+CHANCE = Thresholds().rest
 
 MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
 
@@ -130,7 +131,9 @@ def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(
     assert found.verdict in {"partial", "unknown"}
     assert found.judgement.form.chances["held_out"] < CHANCE
     assert all(effect.approximate for effect in found.effects)
-    assert all(effect.probability < SURE for effect in found.effects)
+    gains = [standing.gain for standing in found.judgement.standings]
+    pairs = zip(found.judgement.probabilities, probabilities(1.0, gains), strict=True)
+    assert all(sure < otherwise for sure, otherwise in pairs)
 
 
 def test_an_effect_of_nothing_does_not_stay_since_its_rest_was_lost(tmp_path: Path) -> None:

@@ -174,28 +174,24 @@ def replaced(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     """Return a trial's model with another effect in the place of one, from the trial's motion.
 
     The fit is given up where it promises to end far above the sum of squares ``target``; none where
-    it begins or ends above ``rest``, that of the model with neither.
+    it ends above ``rest``, that of the model with neither.
     """
     model, free, start = _without(trial, dropped)
     score = scores.scores[place]
     other = score.candidate
 
-    def fit(steps: int) -> Trial:
-        return fitted(
+    try:
+        found = fitted(
             evidence,
             placed(model, [other]),
             [*free, *other.free, *other.adapted],
             (*(c for c in trial.chosen if c.name != dropped.name), other),
             start=start | score.start,
             windows=trial.fit.windows,
-            steps=steps,
+            steps=FEW_STEPS,
             least_gain=LITTLE * level,
             target=target,
         )
-
-    try:
-        found = fit(0)
-        found = found if found.chi2 > rest else fit(FEW_STEPS)
     except InputError:
         return None
     if found.chi2 > rest:

@@ -82,16 +82,22 @@ class State:
         """Give readings the error that a model leaves, and return the model fitted with it.
 
         Fits, scores and hold-out results with other weights are forgotten. Nothing changes where
-        the errors are nearly what they were.
+        the errors are nearly what they were, or where a motion is lost with the new ones.
         """
         errors = model_errors(self.records, best)
         pairs = zip(errors, self.errors, self.records.fitted, strict=True)
         if all(abs(new - old) < SAME * np.hypot(old, np.mean(r.sigma)) for new, old, r in pairs):
             return best
-        self.errors = errors
-        self.evidence = weighted(self.records, errors)
-        self._begin(self._again(self.base))
-        return self.base if not best.chosen else self.keep(self._again(best)) or best
+        before = self.errors, self.evidence
+        self.errors, self.evidence = errors, weighted(self.records, errors)
+        try:
+            base = self._again(self.base)
+            again = self._again(best) if best.chosen else base
+        except InputError:
+            self.errors, self.evidence = before
+            return best
+        self._begin(base)
+        return self.keep(again) or best
 
     def _again(self, trial: Trial) -> Trial:
         """Return a model fitted with the weights that readings have now."""
