@@ -145,7 +145,7 @@ def _by_peaks(
         start = None
     if start is None or start.source == "guess":
         raise TooShortError(
-            "the record must be a free decay that shows three half swings or more, it gives no"
-            " start; or give a natural frequency: w0 = 6.2 under [rig] in experiment.toml"
+            "the record must show three half swings or more of a free decay, or a natural frequency"
+            " must be given: w0 = 6.2 under [rig] in experiment.toml"
         )
     return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}
