@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -29,6 +30,7 @@ __all__ = [
     "Candidate",
     "candidates",
     "checked_own",
+    "choices_of",
     "commonness",
     "placed",
 ]
@@ -160,6 +162,12 @@ class Candidate:
         """Its name with its shape."""
         shape = ", ".join(f"{name} = {value:.3g}" for name, value in self.shape.items())
         return f"{self.name} ({shape})" if shape else self.name
+
+
+def choices_of(pool: Collection[Candidate]) -> dict[str, int]:
+    """Return by effect among how many of its shapes the best one is chosen."""
+    shapes = Counter(candidate.name for candidate in pool)
+    return {c.name: max(shapes[c.name], c.choices) for c in pool}
 
 
 def commonness(effect: str) -> int:

@@ -62,4 +62,4 @@ def rivals_of(
         for k in scores.best()
         if scores.name(k) != candidate.name and scores.scores[k].gain > limits.worth * gain
     ]
-    return [(k, state.instead(best, candidate, rest, k)) for k in others[: limits.rivals]]
+    return [(k, state.refit(rest, [k])) for k in others[: limits.rivals]]

@@ -6,11 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from pendmap.diagnosis.candidates import placed
 from pendmap.diagnosis.fitted_model import (
-    FEW_STEPS,
     LITTLE,
     Trial,
     fitted,
@@ -28,7 +24,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.scores import Score, Scores
     from pendmap.diagnosis.thresholds import Thresholds
-    from pendmap.model import Rig
 
 __all__ = [
     "Key",
@@ -38,7 +33,6 @@ __all__ = [
     "enlarged",
     "key_of",
     "refitted",
-    "replaced",
     "without",
 ]
 
@@ -129,15 +123,20 @@ def without(
 
     The fit is given up where it promises to end far above the sum of squares ``target``.
     """
-    model, free, start = _without(trial, dropped)
-    chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+    gone = {*dropped.free, *dropped.adapted}
+    model = trial.fit.model
+    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
+    effects = tuple(e for e in model.effects if e.name != dropped.name)
+    # The others move by what the covariance says, where that reaches so far.
+    start = trial.start_without([dropped.free[0]]) if _faint(trial, dropped) else trial.start
+    start = dict.fromkeys(trial.zeroed, 0.0) | start
     try:
         rest = fitted(
             evidence,
-            model,
-            free,
-            chosen,
-            start=start,
+            dataclasses.replace(model, effects=effects, **own),
+            [name for name in (*trial.free, *trial.zeroed) if name not in gone],
+            tuple(c for c in trial.chosen if c.name != dropped.name),
+            start={name: value for name, value in start.items() if name not in gone},
             windows=trial.fit.windows,
             least_gain=LITTLE * level,
             target=target,
@@ -161,73 +160,15 @@ def enlarged(
     return within_physics(evidence, found)
 
 
-def replaced(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
-    evidence: Evidence,
-    trial: Trial,
-    dropped: Candidate,
-    scores: Scores,
-    place: int,
-    level: float,
-    target: float,
-    rest: float,
-) -> Trial | None:
-    """Return a trial's model with another effect in the place of one, from the trial's motion.
-
-    The fit is given up where it promises to end far above the sum of squares ``target``; none where
-    it ends above ``rest``, that of the model with neither.
-    """
-    model, free, start = _without(trial, dropped)
-    score = scores.scores[place]
-    other = score.candidate
-
-    try:
-        found = fitted(
-            evidence,
-            placed(model, [other]),
-            [*free, *other.free, *other.adapted],
-            (*(c for c in trial.chosen if c.name != dropped.name), other),
-            start=start | score.start,
-            windows=trial.fit.windows,
-            steps=FEW_STEPS,
-            least_gain=LITTLE * level,
-            target=target,
-        )
-    except InputError:
-        return None
-    if found.chi2 > rest:
-        return None
-    return found if found.fit.given_up else within_physics(evidence, found, rest)
-
-
-def _without(trial: Trial, dropped: Candidate) -> tuple[Rig, list[str], dict[str, float]]:
-    """Return a trial's model without an effect, what is free of it, and where the fit starts."""
-    gone = {*dropped.free, *dropped.adapted}
-    model = trial.fit.model
-    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
-    effects = tuple(e for e in model.effects if e.name != dropped.name)
-    model = dataclasses.replace(model, effects=effects, **own)
-    free = [name for name in (*trial.free, *trial.zeroed) if name not in gone]
-    start = dict.fromkeys(trial.zeroed, 0.0) | trial.start
-    if (faint := _faint(trial, dropped)) is not None:
-        # The others move by what the covariance says.
-        column = trial.fit.covariance[:, faint]
-        share = start[trial.fit.names[faint]] / column[faint]
-        moved = zip(trial.fit.names, column, strict=True)
-        start |= {n: start[n] - share * c for n, c in moved}
-    return model, free, {name: value for name, value in start.items() if name not in gone}
-
-
-def _faint(trial: Trial, dropped: Candidate) -> int | None:
-    """Return where the size of an effect stands that is little beside its standard error."""
+def _faint(trial: Trial, dropped: Candidate) -> bool:
+    """Whether the size of an effect is little beside its standard error."""
     size = dropped.free[0]
     if size not in trial.fit.names or dropped.phase is not None:
-        return None
+        return False
     error = trial.fit.estimates[size].stderr
-    if not np.isfinite(trial.fit.covariance).all() or not error:
-        return None
-    if not math.isfinite(error) or abs(trial.start[size]) > FAINT * error:
-        return None
-    return trial.fit.names.index(size)
+    if error is None or not 0 < error < math.inf:
+        return False
+    return abs(trial.start[size]) <= FAINT * error
 
 
 BACK_STEPS: Final = 6

@@ -91,12 +91,6 @@ class Scores:
         """Return the scores of no candidate."""
         return cls((), (), np.zeros((0, 0)), np.zeros(0))
 
-    @property
-    def looks(self) -> int:
-        """Among how many candidates, in all their shapes, the best one is chosen."""
-        sought = {s.candidate.name: s.candidate.choices for s in self.scores if s.candidate.sought}
-        return sum(not s.candidate.sought for s in self.scores) + sum(sought.values())
-
     def name(self, place: int) -> str:
         """Return the effect at a place."""
         return self.scores[place].candidate.name

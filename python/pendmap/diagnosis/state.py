@@ -10,13 +10,13 @@ import numpy as np
 
 from pendmap.comparison.replay import Fits
 from pendmap.diagnosis.baseline import taken_by
-from pendmap.diagnosis.candidates import ZERO, candidates, commonness
+from pendmap.diagnosis.candidates import ZERO, candidates, choices_of, commonness
 from pendmap.diagnosis.fitted_model import fitted, settled
 from pendmap.diagnosis.held import Held, predictive, tried
 from pendmap.diagnosis.model_error import model_errors, weighted
 from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.refit import Key, best_of, enlarged, key_of, refitted, replaced, without
-from pendmap.diagnosis.scores import CONTAINS, Scores, scores_of
+from pendmap.diagnosis.refit import Key, enlarged, key_of, refitted, without
+from pendmap.diagnosis.scores import Scores, scores_of
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -74,7 +74,6 @@ class State:
         self._fits: dict[Key, Trial] = {key_of(()): base}
         self._rests: dict[tuple[Key, str], Trial] = {}
         self._refits: dict[tuple[Key, Key], Trial | None] = {}
-        self._instead: dict[tuple[Key, Key, str], Trial | None] = {}
         self._scores: dict[Key, Scores] = {}
         self._held: dict[int, tuple[Trial, Held | None, tuple[float, ...]]] = {}
 
@@ -201,27 +200,6 @@ class State:
                 return trial
         return best
 
-    def instead(self, trial: Trial, dropped: Candidate, rest: Trial, place: int) -> Trial | None:
-        """Return a trial's model with a candidate of the rest's scores in an effect's place."""
-        scores = self.scores(rest)
-        way = key_of(trial.chosen), key_of([scores.scores[place].candidate]), dropped.name
-        if way not in self._instead:
-            target = trial.chi2 + self.thresholds.alike * self.level
-            found = replaced(
-                self.evidence, trial, dropped, scores, place, self.level, target, rest.chi2
-            )
-            if found is None or self._lost(found, dropped, rest, place):
-                found = best_of(found, self.refit(rest, [place]))
-            self._instead[way] = found if found is None or found.fit.given_up else self.keep(found)
-        return self._instead[way]
-
-    def _lost(self, found: Trial, dropped: Candidate, rest: Trial, place: int) -> bool:
-        """Whether a fit was given up of an effect that can do all that the dropped one does."""
-        scores = self.scores(rest)
-        own = next((k for k in scores.best() if scores.name(k) == dropped.name), None)
-        like = own is not None and scores.likeness(own, place) > CONTAINS
-        return like and found.fit.given_up
-
     def held(self, trial: Trial) -> Held | None:
         """Return how a model does on what was held back; none where its motion is lost there."""
         return self._tried(trial)[1]
@@ -281,9 +259,9 @@ class State:
             full.remainder.chance_of(gain, more, full.level if full.level < 1 else 0.0),
             float(fdtrc(more, readings, max(gain, 0.0) / more / full.level)),
         )
-        shapes = {each[0].name: max(len(each), each[0].choices) for each in self._pool(rest)}
-        looks = max((shapes.get(c.name, 1) for c in full.chosen), default=1)
-        return min(chance * len(shapes) * looks, 1.0)
+        choices = choices_of([candidate for shapes in self._pool(rest) for candidate in shapes])
+        own = max((choices.get(c.name, 1) for c in full.chosen), default=1)
+        return min(chance * len(choices) * own, 1.0)
 
     def gains(self, rest: Trial, full: Trial) -> bool:
         """Whether further effects gain more than chance, and close what they must.

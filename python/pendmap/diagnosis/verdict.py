@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections import Counter
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from pendmap.diagnosis.alternatives import Standing, standing_of
+from pendmap.diagnosis.candidates import choices_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -177,14 +177,13 @@ def form_of(
 
     ``others`` are the chances that noise alone leaves as much of all else that was looked at.
     """
-    shapes = Counter(score.candidate.name for score in scores.scores)
+    choices = choices_of([score.candidate for score in scores.scores])
     tails = {}
     for k in scores.best():
         score = scores.scores[k]
         name = score.candidate.name
         if score.gain > 0:
-            looks = max(shapes[name], score.candidate.choices)
-            tails[name] = looks * chance_of(score.gain, len(scores.columns[k]))
+            tails[name] = choices[name] * chance_of(score.gain, len(scores.columns[k]))
     further = min(tails, key=lambda name: tails[name], default=None)
     effects = 1.0 if further is None else min(tails[further] * len(tails), 1.0)
     return Form({"effects": effects, **others}, further)

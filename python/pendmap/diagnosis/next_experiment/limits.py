@@ -7,6 +7,7 @@ import functools
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.diagnosis.candidates import choices_of
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.model.effects import Effect
 
@@ -46,12 +47,15 @@ def detection_limits(
     effect's own the fitted parameters and initial states cannot follow); the gain is then
     distributed as noncentral chi-squared, and has to pass the search's threshold.
     """
+    choices = choices_of([score.candidate for score in scores.scores])
     shapes: dict[str, list[tuple[float, Candidate]]] = {}
     for score in scores.scores:
         candidate = score.candidate
         if candidate.name in found:
             continue
-        wanted = needed(_threshold(candidate, scores.looks), len(candidate.free))
+        wanted = needed(
+            _threshold(candidate, len(choices) * choices[candidate.name]), len(candidate.free)
+        )
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         if size > HUGE * _greatest(candidate, units):
@@ -66,11 +70,11 @@ def detection_limits(
     return limits
 
 
-def _threshold(candidate: Candidate, looked: int) -> float:
-    """Return the gain from which an effect is accepted among so many candidates."""
+def _threshold(candidate: Candidate, among: int) -> float:
+    """Return the gain from which an effect is accepted that is chosen among several shapes."""
     from scipy.special import chdtri  # noqa: PLC0415 (where it is needed)
 
-    return float(chdtri(candidate.count, Thresholds().chance / looked))
+    return float(chdtri(candidate.count, Thresholds().chance / among))
 
 
 def _greatest(candidate: Candidate, units: Units) -> float:
