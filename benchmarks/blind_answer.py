@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tempfile
 import time
-import tomllib
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from blind_cases import SOUND, Case, record
@@ -64,51 +61,46 @@ def run(case: Case) -> dict[str, Any]:
     """Make, diagnose and judge one case."""
     hidden = [effect for effect in case.effects if effect != "none"]
     kin = {"families": sorted({f for effect in hidden for f in families(effect)})}
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        try:
-            hard: dict[str, Any] = {
-                "G": [],
-                "s": 1.0,
-                "equals": [],
-                "beyond": 0.0,
-                "disturbance": 0.0,
-            }
-            without: list[str] = []
-            if hidden:
-                hard, alike = _difficulty(case, folder)
-                main = case.what == "mess"
-                hard["disturbance"] = disturbance(case, folder) if main else 0.0
-                least = max(STRONG, hard["disturbance"])
-                for _ in range(TRIES if main else 0):
-                    if min(hard["G"]) >= least:
-                        break
-                    more = 1.2 * math.sqrt(least / max(min(hard["G"]), 1.0))
-                    case = dataclasses.replace(case, size=min(more * case.size, GREATEST))
-                    easier, alike = _difficulty(case, folder)
-                    hard |= easier
-                if case.what == "withheld":
-                    own = [effect.split(":")[0] for effect in case.effects]
-                    without = [n for n in (*own, *alike) if n in library()]
-            asked = folder / "asked"
-            asked.mkdir()
-            experiment, _ = record(case, asked)
-            begin = time.process_time()
-            found = diagnose(experiment, without=without)
-            seconds = time.process_time() - begin
-            truth = _parameters(asked / "noisy.truth.toml")
-        except InputError as error:
-            return dataclasses.asdict(case) | kin | {"error": str(error)}
-    samples = sum(r.time.size for r in experiment.runs)
-    said = {"without": without, "truth": truth, "seconds": seconds, "samples": samples}
+    try:
+        hard: dict[str, Any] = {
+            "G": [],
+            "s": 1.0,
+            "equals": [],
+            "beyond": 0.0,
+            "disturbance": 0.0,
+        }
+        without: list[str] = []
+        if hidden:
+            hard, alike = _difficulty(case)
+            main = case.what == "mess"
+            hard["disturbance"] = disturbance(case) if main else 0.0
+            least = max(STRONG, hard["disturbance"])
+            for _ in range(TRIES if main else 0):
+                if min(hard["G"]) >= least:
+                    break
+                more = 1.2 * math.sqrt(least / max(min(hard["G"]), 1.0))
+                case = dataclasses.replace(case, size=min(more * case.size, GREATEST))
+                easier, alike = _difficulty(case)
+                hard |= easier
+            if case.what == "withheld":
+                own = [effect.split(":")[0] for effect in case.effects]
+                without = [n for n in (*own, *alike) if n in library()]
+        recorded = record(case)
+        begin = time.process_time()
+        found = diagnose(recorded.experiment, without=without)
+        seconds = time.process_time() - begin
+    except InputError as error:
+        return dataclasses.asdict(case) | kin | {"error": str(error)}
+    samples = sum(r.time.size for r in recorded.experiment.runs)
+    said = {"without": without, "truth": recorded.truth, "seconds": seconds, "samples": samples}
     return dataclasses.asdict(case) | kin | hard | said | answer(found)
 
 
-def _difficulty(case: Case, folder: Path) -> tuple[dict[str, Any], list[str]]:
+def _difficulty(case: Case) -> tuple[dict[str, Any], list[str]]:
     """Return how hard a case is; what spoils its records does not count."""
     plain = dataclasses.replace(case, **SOUND)
-    base, _ = baseline(evidence_of(record(plain, folder)[0]))
-    return difficulty(plain, folder, base)
+    base, _ = baseline(evidence_of(record(plain).experiment))
+    return difficulty(plain, base)
 
 
 def answer(found: Discrepancy) -> dict[str, Any]:
@@ -141,8 +133,3 @@ def answer(found: Discrepancy) -> dict[str, Any]:
         ],
         "attempts": [[a.names, a.score, a.gain, a.held_gain, a.accepted] for a in found.attempts],
     }
-
-
-def _parameters(path: Path) -> dict[str, Any]:
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
-    return {e["name"]: e["parameters"] for e in table.get("effect", [])}

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+import tempfile
+import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +17,6 @@ from pendmap.model.effects import library
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from pendmap.records import Experiment
 
 KINDS = {"mixed": (5, 4), "free": (5, 0), "single": (1, 0)}
@@ -140,8 +142,18 @@ def runs_of(kind: str) -> tuple[int, int]:
     return (KINDS | LAYOUTS)[kind]
 
 
-def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment, float]:
-    """Write and read a case's experiment; return it with the noise's standard deviation, rad."""
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """An experiment, and what only the rig knows of it."""
+
+    experiment: Experiment
+    sigma: float  # Standard deviation of the sensor's noise, rad
+    truth: dict[str, dict[str, float]]  # Parameters of what is hidden
+
+
+@functools.lru_cache(maxsize=4)
+def record(case: Case, *, clean: bool = False) -> Recorded:
+    """Write and read a case's experiment; the last four are remembered."""
     free, forced = runs_of(case.kind)
     request = virtual_rig.Request(
         "hidden",
@@ -160,10 +172,11 @@ def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment
         jitter=0.0 if clean else case.jitter,
         mess=0.0 if clean else case.mess,
     )
-    where = virtual_rig.places(folder / ("clean" if clean else "noisy"), replace=True)
-    virtual_rig.write(virtual_rig.make(request), where)
-    count = math.tau / case.counts / math.sqrt(12)
-    experiment = read_experiment(where.experiment)
+    with tempfile.TemporaryDirectory() as folder:
+        where = virtual_rig.places(Path(folder) / "rig")
+        virtual_rig.write(virtual_rig.make(request), where)
+        experiment = read_experiment(where.experiment)
+        table = tomllib.loads((Path(folder) / "rig.truth.toml").read_text(encoding="utf-8"))
     if case.kind == "only free runs held out":
         seen = [k for k, run in enumerate(experiment.runs) if run.kind == "free"]
         runs = tuple(
@@ -171,4 +184,6 @@ def record(case: Case, folder: Path, *, clean: bool = False) -> tuple[Experiment
             for k, run in enumerate(experiment.runs)
         )
         experiment = dataclasses.replace(experiment, runs=runs)
-    return experiment, math.hypot(math.radians(case.noise), count)
+    sigma = math.hypot(math.radians(case.noise), math.tau / case.counts / math.sqrt(12))
+    truth = {e["name"]: e["parameters"] for e in table.get("effect", [])}
+    return Recorded(experiment, sigma, truth)

@@ -23,7 +23,6 @@ from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from blind_cases import Case
     from pendmap.diagnosis.fitted_model import Trial, Windows
@@ -40,7 +39,7 @@ CONTAINED = 1e-3
 
 
 def difficulty(
-    case: Case, folder: Path, base: Trial, without: Sequence[str] = ()
+    case: Case, base: Trial, without: Sequence[str] = ()
 ) -> tuple[dict[str, Any], list[str]]:
     """Return ``G``, ``s`` and equals of a case on noise-free records, and who is not told apart.
 
@@ -52,8 +51,8 @@ def difficulty(
     gains, separation, alike, equals, left = [], 1.0, set(), set(), 0.0
     for effect in case.effects:
         alone = dataclasses.replace(case, effects=(effect,))
-        experiment, sigma = record(alone, folder, clean=True)
-        evidence = _with_noise(evidence_of(experiment), sigma)
+        recorded = record(alone, clean=True)
+        evidence = _with_noise(evidence_of(recorded.experiment), recorded.sigma)
         # From the noisy fit: what is measured is the effect, not how well a start is found.
         windows = _windows_at(evidence, base)
         begin = fitted(evidence, base.fit.model, base.free, start=base.start, windows=windows)
@@ -76,10 +75,10 @@ def difficulty(
     return hard, sorted(alike)
 
 
-def disturbance(case: Case, folder: Path) -> float:
+def disturbance(case: Case) -> float:
     """Return what a perfect model of a case's disturbances alone would gain."""
-    experiment, sigma = record(dataclasses.replace(case, effects=("none",), size=1.0), folder)
-    base, _ = baseline(_with_noise(evidence_of(experiment), sigma))
+    recorded = record(dataclasses.replace(case, effects=("none",), size=1.0))
+    base, _ = baseline(_with_noise(evidence_of(recorded.experiment), recorded.sigma))
     return base.chi2 - base.fit.degrees
 
 

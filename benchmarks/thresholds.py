@@ -17,7 +17,6 @@ import dataclasses
 import json
 import os
 import sys
-import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -140,20 +139,19 @@ def run(case: blind_cases.Case) -> dict[str, Any]:
     """Return what is said of an experiment, as usual and with each threshold changed."""
     own = [effect.split(":")[0] for effect in case.effects] if case.what == "withheld" else []
     without = [name for name in own if name in library()]
-    with tempfile.TemporaryDirectory() as folder:
-        experiment, _ = blind_cases.record(case, Path(folder))
+    experiment = blind_cases.record(case).experiment
 
-        def said(thresholds: Thresholds) -> list[str]:
-            try:
-                found = diagnose(experiment, without=without, thresholds=thresholds)
-            except InputError as error:
-                return ["refused", str(error)]
-            names = [effect.name + "?" * effect.approximate for effect in found.effects]
-            return [found.verdict, *names]
+    def said(thresholds: Thresholds) -> list[str]:
+        try:
+            found = diagnose(experiment, without=without, thresholds=thresholds)
+        except InputError as error:
+            return ["refused", str(error)]
+        names = [effect.name + "?" * effect.approximate for effect in found.effects]
+        return [found.verdict, *names]
 
-        with memory():
-            usual = said(Thresholds())
-            others = {f"{n} {f:g}": said(changed(n, f)) for n in FIELDS for f in FACTORS}
+    with memory():
+        usual = said(Thresholds())
+        others = {f"{n} {f:g}": said(changed(n, f)) for n in FIELDS for f in FACTORS}
     return {"what": case.what, "seed": case.seed, "effects": case.effects, "": usual} | others
 
 

@@ -1,5 +1,6 @@
 //! An effect that its user writes as a formula: a torque per inertia as text.
 //!
+//! - `check`: names and terms that are refused
 //! - `parse`: from text to a `tree`
 //! - `probe`: what the term does, by its values
 //! - `program`: the tree as operations over lanes, single numbers and numbers with derivatives
@@ -9,6 +10,7 @@
 //! slips as exactly as the library's. Where the argument of one absolute value passes zero steps end
 //! ([`Law::switch`](super::effects::Law::switch)); more kinks than one are stepped over.
 
+mod check;
 mod parse;
 mod probe;
 mod program;
@@ -22,7 +24,7 @@ use self::program::{Kinks, Program, SLOTS};
 use self::tree::{Function, Tree, Variable};
 use super::effects::law::NOT_PERIODIC;
 use super::effects::{
-    Action, Definition, Group, Kind, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Group, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::error::Error;
 use crate::lanes::Real;
@@ -108,12 +110,12 @@ impl Formula {
     }
 
     fn made(spec: &Spec) -> Result<&'static Self, String> {
-        check_names(spec)?;
+        check::names(spec)?;
         let names: Vec<String> = spec.parameters.iter().map(|p| p.name.clone()).collect();
         let tree = parse::parse(&spec.term, &names)?;
         let mut parameters: Vec<Parameter> =
             spec.parameters.iter().map(ParameterSpec::kept).collect();
-        check_term(&tree, &parameters)?;
+        check::term(&tree, &parameters)?;
         for (place, said) in spec.parameters.iter().enumerate() {
             parameters[place].role =
                 said.role.unwrap_or_else(|| probe::role(&tree, &parameters, place));
@@ -284,119 +286,6 @@ impl ParameterSpec {
 
 fn kept(text: &str) -> &'static str {
     String::leak(text.to_owned())
-}
-
-fn is_name(name: &str) -> bool {
-    let mut characters = name.chars();
-    characters.next().is_some_and(|c| c.is_ascii_alphabetic())
-        && characters.all(|c| c.is_ascii_alphanumeric() || c == '_')
-}
-
-fn check_names(spec: &Spec) -> Result<(), String> {
-    let letters = "a letter, then letters, digits and _";
-    if !is_name(&spec.name) {
-        return Err(format!("its name must be {letters}"));
-    }
-    if Kind::named(&spec.name).is_ok() {
-        return Err("its name must be another, it is one of the library".to_owned());
-    }
-    let count = spec.parameters.len();
-    if !(1..=MOST_PARAMETERS).contains(&count) {
-        return Err(format!(
-            "must have 1 to {MOST_PARAMETERS} parameters, got {count}; other numbers may stand in \
-             the term"
-        ));
-    }
-    for (k, parameter) in spec.parameters.iter().enumerate() {
-        let name = &parameter.name;
-        if !is_name(name) {
-            return Err(format!("parameter '{name}' must be {letters}"));
-        }
-        if parse::is_taken(name) {
-            return Err(format!("parameter '{name}' must be another, it has a meaning of its own"));
-        }
-        if spec.parameters[..k].iter().any(|p| p.name == *name) {
-            return Err(format!("parameter '{name}' is there twice"));
-        }
-        let ([low, high], [least, greatest]) = (parameter.typical, parameter.range);
-        if !(low < high && low.is_finite() && high.is_finite()) {
-            return Err(format!(
-                "parameter '{name}': typical must be two numbers, the lower first, got [{low}, \
-                 {high}]"
-            ));
-        }
-        if !(least <= low && high <= greatest) {
-            return Err(format!(
-                "parameter '{name}': range must be one that holds the typical [{low}, {high}], got \
-                 [{least}, {greatest}]"
-            ));
-        }
-        if !parameter.power.is_finite() || parameter.less.is_some_and(|p| p >= count || p == k) {
-            return Err(format!("parameter '{name}': power is no number"));
-        }
-    }
-    Ok(())
-}
-
-fn check_term(tree: &Tree, parameters: &[Parameter]) -> Result<(), String> {
-    for (k, parameter) in parameters.iter().enumerate() {
-        let used = |tree: &Tree| {
-            let mut values: Vec<bool> = vec![false; MOST_PARAMETERS];
-            mark(tree, &mut values);
-            values[k]
-        };
-        if !used(tree) {
-            return Err(format!("parameter '{}' is not in the term", parameter.name));
-        }
-    }
-    let mut abrupt = false;
-    tree.functions(&mut |function, inner| {
-        abrupt |= function == Function::Sign && inner.moves() && !inner.is_velocity();
-    });
-    if abrupt {
-        return Err("jumps where what is under sign(...) passes zero: it must be sign(v), or \
-                    tanh(x/width) for sign(x)"
-            .to_owned());
-    }
-    if let Some((at, values)) = probe::gap(tree, parameters) {
-        let given: Vec<String> = parameters
-            .iter()
-            .zip(&values)
-            .map(|(p, value)| format!("{} = {value:.3}", p.name))
-            .collect();
-        return Err(format!(
-            "is no finite number at theta = {:.3}, v = {:.3}, {} (without dimensions)",
-            at.theta,
-            at.velocity,
-            given.join(", ")
-        ));
-    }
-    probe::balances(tree, parameters).map_err(|power| {
-        let unit = "the term is an acceleration in rad/s^2, v a velocity, t a time";
-        match power {
-            Some(power) => format!(
-                "its units do not balance: {unit}; '{}' must have power = {power}",
-                parameters[0].name
-            ),
-            None => format!(
-                "its units do not balance: {unit}; the powers of w0 of its parameters are wrong, or \
-                 a w0 is missing"
-            ),
-        }
-    })
-}
-
-/// Marks the parameters that a tree names.
-fn mark(tree: &Tree, used: &mut [bool]) {
-    match tree {
-        Tree::Variable(Variable::Parameter(place)) => used[*place] = true,
-        Tree::Number(_) | Tree::Variable(_) => {}
-        Tree::Apply(_, inner) => mark(inner, used),
-        Tree::Join(_, left, right) => {
-            mark(left, used);
-            mark(right, used);
-        }
-    }
 }
 
 /// Whether all of it changes its sign with the sense of the motion.
