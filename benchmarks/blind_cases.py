@@ -173,7 +173,7 @@ def record(case: Case, *, clean: bool = False) -> Recorded:
         mess=0.0 if clean else case.mess,
     )
     with tempfile.TemporaryDirectory() as folder:
-        where = virtual_rig.places(Path(folder) / "rig")
+        where = virtual_rig.places(Path(folder) / "rig", replace=False)
         virtual_rig.write(virtual_rig.make(request), where)
         experiment = read_experiment(where.experiment)
         table = tomllib.loads((Path(folder) / "rig.truth.toml").read_text(encoding="utf-8"))
