@@ -52,7 +52,7 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
         step = _step(state, best, starts)
         if step is None:
             break
-        best, starts = pruned(state, state.weigh(state.settled(step))), []
+        best, starts = pruned(state, state.weigh(step)), []
         progress(len(best.chosen))
     return state.weigh(best)
 
@@ -86,7 +86,9 @@ def _step(state: State, best: Trial, starts: Sequence[Trial]) -> Trial | None:
         return None
     level = min((trial for trial, _, _ in found), key=lambda t: t.chi2).level
     found.sort(key=lambda each: state.cost(each[0], level))
-    for trial, rest, places in found[: state.thresholds.singles]:
+    for fit, rest, places in found[: state.thresholds.singles]:
+        # What is judged has taken all the steps that it wants.
+        trial = state.settled(fit)
         gains = state.room(trial) >= 0 and state.gains(best, trial)
         good = gains and state.holds(best, trial)
         state.attempts.append(attempt_of(state, rest, trial, places, tried=gains, accepted=good))
