@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from pendmap.critical_curves import tongues
     from pendmap.diagrams import bifurcation
-    from pendmap.errors import InputError
+    from pendmap.errors import FitDiverged, InputError
     from pendmap.exponents import lyapunov
     from pendmap.grid import Axis, Grid
     from pendmap.homoclinic import melnikov
@@ -59,6 +59,7 @@ __all__ = [
     "EffectParameter",
     "Experiment",
     "Finding",
+    "FitDiverged",
     "Formula",
     "Grid",
     "InputError",
@@ -102,6 +103,7 @@ _HOMES = {
     "Finding": "records",
     "Formula": "model",
     "Grid": "grid",
+    "FitDiverged": "errors",
     "InputError": "errors",
     "NoiseFloor": "records",
     "PRESETS": "model",

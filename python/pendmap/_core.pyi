@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "Diverged",
     "__version__",
     "acceleration",
     "advance",
@@ -35,6 +36,8 @@ __all__ = [
     "texture",
     "tongues",
 ]
+
+class Diverged(ValueError): ...  # noqa: N818
 
 __version__: str
 

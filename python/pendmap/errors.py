@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["InputError", "NotWrittenError", "one_line"]
+__all__ = ["FitDiverged", "InputError", "NotWrittenError", "one_line"]
 
 MOST = 500
 """Characters of a message."""
@@ -33,6 +33,10 @@ class InputError(ValueError):
 
     def __init__(self, message: object = "") -> None:
         super().__init__(one_line(str(message)))
+
+
+class FitDiverged(ArithmeticError):  # noqa: N818 (it is no mistake of the caller)
+    """A fit lost its motion: with its values the model leaves the range of numbers."""
 
 
 class NotWrittenError(OSError):

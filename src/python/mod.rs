@@ -14,6 +14,7 @@ mod planes;
 mod tongues;
 mod watch;
 
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::error::Error;
@@ -25,12 +26,15 @@ use crate::model::effects::Role;
 use crate::model::formula::{ParameterSpec, Spec};
 use crate::model::{Effect, Formula, Kind, Pendulum};
 
+pyo3::create_exception!(_core, Diverged, PyValueError, "A motion left the range of numbers.");
+
 /// One mapping of errors for all functions: what the caller gave is a `ValueError`, what the system
 /// refuses a `MemoryError` or an `OSError`.
 impl From<Error> for PyErr {
     fn from(error: Error) -> Self {
-        use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOSError, PyValueError};
+        use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOSError};
         match error {
+            Error::Diverges => Diverged::new_err(error.to_string()),
             Error::Interrupted => PyKeyboardInterrupt::new_err(()),
             Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
             Error::Threads(_) => PyOSError::new_err(error.to_string()),
@@ -138,6 +142,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     // Loads numpy's functions now: later an interrupt could come in between.
     numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("Diverged", module.py().get_type::<Diverged>())?;
     module.add_function(wrap_pyfunction!(simd, module)?)?;
     module.add_function(wrap_pyfunction!(simd_available, module)?)?;
     module.add_function(wrap_pyfunction!(reckon, module)?)?;

@@ -36,7 +36,7 @@ def lose(monkeypatch: pytest.MonkeyPatch, share: float, seed: int = 0) -> None:
 
         def call(*given: Any, true: Any = true) -> Any:  # noqa: ANN401 (as the core)
             if draw.random() < share:
-                raise InputError(LOST)
+                raise _core.Diverged(LOST)
             return true(*given)
 
         monkeypatch.setattr(_core, name, call)

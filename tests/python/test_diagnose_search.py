@@ -22,7 +22,7 @@ from pendmap.diagnosis.prune import pruned
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fitting import fit_runs
 from pendmap.records import Experiment, Run
 
@@ -109,12 +109,25 @@ def test_a_fit_that_is_lost_is_no_candidate(
     state, _ = dragged
 
     def lost(*_given: object, **_named: object) -> Trial:
-        raise InputError("lost")
+        raise FitDiverged("lost")
 
     monkeypatch.setattr("pendmap.diagnosis.refit.with_candidates", lost)
     other = State(state.records, state.base, state.thresholds, 3, ())
     assert other.refit(state.base, [0]) is None
     assert search(other, None, lambda _: None).chosen == ()
+
+
+def test_no_fault_of_a_fit_is_taken_for_a_lost_motion(
+    dragged: tuple[State, Trial | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state, _ = dragged
+
+    def wrong(*_given: object, **_named: object) -> Trial:
+        raise InputError("free must be among the parameters")
+
+    monkeypatch.setattr("pendmap.diagnosis.refit.with_candidates", wrong)
+    with pytest.raises(InputError, match="free must be"):
+        State(state.records, state.base, state.thresholds, 3, ()).refit(state.base, [0])
 
 
 def test_no_effect_is_accepted_that_noise_alone_may_be() -> None:

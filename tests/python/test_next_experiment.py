@@ -238,3 +238,13 @@ def test_what_is_not_enough_is_said_to_be_so() -> None:
     assert said is not None
     ratio = (25 - outlook.now) / (best.value - outlook.now)
     assert int(said[1]) == math.ceil(ratio * len(best.proposal.runs))
+
+
+@pytest.mark.parametrize("widest", [0.3, 1.0, 3.0])
+def test_no_wider_swing_is_proposed_than_the_rig_has(widest: float) -> None:
+    evidence = once("quadratic_drag").evidence
+    known = {**evidence.experiment.known, "max_angle": widest}
+    rig = dataclasses.replace(evidence.experiment, known=known)
+    menu = menu_of(dataclasses.replace(evidence, experiment=rig), 6.0)
+    angles = {abs(start.theta) for proposal in menu for start in proposal.starts}
+    assert max(angles) == min(widest, 2.8)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.errors import InputError, NotWrittenError, one_line
+from pendmap.errors import FitDiverged, InputError, NotWrittenError, one_line
 from pendmap.files import COMPLETE, STOPS
 
 if TYPE_CHECKING:
@@ -211,7 +211,7 @@ def _failed(error: BaseException) -> int:  # noqa: PLR0911 (one for each way to 
             return BAD_INPUT
         case click.ClickException():
             return _refuse(error.format_message())
-        case InputError():
+        case FitDiverged() | InputError():
             return _refuse(str(error))
         case _ReaderGone():
             # No message, and none from the interpreter at the end.

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
-from pendmap.errors import InputError
-
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -23,7 +21,7 @@ Reasons = dict[str, str]
 
 Part = TypeVar("Part")
 
-LOST: Final = (InputError, ArithmeticError, np.linalg.LinAlgError)
+LOST: Final = (ArithmeticError, np.linalg.LinAlgError)
 """How it shows that numbers are lost: in a motion, in a quotient, in a matrix made of both."""
 
 

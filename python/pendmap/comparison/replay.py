@@ -100,7 +100,7 @@ def replayed(
 
     Raises
     ------
-    InputError
+    FitDiverged
         If a motion leaves the range of numbers.
     """
     blank = [dataclasses.replace(run, theta=np.zeros(run.time.shape), trusted=None) for run in runs]
@@ -116,7 +116,7 @@ def settled(
 
     Raises
     ------
-    InputError
+    FitDiverged
         If a motion leaves the range of numbers.
     """
     fit = _from(motion, runs, states, steps=SEARCHED)
@@ -180,7 +180,7 @@ def strength_of(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -> St
 
     Raises
     ------
-    InputError
+    FitDiverged
         If a motion leaves the range of numbers.
     """
     step = STEP * 2 * np.pi / fit.model.w0

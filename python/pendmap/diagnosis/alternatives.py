@@ -10,7 +10,6 @@ import numpy as np
 
 from pendmap.diagnosis.prune import rivals_of
 from pendmap.diagnosis.scores import CONTAINS
-from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
@@ -89,10 +88,7 @@ def standing_of(state: State, best: Trial, candidate: Candidate) -> Standing:
         if scores.same(own, k):
             reached = gain
         elif fit is not None:
-            try:
-                fit = state.settled(fit)
-            except InputError:
-                continue
+            fit = state.settled(fit)
             reached = (rest.chi2 - fit.chi2) / level
         likeness = scores.likeness(own, k)
         more = score.candidate.count > candidate.count

@@ -12,7 +12,7 @@ from pendmap.diagnosis.fitted_model import GENTLE, Trial, fitted, settled, with_
 from pendmap.diagnosis.physical import within_physics
 from pendmap.diagnosis.refit import best_of
 from pendmap.diagnosis.refit import without as leave_out
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fitting import fit_runs
 from pendmap.identification.rough import rough_start
 from pendmap.identification.start import starting_values
@@ -86,7 +86,7 @@ def _core(
     start = {candidate.free[0]: 0.0 for candidate in added}
     try:
         return with_candidates(evidence, base, added, start, level=base.level, short=short)
-    except InputError:
+    except FitDiverged:
         return None  # the motion is lost
 
 
@@ -117,7 +117,7 @@ def _in_parts(evidence: Evidence, start: Rig, free: list[str]) -> Trial | None:
         return None
     try:
         return fitted(dataclasses.replace(evidence, fitted=tuple(runs)), start, free)
-    except InputError:
+    except FitDiverged:
         return None
 
 
@@ -128,7 +128,7 @@ def _followed(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
         divided = run if part == 1 else dataclasses.replace(run, longest_s=longest)
         try:
             fit = fit_runs([divided], start, free, profiled=())
-        except InputError:
+        except FitDiverged:
             continue  # its motion is lost
         if fit.converged and fit.chi2 < SOUND * max(fit.degrees, 1):
             return divided
@@ -151,7 +151,7 @@ def _through_all(evidence: Evidence, start: Rig, free: list[str]) -> Trial | Non
     try:
         begin = fitted(dataclasses.replace(evidence, fitted=tuple(whole)), start, free)
         return fitted(evidence, begin.fit.model, free, start=begin.start, windows=begin.fit.windows)
-    except InputError:
+    except FitDiverged:
         return None
 
 
@@ -206,7 +206,7 @@ def _other_starts(evidence: Evidence) -> list[Rig]:
                 run.time[good], run.theta[good], sigma=evidence.readings[k].sigma
             )
         except InputError:
-            continue
+            continue  # it does not swing
         gravity = evidence.experiment.gravity
         found.append(Rig(w0=begin.w0, c_over_m=begin.c_over_m, Tr=begin.Tr, gravity=gravity))
     return found

@@ -22,7 +22,7 @@ from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.diagnosis.verdict import Judgement, judge
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.astray import refuse_astray
 from pendmap.model.effects import definition
 from pendmap.notebook import Readable
@@ -292,9 +292,7 @@ def _followed(experiment: Experiment) -> Iterator[None]:
     """Say of which records a motion is lost that the verdict rests on."""
     try:
         yield
-    except InputError as error:
-        if str(error).startswith(str(experiment.path)):
-            raise
+    except FitDiverged as error:
         raise InputError(
             f"{experiment.path}: no model follows these records: {error}. A run under a drive "
             'must have the drive, in an experiment.toml: kind = "forced"'

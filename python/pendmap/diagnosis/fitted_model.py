@@ -52,7 +52,7 @@ LEAST_LEVEL: Final = 0.5
 """Noise counts for at least this part of the variance that its readings are stated to have."""
 
 EXACT: Final = 1e-3
-"""Part of an independent reading that the last step of a settled fit promises."""
+"""Part of an independent reading that the last step of a converged fit promises."""
 
 FEW_STEPS: Final = 12
 """Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
@@ -178,7 +178,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
 
 
 def settled(evidence: Evidence, trial: Trial, level: float) -> Trial:
-    """Return a fit with all the steps that it wants; candidates are given few."""
+    """Return a fit that has converged; that of a candidate ends after a few steps."""
     if trial.fit.converged:
         return trial
     return fitted(

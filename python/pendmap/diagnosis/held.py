@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.diagnosis.fitted_model import FEW_STEPS, LITTLE
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 
 if TYPE_CHECKING:
@@ -145,5 +145,5 @@ def _chi2(
             steps=FEW_STEPS,
             least_gain=LITTLE * level,
         ).chi2
-    except InputError:
+    except FitDiverged:
         return np.inf

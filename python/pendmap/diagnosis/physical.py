@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.diagnosis.fitted_model import LITTLE, fitted
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged
 
 if TYPE_CHECKING:
     from pendmap.comparison.data import Evidence
@@ -49,7 +49,7 @@ def within_physics(evidence: Evidence, trial: Trial, target: float = math.inf) -
                 least_gain=LITTLE * trial.level,
                 target=target,
             )
-        except InputError:
+        except FitDiverged:
             return None
     return trial if all(_possible(evidence, trial, c) for c in trial.chosen) else None
 

@@ -14,7 +14,7 @@ from pendmap.diagnosis.fitted_model import (
 )
 from pendmap.diagnosis.intervals import Z95
 from pendmap.diagnosis.physical import within_physics
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -77,7 +77,7 @@ def refitted(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     def fit(added: Sequence[Candidate], step: dict[str, float], *, short: bool) -> Trial | None:
         try:
             return with_candidates(evidence, trial, added, step, level=level, short=short)
-        except InputError:
+        except FitDiverged:
             return None  # the start leads out of the range of numbers
 
     def kicked(step: dict[str, float]) -> dict[str, float]:
@@ -141,7 +141,7 @@ def without(
             least_gain=LITTLE * level,
             target=target,
         )
-    except InputError:
+    except FitDiverged:
         return None
     return None if rest.fit.given_up else within_physics(evidence, rest, target)
 
@@ -155,7 +155,7 @@ def enlarged(
     start = known | {c.free[0]: KICK * known[c.free[0]] for c in added}
     try:
         found = with_candidates(evidence, rest, added, start, level=level)
-    except InputError:
+    except FitDiverged:
         return None
     return within_physics(evidence, found)
 
@@ -252,5 +252,5 @@ def _from(
             windows=trial.fit.windows,
             steps=steps,
         )
-    except InputError:
+    except FitDiverged:
         return None

@@ -7,9 +7,9 @@
 3. All effects of the library, in all their shapes, are scored at the best model (Rao), alone and in
    pairs; at first also at the models without one of the core's effects.
 4. The best few are fitted with all other parameters, within physics.
-5. The cheapest, by its sum of squares and Schwarz's penalty, is accepted if noise hardly gains as
-   much, if it closes its share of a gap that it does not close whole (with a frequency or an
-   instant all of it), and if it loses on no held-out set.
+5. The cheapest, by its sum of squares and Schwarz's penalty, is fitted until it has converged, and
+   accepted if noise hardly gains as much, if it closes its share of a gap that it does not close
+   whole (with a frequency or an instant all of it), and if it loses on no held-out set.
 6. Accepted effects are dropped where they gain too little beside the others, and replaced by what
    fits better by as much as in step 5; of fits that the records do not tell apart the simplest and
    commonest stands. A model without an effect is never worse than one with fewer.
@@ -87,7 +87,6 @@ def _step(state: State, best: Trial, starts: Sequence[Trial]) -> Trial | None:
     level = min((trial for trial, _, _ in found), key=lambda t: t.chi2).level
     found.sort(key=lambda each: state.cost(each[0], level))
     for fit, rest, places in found[: state.thresholds.singles]:
-        # What is judged has taken all the steps that it wants.
         trial = state.settled(fit)
         gains = state.room(trial) >= 0 and state.gains(best, trial)
         good = gains and state.holds(best, trial)

@@ -17,7 +17,7 @@ from pendmap.diagnosis.model_error import model_errors, weighted
 from pendmap.diagnosis.physical import within_physics
 from pendmap.diagnosis.refit import Key, enlarged, key_of, refitted, without
 from pendmap.diagnosis.scores import Scores, scores_of
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -92,7 +92,7 @@ class State:
         try:
             base = self._again(self.base)
             again = self._again(best) if best.chosen else base
-        except InputError:
+        except FitDiverged:
             self.errors, self.evidence = before
             return best
         self._begin(base)
@@ -131,12 +131,12 @@ class State:
         return best
 
     def settled(self, trial: Trial) -> Trial:
-        """Return a fit with all the steps that it wants, within physics."""
+        """Return a fit that has converged, within physics."""
         if trial.fit.converged:
             return trial
         try:
             full = within_physics(self.evidence, settled(self.evidence, trial, self.level))
-        except InputError:
+        except FitDiverged:
             return trial
         return self.keep(full if full is not None else trial) or trial
 
@@ -213,13 +213,13 @@ class State:
             try:
                 held = tried(self.evidence, trial)
                 sets = predictive(self.evidence, trial, held, self.level)
-            except InputError:
+            except FitDiverged:
                 held, sets = None, (math.inf,)
             self._held[id(trial)] = trial, held, sets
         return self._held[id(trial)]
 
     def found(self, trial: Trial) -> Found:
-        """Return a model with its hold-out results; an InputError where its motion is lost."""
+        """Return a model with its hold-out results; FitDiverged where its motion is lost."""
         held = self.held(trial)
         return Found(trial, held if held is not None else tried(self.evidence, trial))
 

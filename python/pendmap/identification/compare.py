@@ -6,7 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 from pendmap.identification.forced import (
     Ensemble,
@@ -198,7 +198,7 @@ def compare(
                     forced.append(
                         compare_forced(model, run, many, threads=threads, progress=progress)
                     )
-            except InputError as error:  # the others are compared all the same
+            except (FitDiverged, InputError) as error:  # the others are compared all the same
                 why = str(error)
         if why:
             out.append((run.name, why))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification.conversion import Conversion, interval
+from pendmap.identification.conversion import Conversion, core_errors, interval
 from pendmap.identification.free import PER_RUN, PLACES, free_quantities
 from pendmap.identification.result import Estimate
 from pendmap.identification.runs import (
@@ -172,8 +172,9 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     Raises
     ------
     InputError
-        If a name is not known, a record is too short or not finite, or the start leads out of the
-        range of numbers.
+        If a name is not known, or a record is too short or not finite.
+    FitDiverged
+        If the start leads out of the range of numbers.
 
     References
     ----------
@@ -201,10 +202,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         "doubt": sigma_doubt,
     }
     begun = None if windows is None else bare_windows(windows, units)
-    try:
+    with core_errors():
         found = _core.fit_runs(given, unknown.start, choices, begun)
-    except ValueError as error:
-        raise InputError(str(error)) from None
     return _result(found, model, unknown, chosen)
 
 
@@ -242,11 +241,9 @@ def score(
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
     unknown, given = prepared(runs, model, [*base, *candidates], start, units)
-    try:
+    with core_errors():
         windows = bare_windows(fit.windows, units)
         at = _core.fit_equations(given, unknown.start, tolerance_of(runs), windows)
-    except ValueError as error:
-        raise InputError(str(error)) from None
     pull = unknown.columns(at["pull"][None], at["values"])[0]
     information = unknown.columns(unknown.columns(at["information"], at["values"]).T, at["values"])
     new = np.array([name not in fit.estimates for name in unknown.names])

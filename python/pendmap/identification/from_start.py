@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fitting import TrajectoryFit, fit_runs
 from pendmap.identification.rough import rough_start
 from pendmap.identification.start import starting_values
@@ -103,7 +103,7 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     try:
         found_by_peaks = _by_peaks(time, theta, readings[0].sigma)
         again = fitted(dict(start or {}) | found_by_peaks)
-    except InputError:
+    except (FitDiverged, TooShortError):
         return found, tuple(readings)
     better = (again.converged, -again.chi2) > (found.converged, -found.chi2)
     return again if better else found, tuple(readings)

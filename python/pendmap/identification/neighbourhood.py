@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.identification.conversion import core_errors
 from pendmap.identification.fitting import TrajectoryFit, prepared
 from pendmap.identification.runs import bare_run, bare_windows, rig_of, tolerance_of
 from pendmap.model.units import Units
@@ -78,12 +78,10 @@ def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
     units = Units(model.w0, si=True)
     unknown, given = prepared([run], model, (), {}, units)
     first = fit.windows[:1]
-    try:
+    with core_errors():
         found = _core.fit_rows(
             given, unknown.start, tolerance_of([run]), bare_windows(first, units)
         )
-    except ValueError as error:
-        raise InputError(str(error)) from None
     rows = found[0][1][:, -2:]
     scale = np.array([1.0, float(units.given(1.0, 1))])
     covariance = np.linalg.pinv(rows.T @ rows, hermitian=True) * np.outer(scale, scale)
@@ -134,7 +132,7 @@ class Simulated:
         from pendmap import _core  # noqa: PLC0415 (likewise)
 
         units = Units(self.model.w0, si=True)
-        try:
+        with core_errors():
             return _core.replay(
                 bare_run(self.run, rig_of(self.run, self.model), units),
                 np.ascontiguousarray(theta, dtype=np.float64),
@@ -143,5 +141,3 @@ class Simulated:
                 _EXACTNESS,
                 self.threads or 0,
             )
-        except ValueError as error:
-            raise InputError(str(error)) from None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.astray import refuse_astray
 from pendmap.identification.clock import span
 from pendmap.identification.from_start import TooShortError
@@ -232,8 +232,8 @@ def _with_drag(joint: JointFit) -> JointFit | None:
         return None
     try:
         found = fit_together(joint.runs, start=joint.fit.model, effects=[DRAG])
-    except InputError:
-        return None  # the motion with the drag is lost
+    except FitDiverged:
+        return None
     return found if found.fit.rms < joint.fit.rms else None
 
 
@@ -249,7 +249,7 @@ def _best(
         joint = fit_together(runs, start=start, known=known, effects=effects)
     except TooShortError as error:
         return None, Identification(BEST, warnings=(str(error),), applicable=False)
-    except InputError as error:
+    except FitDiverged as error:
         if start is not None or effects:
             raise
         # No other method can stand in for what was asked for by name; without that they can.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.identification.conversion import core_errors
 from pendmap.identification.fitting import prepared
 from pendmap.identification.runs import bare_windows, tolerance_of
 from pendmap.model.units import Units
@@ -136,10 +136,8 @@ def window_slopes(
     start = {name: fit.estimates[name].value for name in fit.names}
     unknown, given = prepared(runs, model, [*base, *candidates], start, units)
     begin = unknown.start
-    try:
+    with core_errors():
         found = _core.fit_rows(given, begin, tolerance_of(runs), bare_windows(fit.windows, units))
-    except ValueError as error:
-        raise InputError(str(error)) from None
     ends = np.cumsum([len(rows) for _, rows, _, _ in found])
     bare = np.zeros((int(ends[-1]), len(begin)))
     for (places, rows, _, _), end in zip(found, ends, strict=True):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged
 from pendmap.identification.sensitivity import sensitivities
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
         start[size] = fit[size] * math.exp(power)
         try:
             found = again(_with(fit.model, exponent, step), start, fit)
-        except InputError:
+        except FitDiverged:
             reach = SHORTER * abs(step)
             continue
         if found.chi2 < fit.chi2:

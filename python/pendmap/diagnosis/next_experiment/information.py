@@ -20,7 +20,7 @@ import numpy as np
 from pendmap.comparison.data import held_parts
 from pendmap.comparison.replay import Motion, replayed
 from pendmap.diagnosis.candidates import placed
-from pendmap.errors import InputError
+from pendmap.errors import FitDiverged
 from pendmap.identification.free import PER_RUN
 from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
 from pendmap.identification.sensitivity import window_slopes
@@ -226,7 +226,7 @@ class Prospects:
         self._starts, runs, windows = _simulated(evidence, found, longest, reasons)
         self.menu = [p for p in menu if all(start in self._starts for start in p.starts)]
         if menu and not self.menu:
-            raise InputError(f"of {counted(len(menu), 'proposal')} none: {reasons['proposals']}")
+            raise FitDiverged(f"of {counted(len(menu), 'proposal')} none: {reasons['proposals']}")
         if len(self.menu) < len(menu):
             reasons["proposals"] = (
                 f"{len(menu) - len(self.menu)} of {len(menu)} left out: {reasons['proposals']}"
@@ -321,12 +321,12 @@ def _curves(
     try:
         every = replayed(motion, list(runs.values()), list(states.values()))
         return {start: curve for start, (_, curve) in zip(runs, every, strict=True)}
-    except InputError:
+    except FitDiverged:
         found = {}
         for start, run in runs.items():
             try:
                 found[start] = replayed(motion, [run], [states[start]])[0][1]
-            except InputError as error:
+            except FitDiverged as error:
                 reasons["proposals"] = str(error)
         return found
 

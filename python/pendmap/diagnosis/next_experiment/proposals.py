@@ -18,7 +18,7 @@ import numpy as np
 from pendmap.words import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Planned", "Proposal", "Start", "menu_of"]
 
 RELEASES: Final = (0.5, 1.2, 2.0, 2.8)
-"""Angles of release, rad: small swings down to rest, and up to nearly inverted."""
+"""Angles of release, rad, as far as the rig has them: small swings, and up to nearly inverted."""
 
 FLINGS: Final = (2.5, 3.5)
 """Velocities at the bottom over ``w0``: with more than 2 the pendulum goes round. Much quicker, a
@@ -142,7 +142,7 @@ def menu_of(evidence: Evidence, w0: float) -> tuple[Proposal, ...]:
     limits = _limits(evidence)
     lengths = [x for f in LENGTHS if least <= (x := _round(f * usual)) <= most] or [_round(least)]
     ended = max(run.lab_time_s + float(run.time[-1]) for run in evidence.fitted) + PAUSE_S
-    singles, pairs = _free(w0, ended)
+    singles, pairs = _free(w0, ended, math.floor(100 * limits.angle) / 100)
     singles = [s for s in (*singles, *_forced(evidence, w0, ended)) if limits.allows(s)]
     pairs = [pair for pair in pairs if all(map(limits.allows, pair))]
     found = [Proposal((Planned(start, x),)) for start in singles for x in lengths]
@@ -210,10 +210,15 @@ def _in_turn(run: Planned, count: int) -> Iterator[Planned]:
         yield run
 
 
-def _free(w0: float, ended: float) -> tuple[list[Start], list[tuple[Start, Start]]]:
-    """Return free decays, and those that are done either way."""
-    singles = [Start(f"from {angle:g} rad", angle, 0.0, 0.0, ended) for angle in RELEASES]
-    other = Start(f"from -{RELEASES[-1]:g} rad", -RELEASES[-1], 0.0, 0.0, ended)
+def _free(w0: float, ended: float, widest: float) -> tuple[list[Start], list[tuple[Start, Start]]]:
+    """Return free decays from angles up to the widest, and those that are done either way."""
+
+    def within(angles: Sequence[float]) -> list[float]:
+        return list(dict.fromkeys(min(angle, widest) for angle in angles))
+
+    singles = [Start(f"from {angle:g} rad", angle, 0.0, 0.0, ended) for angle in within(RELEASES)]
+    farthest = singles[-1].theta
+    other = Start(f"from -{farthest:g} rad", -farthest, 0.0, 0.0, ended)
     pairs = [(singles[-1], other)]
     flung = []
     for factor in FLINGS:
@@ -224,7 +229,7 @@ def _free(w0: float, ended: float) -> tuple[list[Start], list[tuple[Start, Start
     pairs.append((flung[0], back))
     later = [
         Start(f"from {angle:g} rad, {_pause(wait)} after the last,", angle, 0.0, wait, ended + wait)
-        for angle, wait in itertools.product(LATER, WAITS)
+        for angle, wait in itertools.product(within(LATER), WAITS)
     ]
     return singles + flung + later, pairs
 
