@@ -13,7 +13,7 @@ import pendmap.diagnosis
 from hidden import once
 from pendmap import InputError, _core, figures, viewer
 from pendmap.cli.show import plain
-from pendmap.diagnosis import Discrepancy, summary
+from pendmap.diagnosis import Discrepancy, diagnosed_model, summary
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,3 +98,21 @@ def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Pat
     model = pendmap.Rig.of(w0=5.0, torque=1e9)
     with pytest.raises(InputError, match=r"run\.csv: no model follows these records: "):
         pendmap.diagnosis.diagnose(pendmap.read_experiment(record), model=model)
+
+
+def test_what_differs_from_run_to_run_is_said_and_widens_intervals(tmp_path: Path) -> None:
+    time, noise = np.arange(0, 40, 0.04), np.random.default_rng(1)
+    w0 = np.array([6.200, 6.209, 6.201, 6.207])
+    for k, own in enumerate(w0):
+        motion = pendmap.simulate(pendmap.Rig(w0=own, c_over_m=0.06, Tr=0.08), 1.5, 0, 40.1)
+        theta = np.interp(time, motion["time"], motion["theta"]) + 1e-3 * noise.normal(
+            size=time.size
+        )
+        rows = np.c_[time, theta]
+        np.savetxt(tmp_path / f"{k}.csv", rows, "%.5f", ",", header="t_s,theta_rad", comments="")
+    found = pendmap.diagnosis.diagnose(pendmap.read_experiment(tmp_path))
+    assert found.verdict in {"unknown", "partial"}
+    assert found.runs.between("w0") == pytest.approx(w0.std(ddof=1), rel=0.2)
+    assert any(line.startswith("w0 differs from run to run by ") for line in summary.as_text(found))
+    between = diagnosed_model(found).notes["covariance"]["between_runs"]
+    assert between["w0"] == found.runs.between("w0")

@@ -72,13 +72,19 @@ def ranking_handles(found: Discrepancy) -> list[Artist]:
 def shown_coefficients(found: Discrepancy) -> list[str]:
     """Return the parameters that are drawn run by run: the sizes of what was found.
 
-    One run has nothing to be compared with.
+    Where nothing was found, the parameter that differs most between runs, by its errors. One run
+    has nothing to be compared with.
     """
     if len(found.evidence.fitted) == 1:
         return []
     sizes = [standing.candidate.free[0] for standing in found.judgement.standings]
-    known = found.runs.coefficients
-    return sizes or next(([name] for name in ("c_over_m", "w0") if name in known), [])
+    known = [name for name in ("c_over_m", "w0", "Tr") if name in found.runs.coefficients]
+
+    def apart(name: str) -> float:
+        errors = [error for _, error in found.runs.shown(name)]
+        return found.runs.between(name) / min(errors, default=math.inf)
+
+    return sizes or ([max(known, key=apart)] if known else [])
 
 
 def coefficient_handles(found: Discrepancy, shown: Iterable[str]) -> list[Artist]:
