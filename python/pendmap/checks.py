@@ -7,7 +7,7 @@ import numbers
 import operator
 from typing import Any, Final
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 
 __all__ = [
     "MOST_CELLS",
@@ -59,10 +59,8 @@ def instruction_set() -> str:
     """
     from pendmap import _core  # noqa: PLC0415 (heavy; the command line reads only the bounds)
 
-    try:
+    with core_errors():
         return _core.simd()
-    except ValueError as error:
-        raise InputError(str(error)) from None
 
 
 def number(name: str, value: object) -> float:

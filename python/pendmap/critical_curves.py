@@ -15,7 +15,7 @@ from pendmap import grid as grids
 from pendmap.critical_plane import PLANES, in_picture
 from pendmap.draws import drawn, part
 from pendmap.draws.curves import tongues_over
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE
 from pendmap.store import FORMAT_VERSION
@@ -240,7 +240,7 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in rows]
 
     looked = np.ones(asked.size, dtype=bool)
-    try:
+    with core_errors():
         frequencies, rows = asked, all_at(asked, folds=True)
         if refine and asked.size > 1:
             views = [in_picture(asked, p_max, one) for one in PLANES]
@@ -250,8 +250,6 @@ def _solved(  # noqa: PLR0913 (as for tongues)
             again = partial(solve, one=pendulum, upright=False, folds=True)
             known = np.isin(frequencies, asked)
             looked = _folds_to_their_ends(frequencies, found, known, again)
-    except ValueError as error:
-        raise InputError(str(error)) from None
     return frequencies, looked, (found, undamped, upright)
 
 

@@ -11,7 +11,7 @@ import xarray as xr
 from pendmap import _core, checks
 from pendmap.branches import branches
 from pendmap.cell_search import STARTS, CellSearch
-from pendmap.errors import InputError
+from pendmap.errors import core_errors
 from pendmap.model import without_dimensions
 from pendmap.model.units import VELOCITY
 from pendmap.planes import CHAOS_PERIODS, chaos, entries, undecided
@@ -106,7 +106,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         angle, speed = (checks.number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
     began = time.perf_counter()
-    try:
+    with core_errors():
         raw = _core.bifurcation(
             pendulum.parameters,
             axis.kernel,
@@ -119,8 +119,6 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
             search.workers,
             progress,
         )
-    except ValueError as error:
-        raise InputError(str(error)) from None
     dataset = _dataset(raw, axis, units)
     dataset.attrs = {
         "kind": "bifurcation",

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-__all__ = ["FitDiverged", "InputError", "NotWrittenError", "one_line"]
+import contextlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["FitDiverged", "InputError", "NotWrittenError", "core_errors", "one_line"]
 
 MOST = 500
 """Characters of a message."""
@@ -41,3 +47,15 @@ class FitDiverged(ArithmeticError):  # noqa: N818 (it is no mistake of the calle
 
 class NotWrittenError(OSError):
     """Results were computed that could not be written; the message names them and what was."""
+
+
+@contextlib.contextmanager
+def core_errors(lost: type[Exception] = InputError) -> Iterator[None]:
+    """Raise what the core refuses as InputError, and as ``lost`` where a motion diverges."""
+    try:
+        yield
+    except ValueError as error:
+        from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+
+        kind = lost if isinstance(error, _core.Diverged) else InputError
+        raise kind(str(error)) from None

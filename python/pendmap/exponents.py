@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core, checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 from pendmap.exponents_said import summary
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY, Units
@@ -133,11 +133,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         "seed": checks.whole("seed", seed, 0, checks.MOST_SEED),
     }
     began = time.perf_counter()
-    try:
+    with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
         raw = _core.lyapunov(pendulum.parameters, start, choices, progress)
-    except ValueError as error:
-        raise InputError(str(error)) from None
     found = raw["attractor"]
     exponent, stderr = _value(raw)
     regular = _regular(raw, pendulum.period)

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core, checks, grid
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 from pendmap.separatrices import loop, separatrix
 from pendmap.store import FORMAT_VERSION
@@ -109,7 +109,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     if omega is None:
         omega = np.linspace(*_RANGE)
     frequencies = grid.frequencies(omega)
-    try:
+    with core_errors():
         orbits, sense = _orbits(pendulum)
         at = {name: _threshold(pendulum, pendulum.omega, orbit) for name, orbit in orbits.items()}
         if not sense:
@@ -118,8 +118,6 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
             [_threshold(pendulum, float(w), orbit) for orbit in orbits.values()]
             for w in frequencies
         ]
-    except ValueError as error:
-        raise InputError(str(error)) from None
     known = [at[name] for name in orbits if math.isfinite(at[name])]
     first = at["loop"] if sense else min(known, default=math.nan)
     dataset = xr.Dataset(

@@ -11,7 +11,7 @@ from pendmap import _core, checks
 from pendmap.basin_dataset import cells, complete, uncertain_starts
 from pendmap.draws import drawn, part
 from pendmap.draws.basins import basins_over
-from pendmap.errors import InputError
+from pendmap.errors import core_errors
 from pendmap.grid import Grid, coordinate, starts
 from pendmap.model import without_dimensions
 from pendmap.model.units import VELOCITY
@@ -247,7 +247,5 @@ def _choices(  # noqa: PLR0913
 
 
 def _call(function: Callable[..., dict[str, Any]], *arguments: object) -> dict[str, Any]:
-    try:
+    with core_errors():
         return function(*arguments)
-    except ValueError as error:
-        raise InputError(str(error)) from None

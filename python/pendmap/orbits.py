@@ -12,7 +12,7 @@ import xarray as xr
 from pendmap import _core, checks
 from pendmap.draws import drawn, part
 from pendmap.draws.orbits import orbits_over
-from pendmap.errors import InputError
+from pendmap.errors import core_errors
 from pendmap.grid import Axis, Grid
 from pendmap.model import without_dimensions
 from pendmap.model.units import VELOCITY, Units
@@ -141,11 +141,9 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     began = time.perf_counter()
     low, high, count = grid.velocity.as_tuple
     box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
-    try:
+    with core_errors():
         raw = _core.orbits(pendulum.parameters, (n, w), grid.theta.as_tuple, box, workers, progress)
         paths = _paths(pendulum, raw["orbits"], units)
-    except ValueError as error:
-        raise InputError(str(error)) from None
     found = raw["orbits"]
     dataset = xr.Dataset(
         {

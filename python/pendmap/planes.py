@@ -15,7 +15,7 @@ from pendmap.cell_search import STARTS, CellSearch
 from pendmap.critical_curves import MOST_P, tongues
 from pendmap.draws import drawn, part
 from pendmap.draws.planes import regimes_over
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 from pendmap.model.units import RATE, VELOCITY
 from pendmap.regimes import kind_of, regimes
@@ -160,7 +160,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         first, progress = _halves(progress)
         over = _curves(model, columns, rows, first)
     began = time.perf_counter()
-    try:
+    with core_errors():
         raw = _core.parameter_map(
             pendulum.parameters,
             (columns.kernel, rows.kernel),
@@ -172,8 +172,6 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
             search.workers,
             progress,
         )
-    except ValueError as error:
-        raise InputError(str(error)) from None
     dataset = _dataset(raw, (columns, rows), units)
     if over is not None:
         dataset = dataset.assign(over)

@@ -10,7 +10,7 @@ import xarray as xr
 
 from pendmap import _core, checks
 from pendmap.energy import FORMULA, energy
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 from pendmap.grid import starts
 from pendmap.model import Units, without_dimensions
 from pendmap.model.units import RATE, TIME, VELOCITY
@@ -131,13 +131,11 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
             "fit into memory"
         )
-    try:
+    with core_errors():
         start = (theta, units.bare(velocity, VELOCITY))
         end = units.bare(until, TIME)
         shown = None if live is None else _in_units(live, units)
         raw = _core.simulate(pendulum.parameters, start, end, tol, samples, lyapunov, shown)
-    except ValueError as error:
-        raise InputError(str(error)) from None
     time, speed = units.given(raw["time"], TIME), units.given(raw["velocity"], VELOCITY)
     event_time = units.given(raw["event_time"], TIME)
     once = np.arange(0, time.size, samples)
@@ -343,7 +341,7 @@ def advance(  # noqa: PLR0913
     tol = checks.number("tol", tol)
     if steps_per_period is not None:
         steps_per_period = checks.whole("steps_per_period", steps_per_period, 1, _MOST_SAMPLES)
-    try:
+    with core_errors():
         if steps_per_period is None:
             step = max(1, angles.size // 400)
             sample = angles[::step].copy(), speeds[::step].copy()
@@ -351,6 +349,4 @@ def advance(  # noqa: PLR0913
         end, speed, turns = _core.advance(
             pendulum.parameters, angles, speeds, periods, steps_per_period, workers, progress
         )
-    except ValueError as error:
-        raise InputError(str(error)) from None
     return end, units.given(speed, VELOCITY), turns

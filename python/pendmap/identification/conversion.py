@@ -11,17 +11,14 @@ the Jacobian ``dx / dxi`` has ``dq / dn = -ln(w_ref) q`` beside its diagonal.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendmap.errors import FitDiverged, InputError
-
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -30,20 +27,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Conversion", "core_errors", "interval"]
-
-
-@contextlib.contextmanager
-def core_errors() -> Iterator[None]:
-    """Raise what the core says of a fit as FitDiverged, or as InputError."""
-    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
-
-    try:
-        yield
-    except _core.Diverged as error:
-        raise FitDiverged(str(error)) from None
-    except ValueError as error:
-        raise InputError(str(error)) from None
+__all__ = ["Conversion", "interval"]
 
 
 @dataclasses.dataclass(frozen=True)

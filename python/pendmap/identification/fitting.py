@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
-from pendmap.identification.conversion import Conversion, core_errors, interval
+from pendmap.errors import FitDiverged, InputError, core_errors
+from pendmap.identification.conversion import Conversion, interval
 from pendmap.identification.free import PER_RUN, PLACES, free_quantities
 from pendmap.identification.result import Estimate
 from pendmap.identification.runs import (
@@ -202,7 +202,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
         "doubt": sigma_doubt,
     }
     begun = None if windows is None else bare_windows(windows, units)
-    with core_errors():
+    with core_errors(FitDiverged):
         found = _core.fit_runs(given, unknown.start, choices, begun)
     return _result(found, model, unknown, chosen)
 
@@ -241,7 +241,7 @@ def score(
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
     unknown, given = prepared(runs, model, [*base, *candidates], start, units)
-    with core_errors():
+    with core_errors(FitDiverged):
         windows = bare_windows(fit.windows, units)
         at = _core.fit_equations(given, unknown.start, tolerance_of(runs), windows)
     pull = unknown.columns(at["pull"][None], at["values"])[0]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.conversion import core_errors
+from pendmap.errors import FitDiverged, core_errors
 from pendmap.identification.fitting import TrajectoryFit, prepared
 from pendmap.identification.runs import bare_run, bare_windows, rig_of, tolerance_of
 from pendmap.model.units import Units
@@ -78,7 +78,7 @@ def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
     units = Units(model.w0, si=True)
     unknown, given = prepared([run], model, (), {}, units)
     first = fit.windows[:1]
-    with core_errors():
+    with core_errors(FitDiverged):
         found = _core.fit_rows(
             given, unknown.start, tolerance_of([run]), bare_windows(first, units)
         )
@@ -132,7 +132,7 @@ class Simulated:
         from pendmap import _core  # noqa: PLC0415 (likewise)
 
         units = Units(self.model.w0, si=True)
-        with core_errors():
+        with core_errors(FitDiverged):
             return _core.replay(
                 bare_run(self.run, rig_of(self.run, self.model), units),
                 np.ascontiguousarray(theta, dtype=np.float64),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.conversion import core_errors
+from pendmap.errors import FitDiverged, core_errors
 from pendmap.identification.fitting import prepared
 from pendmap.identification.runs import bare_windows, tolerance_of
 from pendmap.model.units import Units
@@ -136,7 +136,7 @@ def window_slopes(
     start = {name: fit.estimates[name].value for name in fit.names}
     unknown, given = prepared(runs, model, [*base, *candidates], start, units)
     begin = unknown.start
-    with core_errors():
+    with core_errors(FitDiverged):
         found = _core.fit_rows(given, begin, tolerance_of(runs), bare_windows(fit.windows, units))
     ends = np.cumsum([len(rows) for _, rows, _, _ in found])
     bare = np.zeros((int(ends[-1]), len(begin)))

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 from pendmap.files import read_toml
 
 if TYPE_CHECKING:
@@ -128,10 +128,8 @@ class Formula:
                 "that name"
             )
         key = (self.name, self.term, self.revealed_by, parts)
-        try:
+        with core_errors():
             entry, proportional = _core.formula(key)
-        except ValueError as error:
-            raise InputError(str(error)) from None
         kept = {part[0]: _said(part, names) for part in parts}
         for what, value in (
             ("parameters", kept),

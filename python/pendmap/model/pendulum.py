@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, core_errors
 from pendmap.model.covariance import said_of
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula, FormulaKey
@@ -122,10 +122,8 @@ class Pendulum:
             return math.tau if self.p == 0 else math.tau / self.omega
         from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
 
-        try:
+        with core_errors():
             return _core.period(self.parameters)
-        except ValueError as error:
-            raise InputError(str(error)) from None
 
     @property
     def parameters(self) -> Kernel:
