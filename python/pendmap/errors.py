@@ -42,7 +42,7 @@ class InputError(ValueError):
 
 
 class FitDiverged(ArithmeticError):  # noqa: N818 (it is no mistake of the caller)
-    """A fit lost its motion: with its values the model leaves the range of numbers."""
+    """A fit is lost: its motion leaves the range of numbers, or its values are no model's."""
 
 
 class NotWrittenError(OSError):

@@ -18,6 +18,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from pendmap.diagnosis.attempts import attempt_of, core_attempt
@@ -45,10 +46,14 @@ def search(state: State, core: Trial | None, progress: Callable[[int], None]) ->
     # What takes the place of the core's effects starts without them.
     rests = [state.rest(best, candidate) for candidate in best.chosen]
     starts = [rest for rest in rests if follows(state.evidence, rest)]
-    seen: set[Key] = set()
-    # What is accepted may be dropped again: no set of effects is enlarged twice.
-    while state.room(best) > 0 and key_of(best.chosen) not in seen:
-        seen.add(key_of(best.chosen))
+    seen: dict[Key, float] = {}
+    # What is accepted may be dropped again: no set of effects is enlarged twice, unless a fit of it
+    # was found that the records tell from the first.
+    margin = state.thresholds.alike
+    while state.room(best) > 0 and best.chi2 + margin * best.level < seen.get(
+        key_of(best.chosen), math.inf
+    ):
+        seen[key_of(best.chosen)] = best.chi2
         step = _step(state, best, starts)
         if step is None:
             break

@@ -72,9 +72,10 @@ class State:
     def _begin(self, base: Trial) -> None:
         self.base = self._best = base
         self._fits: dict[Key, Trial] = {key_of(()): base}
-        self._rests: dict[tuple[Key, str], Trial] = {}
-        self._refits: dict[tuple[Key, Key], Trial | None] = {}
-        self._scores: dict[Key, Scores] = {}
+        self._without: set[tuple[Key, str]] = set()
+        # By the fit that they begin at: a better one of the same effects has its own.
+        self._refits: dict[tuple[int, Key], tuple[Trial, Trial | None]] = {}
+        self._scores: dict[int, tuple[Trial, Scores]] = {}
         self._held: dict[int, tuple[Trial, Held | None, tuple[float, ...]]] = {}
 
     def weigh(self, best: Trial) -> Trial:
@@ -142,10 +143,9 @@ class State:
 
     def scores(self, trial: Trial) -> Scores:
         """Return the scores of all candidates at a fit."""
-        key = key_of(trial.chosen)
-        if key not in self._scores:
-            self._scores[key] = scores_of(self.evidence, trial, self._pool(trial))
-        return self._scores[key]
+        if id(trial) not in self._scores:
+            self._scores[id(trial)] = trial, scores_of(self.evidence, trial, self._pool(trial))
+        return self._scores[id(trial)][1]
 
     def _pool(self, trial: Trial) -> list[list[Candidate]]:
         """Return the candidates that a model does not have, each in all its shapes."""
@@ -156,26 +156,25 @@ class State:
     def refit(self, trial: Trial, places: Sequence[int]) -> Trial | None:
         """Return a trial's model with candidates, those at some places of its scores."""
         scores = self.scores(trial)
-        key = key_of(trial.chosen), key_of([scores.scores[k].candidate for k in places])
+        key = id(trial), key_of([scores.scores[k].candidate for k in places])
         if key not in self._refits:
             found = refitted(self.evidence, self.thresholds, trial, scores, places, self.level)
-            self._refits[key] = self.keep(found)
-        return self._refits[key]
+            self._refits[key] = trial, self.keep(found)
+        return self._refits[key][1]
 
     def rest(self, trial: Trial, dropped: Candidate) -> Trial:
         """Return the best model with a trial's other effects, with fewer where these do no good."""
+        chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
         way = key_of(trial.chosen), dropped.name
-        if way not in self._rests:
-            chosen = tuple(c for c in trial.chosen if c.name != dropped.name)
+        if way not in self._without:
+            self._without.add(way)
             target = self._fewer(chosen).chi2
             self.keep(without(self.evidence, trial, dropped, self.level, target))
             rest = self._fewer(chosen)
             if len(rest.chosen) < len(chosen):
                 # More parameters fit no worse: the motion was lost on the way.
                 self.keep(enlarged(self.evidence, rest, trial, chosen, self.level))
-                rest = self._fewer(chosen)
-            self._rests[way] = rest
-        return self._rests[way]
+        return self._fewer(chosen)
 
     def _fewer(self, chosen: Sequence[Candidate]) -> Trial:
         """Return the best known model with no other effects than these."""

@@ -174,7 +174,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     InputError
         If a name is not known, or a record is too short or not finite.
     FitDiverged
-        If the start leads out of the range of numbers.
+        If the start leads out of the range of numbers, or the fit to values that no model may have.
 
     References
     ----------
@@ -299,6 +299,10 @@ def _result(
         known = math.isfinite(low) and math.isfinite(high)
         ends[name] = low, high
         estimates[name] = Estimate(float(values[k]), errors[k], (low, high) if known else None)
+    try:
+        found_model = _found_model(model, estimates)
+    except InputError as error:
+        raise FitDiverged(f"the fit ends at values that no model may have: {error}") from None
     curves, residuals, squares = [], [], 0.0
     for curve in found["runs"]:
         curves.append(np.stack([curve["theta"], units.given(curve["velocity"], 1)]))
@@ -313,7 +317,7 @@ def _result(
         samples=found["samples"],
         degrees=found["degrees"],
         rms=math.sqrt(squares / max(found["samples"], 1)),
-        model=_found_model(model, estimates),
+        model=found_model,
         curves=tuple(curves),
         residuals=tuple(residuals),
         white=tuple(curve["white"] for curve in found["runs"]),
