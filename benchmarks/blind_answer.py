@@ -117,7 +117,6 @@ def answer(found: Discrepancy) -> dict[str, Any]:
         "parameters": {e.name: [dict(e.parameters), dict(e.ci95)] for e in found.effects},
         "held": held.chi2 / held.degrees,
         "closed": judgement.closed,
-        "spread": judgement.spread,
         "ratio": [judgement.ratio, judgement.ratio_allowed],
         "left": [judgement.left, judgement.uneven, judgement.chance],
         "form": [judgement.form.chance, dict(judgement.form.chances), judgement.form.further],

@@ -96,7 +96,6 @@ def runs_of(state: State, trial: Trial) -> RunByRun:
     [
         ({}, "partial"),
         ({"closes": 1.1}, "unknown"),
-        ({"spread": -1.0}, "unknown"),
         # Nothing counts as left: then the drag's rivals, which the wave hides, decide.
         ({"rest": 0.0}, "ambiguous"),
     ],

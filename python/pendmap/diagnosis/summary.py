@@ -129,7 +129,6 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "left": {
             "z": judgement.left,
             "uneven": judgement.uneven,
-            "spread": judgement.spread,
             "torque_by_chance": judgement.chance,
             "chance": judgement.form.chance,
             "chances": dict(judgement.form.chances),

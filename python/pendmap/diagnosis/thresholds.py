@@ -45,9 +45,6 @@ class Thresholds:
     forecast : float
         Sum of squares per reading held out, over that per reading fitted or over that of the model
         without an effect, above which a model does not foretell what it was not fitted to.
-    spread : float
-        Standard error of an effect's size by its scatter between the runs, over the size, up to
-        which the runs agree on it.
     sure : float
         Probability of a name below which it is given with reserve.
     """
@@ -64,5 +61,4 @@ class Thresholds:
     shapes: int = 3
     short: float = 0.8
     forecast: float = 1.3
-    spread: float = 0.5
     sure: float = 0.9

@@ -14,8 +14,6 @@ from pendmap.diagnosis.candidates import choices_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Found, State
     from pendmap.residuals.by_run import RunByRun
@@ -49,9 +47,6 @@ class Judgement:
     # How differently the runs would have the parameters, over the standard error of that (Cochran's
     # Q less its degrees of freedom over ``sqrt(2 degrees)``).
     uneven: float
-    # Standard error of the first effect's size by its scatter between the runs beyond noise, over
-    # the size.
-    spread: float
     # That noise alone would show such a torque over angle, velocity, amplitude, drive phase or time
     # as is left.
     chance: float
@@ -87,13 +82,12 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
             key=lambda s: -s.gain,
         )
     )
-    spread = _spread(trial, runs, standings[0].candidate) if standings else 0.0
     sure = probabilities(form.chance, [s.gain for s in standings])
     verdict: Verdict
     if not standings:
         verdict = "unknown" if rest else "none"
     elif rest:
-        verdict = "partial" if closed >= limits.closes and spread <= limits.spread else "unknown"
+        verdict = "partial" if closed >= limits.closes else "unknown"
     elif any(len(standing.equivalent) > 1 for standing in standings):
         verdict = "ambiguous"
     else:
@@ -107,7 +101,6 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
         best.held.chi2 / max(best.held.degrees, 1),
         closed,
         runs.uneven,
-        spread,
         chance,
         form,
         sure,
@@ -124,13 +117,6 @@ def _foretold(best: Found, ratio: float) -> float:
 
     readings = max(best.held.degrees / best.trial.level, 1.0)
     return float(chdtrc(readings, best.held.chi2 / ratio / best.trial.level))
-
-
-def _spread(trial: Trial, runs: RunByRun, candidate: Candidate) -> float:
-    """Return the standard error of an effect's size by its scatter between runs, over the size."""
-    size = candidate.free[0]
-    error = runs.between(size) / math.sqrt(max(len(runs.shown(size)), 1))
-    return error / max(abs(trial.fit[size]), 1e-300)
 
 
 def _closed(state: State, best: Found) -> float:
