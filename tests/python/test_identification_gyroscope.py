@@ -99,6 +99,10 @@ def test_a_gain_is_fitted_on_demand(tmp_path: Path) -> None:
     experiment = Experiment(Path(), (run,))
     best = identify_experiment(experiment, methods=["trajectory"], effects=["encoder_gain"]).best
     agrees(best, {**TRUTH, "encoder_gain.e": -0.25, "bias": 0.01})
+    # Drag would mend a part of it, if it drove the motion.
+    assert identify_experiment(experiment, methods=["trajectory"]).with_drag is None
+    best = identify_experiment(experiment, methods=["trajectory"], effects=["quadratic_drag"]).best
+    assert any(w.startswith("quadratic_drag.q is -") for w in best.warnings)
 
 
 def test_intervals_hold_the_truth(tmp_path: Path) -> None:

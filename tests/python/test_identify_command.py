@@ -97,6 +97,20 @@ def test_some_methods_and_an_effect(decay_file: Path, pendmap_command: Run) -> N
     assert low - (high - low) < 0 < high + (high - low)
 
 
+def test_drag_is_tried_where_the_residual_exceeds_the_noise(
+    tmp_path: Path, decay_file: Path, pendmap_command: Run
+) -> None:
+    rig = ("rig", "free_decay", "--effect", "quadratic_drag", "--size", 3, "--out", "dragged")
+    assert pendmap_command(*rig).returncode == 0
+    truth = tomllib.loads((tmp_path / "dragged.truth.toml").read_text(encoding="utf-8"))
+    q = truth["effect"][0]["parameters"]["q"]
+    assert json.loads(pendmap_command("identify", decay_file, "--json").stdout)["with_drag"] is None
+    found = json.loads(pendmap_command("identify", "dragged", "--json").stdout)
+    assert found["with_drag"]["parameters"]["quadratic_drag.q"] == pytest.approx(q, rel=0.01)
+    assert found["with_drag"]["rms"] < 0.5 * found["rms"]
+    assert "\nWith quadratic_drag (q = 0.0" in pendmap_command("identify", "dragged").stdout
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [

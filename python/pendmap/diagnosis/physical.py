@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.diagnosis.fitted_model import LITTLE, fitted
 from pendmap.errors import FitDiverged
+from pendmap.model.effects import opposes
 
 if TYPE_CHECKING:
     from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Trial
 
-__all__ = ["signed_sizes", "within_physics"]
+__all__ = ["within_physics"]
 
 OPPOSING: Final = ("c_over_m", "Tr")
 """Coefficients that oppose the motion: 0 or more."""
@@ -54,14 +55,6 @@ def within_physics(evidence: Evidence, trial: Trial, target: float = math.inf) -
     return trial if all(_possible(evidence, trial, c) for c in trial.chosen) else None
 
 
-def signed_sizes(candidate: Candidate) -> bool:
-    """Whether a size may have either sign: a library entry with a positive range opposes motion."""
-    definition = candidate.definition
-    if definition["group"] != "damping":
-        return True
-    return bool(_entry(candidate, candidate.size)["typical"][0] < 0)
-
-
 def _possible(evidence: Evidence, trial: Trial, candidate: Candidate) -> bool:
     estimates = trial.fit.estimates
     wide = math.sqrt(trial.level)
@@ -69,7 +62,7 @@ def _possible(evidence: Evidence, trial: Trial, candidate: Candidate) -> bool:
     if size is None:
         return True
     error = ERRORS * wide * (size.stderr or 0.0)
-    if not signed_sizes(candidate) and size.value < -error:
+    if opposes(candidate.definition) and size.value < -error:
         return False
     for name in candidate.shape:
         estimate = estimates.get(f"{candidate.name}.{name}")

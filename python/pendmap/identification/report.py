@@ -226,7 +226,7 @@ def identify_experiment(
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
-    """Return a fit with quadratic drag, where the one without leaves more than the noise."""
+    """Return a fit with drag, positive, where the one without leaves more than the noise."""
     noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
     if joint.fit.rms < MISSES * noise:
         return None
@@ -234,7 +234,9 @@ def _with_drag(joint: JointFit) -> JointFit | None:
         found = fit_together(joint.runs, start=joint.fit.model, effects=[DRAG])
     except FitDiverged:
         return None
-    return found if found.fit.rms < joint.fit.rms else None
+    drag = next(effect for effect in found.fit.model.effects if effect.name == DRAG)
+    opposes = min(drag.values) > 0
+    return found if opposes and found.fit.rms < joint.fit.rms else None
 
 
 def _best(

@@ -21,6 +21,7 @@ from pendmap.identification.from_start import OFFSET, TooShortError, fit_from_st
 from pendmap.identification.reading import Reading, reading_of
 from pendmap.identification.result import Estimate, Identification
 from pendmap.identification.runs import FitRun
+from pendmap.model.effects import opposes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -209,7 +210,10 @@ def _warnings(
     fit: TrajectoryFit, estimates: Mapping[str, Estimate], readings: Sequence[Reading]
 ) -> list[str]:
     found = []
-    for name in ("c_over_m", "Tr"):
+    opposing = [
+        f"{e.name}.{size}" for e in fit.model.effects if opposes(e.definition) for size in e.sizes
+    ]
+    for name in ("c_over_m", "Tr", *opposing):
         if name in estimates and estimates[name].value < 0:
             low, high = estimates[name].ci95 or (-math.inf, math.inf)
             found.append(

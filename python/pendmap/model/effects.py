@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pendmap.model.formula import Formula, FormulaKey
     from pendmap.model.units import Units
 
-__all__ = ["Effect", "definition", "is_shape", "library", "middle"]
+__all__ = ["Effect", "definition", "is_shape", "library", "middle", "opposes"]
 
 _NO_SHAPE: Final = ("size", "phase")
 
@@ -37,6 +37,12 @@ def library() -> dict[str, dict[str, Any]]:
 def is_shape(entry: Mapping[str, Any]) -> bool:
     """Whether a parameter says how an effect acts, not how strongly or at which phase."""
     return entry["role"] not in _NO_SHAPE
+
+
+def opposes(definition: Mapping[str, Any]) -> bool:
+    """Whether an effect of this definition is damping whose size is 0 or more."""
+    entries = (entry for entry in definition["parameters"] if entry["role"] == "size")
+    return definition["group"] == "damping" and all(e["typical"][0] >= 0 for e in entries)
 
 
 def middle(entry: Mapping[str, Any]) -> float:
