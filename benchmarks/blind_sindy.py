@@ -56,7 +56,7 @@ import blind_cases
 from blind_report import right, strength, true_names, wilson
 from peers.report import machine, note, say, table
 from pendmap.comparison.data import evidence_of
-from pendmap.identification.joint import as_fit_run
+from pendmap.identification.methods.joint import as_fit_run
 from sindy_choice import choose
 from sindy_forms import Setting, prepared, regression
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from peers.report import machine, note, say, table
-from pendmap.identification.trajectory import identify
+from pendmap.identification.methods.trajectory import identify
 
 NAMES = ("w0", "c_over_m", "Tr", "offset")
 HEADERS = ("parameter", "cover %", "95 % of that", "wanted", "rms / bound", "wanted", "median z^2")

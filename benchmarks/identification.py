@@ -22,21 +22,11 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 import numpy as np
 
 from peers.report import machine, note, say, table
-from pendmap.identification import (
-    METHODS,
-    Estimate,
-    Identification,
-    Peaks,
-    combined,
-    de_paula,
-    decrement,
-    find_peaks,
-    identify,
-    log_decrement,
-)
+from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, identify
+from pendmap.identification.methods.registry import combined, de_paula, decrement, log_decrement
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
-from pendmap.virtual_rig.drive import Drive
+from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
 from pendmap.virtual_rig.sensor import Sensor

@@ -23,9 +23,9 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from pendmap.diagnosis.candidates import Candidate, candidates
 from pendmap.model import Rig
 from pendmap.virtual_rig import EFFECTS
-from pendmap.virtual_rig.drive import Drive
+from pendmap.virtual_rig.effects.base import Drive
+from pendmap.virtual_rig.effects.readings import ReadingEffect
 from pendmap.virtual_rig.equation import Equation, Parameters
-from pendmap.virtual_rig.readings import ReadingEffect
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.identification.runs import FitRun
-    from pendmap.virtual_rig.effect import Effect
+    from pendmap.virtual_rig.effects.base import Effect
 
     Floats = NDArray[np.float64]
 

@@ -31,20 +31,12 @@ import blind_cases
 from peers.report import machine, note, say, table
 from pendmap import comparison
 from pendmap.comparison.data import Evidence
-from pendmap.diagnosis import (
-    diagnose,
-    fitted_model,
-    held,
-    intervals,
-    model_error,
-    physical,
-    scores,
-)
+from pendmap.diagnosis import diagnose, fitted_model, held, model_error, physical, refit, scores
 from pendmap.diagnosis.fitted_model import Trial
 from pendmap.diagnosis.held import Held
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
-from pendmap.identification.fitting import TrajectoryFit
+from pendmap.identification.fit import TrajectoryFit
 from pendmap.identification.runs import FitRun
 from pendmap.model.effects import library
 from pendmap.records import Experiment
@@ -78,7 +70,7 @@ REMEMBERED = {
     "scores_of": scores,
     "tried": held,
     "predictive": held,
-    "profiles": intervals,
+    "profiles": refit,
     "residual_torque": torque,
     "run_by_run": by_run,
 }

@@ -17,8 +17,6 @@ from pendmap import (
     basins,
     bifurcation,
     figures,
-    paper_figures,
-    paper_motions,
     parameter_map,
     read_experiment,
     simulate,
@@ -26,6 +24,8 @@ from pendmap import (
 )
 from pendmap.diagnosis import diagnose
 from pendmap.figures import style
+from pendmap.paper import figures as paper_figures
+from pendmap.paper import motions as paper_motions
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)

@@ -13,14 +13,24 @@ TYPE_CHECKING = False  # importing typing takes most of the time that this file 
 if TYPE_CHECKING:
     from typing import Any
 
-    from pendmap.critical_curves import tongues
-    from pendmap.diagrams import bifurcation
+    from pendmap.analysis.basins import basins, basins_of
+    from pendmap.analysis.bifurcation import bifurcation
+    from pendmap.analysis.fractality import (
+        BasinEntropy,
+        UncertaintyExponent,
+        basin_entropy,
+        uncertainty_exponent,
+    )
+    from pendmap.analysis.grid import Axis, Grid
+    from pendmap.analysis.lifetime import lifetime
+    from pendmap.analysis.lyapunov import lyapunov
+    from pendmap.analysis.melnikov import melnikov
+    from pendmap.analysis.orbits import orbit
+    from pendmap.analysis.parameter_map import parameter_map
+    from pendmap.analysis.tongues import tongues
+    from pendmap.analysis.trajectory import advance, simulate
     from pendmap.errors import FitDiverged, InputError
-    from pendmap.exponents import lyapunov
-    from pendmap.grid import Axis, Grid
-    from pendmap.homoclinic import melnikov
-    from pendmap.lifetimes import lifetime
-    from pendmap.maps import basins, basins_of
+    from pendmap.files.dataset import load, save
     from pendmap.model import (
         PRESETS,
         Effect,
@@ -32,8 +42,6 @@ if TYPE_CHECKING:
         save_model,
     )
     from pendmap.model.library import EffectDefinition, EffectParameter, effects
-    from pendmap.orbits import orbit
-    from pendmap.planes import parameter_map
     from pendmap.records import (
         Experiment,
         Finding,
@@ -43,10 +51,6 @@ if TYPE_CHECKING:
         noise_floor,
         read_experiment,
     )
-    from pendmap.store import load, save
-    from pendmap.texture import BasinEntropy, basin_entropy
-    from pendmap.trajectory import advance, simulate
-    from pendmap.uncertainty import UncertaintyExponent, uncertainty_exponent
 
     __version__: str
 
@@ -94,15 +98,15 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Axis": "grid",
-    "BasinEntropy": "texture",
+    "Axis": "analysis.grid",
+    "BasinEntropy": "analysis.fractality",
     "Effect": "model",
     "EffectDefinition": "model.library",
     "EffectParameter": "model.library",
     "Experiment": "records",
     "Finding": "records",
     "Formula": "model",
-    "Grid": "grid",
+    "Grid": "analysis.grid",
     "FitDiverged": "errors",
     "InputError": "errors",
     "NoiseFloor": "records",
@@ -111,28 +115,28 @@ _HOMES = {
     "Rig": "model",
     "Run": "records",
     "Segment": "records",
-    "UncertaintyExponent": "uncertainty",
-    "advance": "trajectory",
-    "basin_entropy": "texture",
-    "basins": "maps",
-    "basins_of": "maps",
-    "bifurcation": "diagrams",
+    "UncertaintyExponent": "analysis.fractality",
+    "advance": "analysis.trajectory",
+    "basin_entropy": "analysis.fractality",
+    "basins": "analysis.basins",
+    "basins_of": "analysis.basins",
+    "bifurcation": "analysis.bifurcation",
     "effects": "model.library",
-    "lifetime": "lifetimes",
-    "load": "store",
+    "lifetime": "analysis.lifetime",
+    "load": "files.dataset",
     "load_formulas": "model",
     "load_model": "model",
-    "lyapunov": "exponents",
-    "melnikov": "homoclinic",
+    "lyapunov": "analysis.lyapunov",
+    "melnikov": "analysis.melnikov",
     "noise_floor": "records",
-    "orbit": "orbits",
-    "parameter_map": "planes",
+    "orbit": "analysis.orbits",
+    "parameter_map": "analysis.parameter_map",
     "read_experiment": "records",
-    "save": "store",
+    "save": "files.dataset",
     "save_model": "model",
-    "simulate": "trajectory",
-    "tongues": "critical_curves",
-    "uncertainty_exponent": "uncertainty",
+    "simulate": "analysis.trajectory",
+    "tongues": "analysis.tongues",
+    "uncertainty_exponent": "analysis.fractality",
 }
 
 

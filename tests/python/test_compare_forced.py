@@ -13,11 +13,11 @@ import pytest
 import pendmap
 from driven_decays import motion
 from pendmap import InputError, Rig, virtual_rig
-from pendmap.identification import Ensemble, compare
-from pendmap.identification.forced import Statistic
-from pendmap.identification.neighbourhood import Simulated, Start
+from pendmap.comparison import Ensemble, compare
+from pendmap.comparison.ensemble import Simulated, Start
+from pendmap.comparison.forced import Statistic
+from pendmap.comparison.steady import Cycle
 from pendmap.identification.runs import FitRun
-from pendmap.identification.steady import Cycle
 from pendmap.records import Experiment, Run, read_experiment
 from pendmap.virtual_rig import RunPlan
 

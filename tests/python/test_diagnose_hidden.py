@@ -10,7 +10,7 @@ from hidden import diagnosed
 from pendmap import virtual_rig
 from pendmap.diagnosis import diagnose
 from pendmap.errors import InputError
-from pendmap.identification.fitting import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import FitDiverged, InputError
-from pendmap.identification.fitting import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:

@@ -10,8 +10,9 @@ import pytest
 
 import pendmap
 from drawn import made, named
-from pendmap import Pendulum, Rig, figures, palette
-from pendmap.pictures import diagrams as drawn
+from pendmap import Pendulum, Rig, figures
+from pendmap.charts import bifurcation as drawn
+from pendmap.charts import palette
 from recordings import recorded
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from scipy.stats import norm, truncnorm
 
 import pendmap
 from pendmap import Axis, Effect, Grid, InputError, Pendulum, Rig
-from pendmap.draws import Draws, drawn
-from pendmap.draws.basins import basins_over
+from pendmap.analysis.draws import Draws, drawn
+from pendmap.analysis.draws.basins import basins_over
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

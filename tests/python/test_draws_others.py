@@ -16,7 +16,7 @@ import pendmap
 from pendmap import Axis, Grid, InputError, Pendulum, Rig, cli, figures, viewer
 from pendmap.figures import style
 from pendmap.identification import identify_experiment
-from pendmap.identification.model_file import identified_model, provenance
+from pendmap.identification.experiment import identified_model, provenance
 
 if TYPE_CHECKING:
     from pathlib import Path

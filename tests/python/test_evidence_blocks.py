@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from driven_decays import motion
 from pendmap.comparison.data import in_blocks
-from pendmap.identification.fitting import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.runs import FitRun
 from pendmap.model import Rig
 

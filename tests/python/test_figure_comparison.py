@@ -13,8 +13,9 @@ from matplotlib.text import Text
 from decays import decay, record
 from drawn import written
 from pendmap import Rig, virtual_rig
-from pendmap.figures import comparison, motions, style
-from pendmap.identification import Comparison, Ensemble, compare
+from pendmap.comparison import Comparison, Ensemble, compare
+from pendmap.figures import comparison, style
+from pendmap.paper import drawings
 from pendmap.records import Experiment, Run, read_experiment
 from pendmap.virtual_rig import RunPlan
 from test_figure_overlap import overlap, shown
@@ -86,8 +87,8 @@ def test_forced_runs_have_rows_in_which_nothing_overlaps(seconds: float, tmp_pat
     with rc_context(style.RC):
         sheets = [
             comparison.figure(found, dpi=100.0),
-            motions.steady_figure(found.forced, dpi=100.0, title="Steady", subtitle="rig"),
-            motions.tumbling_figure(found.forced, dpi=100.0, title="Tumbling", subtitle="rig"),
+            drawings.steady_figure(found.forced, dpi=100.0, title="Steady", subtitle="rig"),
+            drawings.tumbling_figure(found.forced, dpi=100.0, title="Tumbling", subtitle="rig"),
         ]
         for figure in sheets:
             figure.canvas.draw()

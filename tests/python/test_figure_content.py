@@ -14,7 +14,7 @@ import motions
 import pendmap
 import synthetic
 from drawn import made, named, titles, written
-from pendmap import palette
+from pendmap.charts import palette
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

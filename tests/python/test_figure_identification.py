@@ -16,15 +16,16 @@ from matplotlib.text import Text
 import pendmap
 from decays import decay, record
 from pendmap import figures
+from pendmap.charts import identification, methods
 from pendmap.figures import identification as drawing
-from pendmap.figures import pendulum, style
+from pendmap.figures import style
 from pendmap.figures.decrements import triplets_of
 from pendmap.figures.half_cycles import course_of
 from pendmap.figures.sides import signed_log_axis
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
-from pendmap.identification.decrement import recursion
+from pendmap.identification.methods.decrement import recursion
 from pendmap.identification.summary import with_error
-from pendmap.pictures import methods, table1
+from pendmap.paper import drawings
 from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def test_the_pendulum(tmp_path: Path) -> None:
     assert figures.draw_pendulum(tmp_path / "a.png").stat().st_size > 5000
     for size in (None, (9.0, 5.6), (5.6, 8.0)):
         with rc_context(style.RC):
-            figure = pendulum.figure(size=size, dpi=100.0)
+            figure = drawings.figure(size=size, dpi=100.0)
             figure.canvas.draw()
         assert_room(figure)
 
@@ -207,11 +208,11 @@ def test_colours_differ() -> None:
 
 def test_the_table_says_what_was_found() -> None:
     found = report("whole")
-    rows = table1.rows(found)
-    assert [len(row) for row in rows] == [len(table1.columns(found))] * len(rows)
+    rows = identification.rows(found)
+    assert [len(row) for row in rows] == [len(identification.columns(found))] * len(rows)
     assert rows[0][0] == "trajectory"
     assert float(rows[0][1].partition("(")[0]) == pytest.approx(6.2, abs=1e-3)
-    said = with_error(Estimate(-0.0123456, 0.00123), minus=table1.MINUS)
+    said = with_error(Estimate(-0.0123456, 0.00123), minus=identification.MINUS)
     assert said == "\u22120.0123(12)"
 
 

@@ -13,7 +13,7 @@ import pytest
 import fractals
 import pendmap
 from pendmap import Grid, InputError, Pendulum
-from pendmap.uncertainty import fitted
+from pendmap.analysis.fractality import fitted
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,10 +10,10 @@ import pytest
 
 from hidden import once
 from pendmap import Rig
+from pendmap.comparison import compare
 from pendmap.comparison.forecast import forecasts_of
 from pendmap.comparison.replay import Motion, replayed, strength_of
 from pendmap.diagnosis import diagnosed_model
-from pendmap.identification import compare
 from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from accelerations import GRAVITY, TRUTH, experiment, readings
 from decays import decay, record
 from pendmap import InputError, figures
 from pendmap.comparison.data import evidence_of
+from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify, identify_experiment
-from pendmap.identification.compare import compare
 from pendmap.identification.summary import as_json, as_text
 from pendmap.records import Experiment
 

@@ -10,8 +10,8 @@ import pytest
 
 from decays import decay, record
 from pendmap import InputError
+from pendmap.formatting import interval
 from pendmap.identification import Estimate, identified_model, identify_experiment
-from pendmap.identification.digits import interval
 from pendmap.identification.summary import as_json, as_text
 from pendmap.records import Experiment, Run
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from decays import decay, record
-from pendmap.identification import compare, find_peaks, identify, identify_experiment
+from pendmap.comparison import compare
+from pendmap.identification import find_peaks, identify, identify_experiment
 from pendmap.records import Experiment, Run
 
 STAMP = 1.7e9

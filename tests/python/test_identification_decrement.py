@@ -11,10 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decays import decay, record
-from pendmap.identification import Peaks, combined, de_paula, decrement, log_decrement, repair
-from pendmap.identification.methods import identify_peaks
+from pendmap.identification import Peaks
+from pendmap.identification.methods.registry import (
+    combined,
+    de_paula,
+    decrement,
+    identify_peaks,
+    log_decrement,
+    repaired,
+    scatter,
+)
 from pendmap.identification.period import frequency, mean_period
-from pendmap.identification.scatter import scatter
 
 WIDE = decay()
 
@@ -56,7 +63,7 @@ def test_the_repair_finds_the_zero_too(zero: float, theta_r: float, delta: float
     times = np.concatenate(([0.0], np.cumsum(quarter[1:] + quarter[:-1])))
     times /= w0 * math.sqrt(1 - zeta**2)
     peaks = Peaks.of(times, made * (-1.0) ** np.arange(made.size) + zero)
-    found = repair.from_peaks(peaks)
+    found = repaired.from_peaks(peaks)
     assert found["offset"] == pytest.approx(zero, abs=1e-9)
     assert found["w0"] == pytest.approx(w0, rel=1e-8)
     assert found["Tr"] == pytest.approx(theta_r * w0**2, rel=1e-6)
@@ -121,7 +128,7 @@ def test_mean_periods_of_wide_swings_give_a_low_w0(truths: dict[str, Any]) -> No
 @pytest.mark.parametrize("offset_deg", [0.0, 0.05, -0.3])
 def test_the_repair_of_a_noisy_record(offset_deg: float) -> None:
     time, angle = record(WIDE, counts=4096, offset=math.radians(offset_deg), seed=5)
-    found = repair.identify(time, angle)
+    found = repaired.identify(time, angle)
     assert found.applicable
     assert found["offset"] == pytest.approx(math.radians(offset_deg), abs=5e-4)
     assert found["w0"] == pytest.approx(6.2, rel=3e-4)
@@ -137,7 +144,7 @@ def test_the_errors_of_the_repair_are_honest() -> None:
     off = []
     for seed in range(60):
         time, angle = record(small, seconds=25, noise_deg=0.1, seed=seed)
-        found = repair.identify(time, angle)
+        found = repaired.identify(time, angle)
         true = {"w0": 6.2, "c_over_m": 0.05, "Tr": 0.05, "offset": 0.0}
         off.append([(found[n] - v) / (found.estimates[n].stderr or 0) for n, v in true.items()])
     scatter = np.std(off, axis=0)
@@ -155,12 +162,12 @@ def test_an_offset_makes_triplets_alternate_and_readings_differ() -> None:
     ends = combined.from_peaks(made, reading="odd_ends")
     triplets = combined.from_peaks(made, reading="odd_triplets")
     assert abs(triplets["c_over_m"] - ends["c_over_m"]) > 0.5 * abs(ends["c_over_m"])
-    assert repair.from_peaks(made)["offset"] == pytest.approx(1e-3, abs=1e-5)
+    assert repaired.from_peaks(made)["offset"] == pytest.approx(1e-3, abs=1e-5)
 
 
 def test_a_record_that_ends_above_12_degrees_is_not_for_the_printed_method() -> None:
     time, angle = record(WIDE, seconds=30)
-    for method in (combined.identify, combined.identify_odd_ends, repair.identify):
+    for method in (combined.identify, combined.identify_odd_ends, repaired.identify):
         found = method(time, angle)
         assert not found.applicable
         assert not found.estimates
@@ -193,7 +200,7 @@ def test_a_short_record_is_told_how_many_peaks_of_how_many_it_lacks(count: int) 
     size = np.concatenate(([1.4, 0.4], small)) * (-1.0) ** np.arange(count + 2)
     made = Peaks.of(np.arange(count + 2) * 0.5, size)
     total = count + 2
-    for method, least in ((combined.from_peaks, 4), (repair.from_peaks, 6)):
+    for method, least in ((combined.from_peaks, 4), (repaired.from_peaks, 6)):
         said = method(made).warnings[-1]
         assert f"{count} of {total} peaks under 12 degrees, {least} are needed" in said
     if count < 3:

@@ -15,9 +15,9 @@ import pendmap
 from decays import decay, record
 from pendmap import InputError, figures
 from pendmap.comparison.data import evidence_of
+from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify_experiment
-from pendmap.identification.compare import compare
-from pendmap.identification.joint import fit_together
+from pendmap.identification.methods.joint import fit_together
 from pendmap.records import Experiment, Run
 from pendmap.records.summary import as_json, as_text
 

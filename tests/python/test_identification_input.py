@@ -10,7 +10,8 @@ import pytest
 
 from decays import decay, record
 from pendmap import InputError, Pendulum, Rig
-from pendmap.identification import compare, identify, identify_experiment
+from pendmap.comparison import compare
+from pendmap.identification import identify, identify_experiment
 from pendmap.records import Experiment
 
 THERE = Experiment(Path("there"), ())

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from pendmap.identification.fitting import fit_runs
-from pendmap.identification.from_start import fit_from_start
-from pendmap.identification.reading import reading_of
+from pendmap.identification.fit import fit_runs
+from pendmap.identification.methods.trajectory import fit_from_start, identify
+from pendmap.identification.readings import reading_of
 from pendmap.identification.runs import FitRun
-from pendmap.identification.trajectory import identify
-from pendmap.identification.window_fit import smoothed_velocity
 from pendmap.model import Rig
 from pendmap.records.noise import noise_of
 from pendmap.records.summary import noise_said
+from pendmap.signal.window_polynomial import smoothed_velocity
 
 FINE = np.arange(-200, 60_200) / 2000
 TIME = np.arange(3000) * 0.01

@@ -15,16 +15,14 @@ from pendmap.identification import (
     Estimate,
     Identification,
     Peaks,
-    de_paula,
-    energy_balance,
     find_peaks,
     global_start,
     identify,
-    log_decrement,
     starting_values,
     table1,
 )
-from pendmap.identification.envelope import envelope, viscous_work
+from pendmap.identification.methods.registry import de_paula, energy_balance, log_decrement
+from pendmap.identification.period import envelope, viscous_work
 
 WIDE = decay()
 BOTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}

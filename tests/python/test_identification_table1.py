@@ -8,8 +8,9 @@ import numpy as np
 
 from decays import decay, record
 from pendmap import Rig
-from pendmap.identification import Estimate, Identification, compare
-from pendmap.identification.compared import as_text, tables
+from pendmap.comparison import compare
+from pendmap.comparison.free import as_text, tables
+from pendmap.identification import Estimate, Identification
 from pendmap.identification.table1 import table1
 from pendmap.records import Experiment, Run
 

@@ -12,10 +12,10 @@ import pytest
 
 from driven_decays import motion
 from pendmap.errors import InputError
-from pendmap.identification.fitting import FitRun, Pivot, fit_runs, score
-from pendmap.identification.reading import reading_of
-from pendmap.identification.rough import rough_start
-from pendmap.identification.trajectory import fit_decay, identify
+from pendmap.identification.fit import FitRun, Pivot, fit_runs, score
+from pendmap.identification.methods.trajectory import fit_decay, identify
+from pendmap.identification.readings import reading_of
+from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
 

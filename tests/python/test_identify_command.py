@@ -15,8 +15,8 @@ import pytest
 
 from conftest import COMMAND
 from decays import decay, record
+from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate
-from pendmap.identification.digits import with_error
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -199,7 +199,7 @@ def test_a_wrong_unit_is_said_before_all_else(
     ],
 )
 def test_numbers_with_their_errors(value: float, error: float | None, shown: str) -> None:
-    assert with_error(Estimate(value, error)) == shown
+    assert estimate_text(Estimate(value, error)) == shown
 
 
 def test_a_reader_that_goes_away_is_no_failed_check(decay_file: Path, tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ import pytest
 import xarray as xr
 
 import pendmap
-from pendmap import Axis, Grid, InputError, Pendulum, summary
+from pendmap import Axis, Grid, InputError, Pendulum
+from pendmap.analysis import summary
 
 if TYPE_CHECKING:
     from pathlib import Path

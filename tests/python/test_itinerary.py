@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pendmap.itinerary import Itineraries, Ruler, repeats, wells
+from pendmap.comparison.itinerary import Itineraries, Ruler, repeats, wells
 
 TICK, PERIOD = 0.01, 0.73
 RULER = Ruler(TICK, 1.0, PERIOD, 0.001)

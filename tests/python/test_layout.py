@@ -16,8 +16,9 @@ import motions
 import pendmap
 import synthetic
 from pendmap import InputError
+from pendmap.charts import basins as layers
+from pendmap.charts import plane
 from pendmap.figures import basins, style
-from pendmap.pictures import layers, plane
 
 MAPS = {
     "usual": synthetic.painted(),

@@ -11,7 +11,8 @@ import pytest
 
 import pendmap
 from drawn import made, named
-from pendmap import Effect, Pendulum, Rig, survival
+from pendmap import Effect, Pendulum, Rig
+from pendmap.analysis import survival
 from recordings import recorded
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 import pendmap
 from drawn import made, named
 from pendmap import Effect, Pendulum, Rig
-from pendmap.separatrices import loop
+from pendmap.analysis.melnikov import loop
 from recordings import recorded
 
 if TYPE_CHECKING:

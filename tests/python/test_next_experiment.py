@@ -23,8 +23,8 @@ from pendmap.diagnosis.next_experiment.power import one_left, wrong_name
 from pendmap.diagnosis.next_experiment.proposals import menu_of
 from pendmap.diagnosis.summary import as_json
 from pendmap.errors import InputError
-from pendmap.identification.joint import as_fit_run
-from pendmap.identification.reading import reading_of
+from pendmap.identification.methods.joint import as_fit_run
+from pendmap.identification.readings import reading_of
 from pendmap.records import read_experiment
 from pendmap.virtual_rig import Request, RunPlan
 

@@ -10,8 +10,9 @@ import pytest
 
 from decays import decay, record
 from pendmap import Rig
-from pendmap.identification import compare, identify_experiment
-from pendmap.notebook import Readable
+from pendmap.comparison import compare
+from pendmap.formatting import Readable
+from pendmap.identification import identify_experiment
 from pendmap.records import Experiment, Run
 
 TIME, ANGLE = record(decay(release=1.0, until=40.0), seconds=20)

@@ -12,9 +12,11 @@ import pytest
 from click.testing import CliRunner
 
 import pendmap
-from pendmap import figures, paper_figures, paper_motions, virtual_rig
-from pendmap.cli.paper_command import command
-from pendmap.figures import tumbling
+from pendmap import figures, virtual_rig
+from pendmap.cli.paper import command
+from pendmap.paper import figures as paper_figures
+from pendmap.paper import motions as paper_motions
+from pendmap.paper import tumbling
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 
 import motions
 import synthetic
-from pendmap.pictures import layers, legend, plane
+from pendmap.charts import basins, legend, plane
 
 
 def test_a_pixel_has_the_cell_that_its_centre_lies_in() -> None:
@@ -81,10 +81,10 @@ def test_percent_has_the_digits_its_error_supports(share: float, stderr: float, 
 
 
 def test_layers_lead_as_the_map_demands() -> None:
-    assert layers.layers(synthetic.painted()) == ("labels", "settle", "turns")
-    assert layers.layers(synthetic.painted(**synthetic.UNRELIABLE)) == ("settle", "turns", "labels")
-    assert layers.layers(motions.chaotic(cells=16, periods=3)) == ("turns", "exponent")
-    assert layers.layers(synthetic.painted(synthetic.USUAL[10:12])) == ("labels", "turns")
+    assert basins.layers(synthetic.painted()) == ("labels", "settle", "turns")
+    assert basins.layers(synthetic.painted(**synthetic.UNRELIABLE)) == ("settle", "turns", "labels")
+    assert basins.layers(motions.chaotic(cells=16, periods=3)) == ("turns", "exponent")
+    assert basins.layers(synthetic.painted(synthetic.USUAL[10:12])) == ("labels", "turns")
 
 
 def test_a_legend_entry_has_the_colour_of_its_cells() -> None:

@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import InputError
-from pendmap.virtual_rig.drive import Drive
+from pendmap.virtual_rig.effects.base import Drive
+from pendmap.virtual_rig.effects.stand import PivotCompliance
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
-from pendmap.virtual_rig.stands import PivotCompliance
 
 if TYPE_CHECKING:
     from pendmap.virtual_rig.path import Path

@@ -13,10 +13,10 @@ import xarray as xr
 import pendmap
 from drawn import made, named, titles
 from pendmap import Effect, Grid, Pendulum, Rig, figures
-from pendmap.cell_search import spread
-from pendmap.pictures import planes as drawn
-from pendmap.planes import undecided_cells
-from pendmap.regimes import kind_of, regimes
+from pendmap.analysis.parameter_map import undecided_cells
+from pendmap.analysis.regimes import kind_of, regimes
+from pendmap.analysis.sweep import spread
+from pendmap.charts import parameter_map as drawn
 from recordings import recorded
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
 from pendmap.diagnosis.fitted_model import with_candidates
 from pendmap.diagnosis.named import diagnosed_model
-from pendmap.identification.fitting import FitRun, fit_runs, score
+from pendmap.identification.fit import FitRun, fit_runs, score
 from pendmap.identification.sensitivity import sensitivities, window_slopes
 from pendmap.model import Formula, Rig, load_model, save_model
 from pendmap.model.effects import Effect

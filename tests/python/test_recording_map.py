@@ -10,7 +10,7 @@ import pytest
 
 import motions
 import synthetic
-from pendmap import palette
+from pendmap.charts import palette
 from pendmap.viewer import basins
 from recordings import recorded
 

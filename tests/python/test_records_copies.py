@@ -10,7 +10,8 @@ import pytest
 
 import pendmap
 import recorded
-from pendmap.identification import compare, identify_experiment
+from pendmap.comparison import compare
+from pendmap.identification import identify_experiment
 
 if TYPE_CHECKING:
     from pathlib import Path

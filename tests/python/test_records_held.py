@@ -11,7 +11,9 @@ import pytest
 import pendmap
 from accelerations import GRAVITY, SENSORS, TRUTH, column, experiment, handled, readings
 from pendmap import InputError
-from pendmap.identification import compare, compared, identify_experiment, summary
+from pendmap.comparison import compare
+from pendmap.comparison import free as compared
+from pendmap.identification import identify_experiment, summary
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from pendmap.identification.trajectory import identify
+from pendmap.identification.methods.trajectory import identify
 from recorded import W0, found, motion, noisy, read, text
 
 if TYPE_CHECKING:

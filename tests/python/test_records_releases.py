@@ -11,12 +11,13 @@ import pytest
 
 import pendmap
 from decays import decay, record
+from pendmap.comparison import compare
 from pendmap.comparison.data import evidence_of
-from pendmap.identification import compare, identified_model, identify_experiment
-from pendmap.identification.compared import as_json as compared
-from pendmap.identification.compared import as_text as compared_text
-from pendmap.identification.joint import as_fit_run
-from pendmap.identification.reading import reading_of
+from pendmap.comparison.free import as_json as compared
+from pendmap.comparison.free import as_text as compared_text
+from pendmap.identification import identified_model, identify_experiment
+from pendmap.identification.methods.joint import as_fit_run
+from pendmap.identification.readings import reading_of
 from pendmap.identification.summary import as_json, as_text
 from pendmap.records import Experiment, Run
 from recorded import TR, W0, C, clean, experiment, found, motion, noisy, text

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pendmap.records.noise import noise_of
-from pendmap.records.still import still_noise
+from pendmap.records.resolution import still_noise
 
 COUNT = math.tau / 1024
 TIME = np.arange(6000) / 100.0

@@ -9,18 +9,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pendmap.virtual_rig.damping import DahlFriction, LoadDependentFriction, SharpStribeckFriction
-from pendmap.virtual_rig.drive import Drive
+from pendmap.virtual_rig.effects.base import Drive
+from pendmap.virtual_rig.effects.damping import (
+    DahlFriction,
+    LoadDependentFriction,
+    SharpStribeckFriction,
+)
+from pendmap.virtual_rig.effects.readings import SensorLag
+from pendmap.virtual_rig.effects.stand import Impulses, ImpulseTrain, PivotCompliance
+from pendmap.virtual_rig.effects.torques import InertiaRipple, Magnet
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
-from pendmap.virtual_rig.readings import SensorLag
-from pendmap.virtual_rig.stands import Impulses, ImpulseTrain, PivotCompliance
-from pendmap.virtual_rig.torques import InertiaRipple, Magnet
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.virtual_rig.effect import Effect
+    from pendmap.virtual_rig.effects.base import Effect
     from pendmap.virtual_rig.path import Path
 
 LOW = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}

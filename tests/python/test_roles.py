@@ -14,7 +14,7 @@ from pendmap import InputError
 from pendmap.diagnosis import candidates as search
 from pendmap.diagnosis.candidates import Candidate, candidates
 from pendmap.model import Effect, effects
-from pendmap.model.units import Units
+from pendmap.units import Units
 
 ROLES = {"size", "width", "place", "power", "order", "time constant", "phase"}
 ROLES |= {"frequency", "instant", "mode"}

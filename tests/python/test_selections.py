@@ -13,10 +13,10 @@ from matplotlib.colors import to_rgb
 
 import pendmap
 from drawn import made, named
-from pendmap import InputError, Pendulum, figures, palette, viewer
+from pendmap import InputError, Pendulum, figures, viewer
+from pendmap.charts import palette, parameter_map
+from pendmap.charts.selection import shown
 from pendmap.figures.trajectory import resting
-from pendmap.pictures import planes
-from pendmap.pictures.selection import shown
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def test_a_parameter_map(*, p: list[int], omega: list[int], turned: bool, tmp_pa
     for axes in figure.axes[:2]:
         assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((*wide, *high))
     kinds, exponent = (axes.images[0] for axes in figure.axes[:2])
-    listed = {kind.colour: kind for kind in planes.kinds(shown(part))}
+    listed = {kind.colour: kind for kind in parameter_map.kinds(shown(part))}
     back = recorded(part, tmp_path)
     image = back.image("/kinds/data/kinds", "SegmentationImage", np.uint8)
     extent = _extent(back, "/kinds/data/kinds", image.shape)

@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 import pendmap
 from models import DRAG, SWING
 from pendmap import Effect, Grid, Pendulum, Rig, figures, viewer
+from pendmap.charts import basins
 from pendmap.figures import style, trajectory
-from pendmap.pictures import layers
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -208,7 +208,7 @@ def test_results_in_si_are_stored_and_drawn(tmp_path: Path, suffix: str) -> None
 
 def test_axes_are_named_in_the_units_of_the_result() -> None:
     run = pendmap.simulate(SWING, 1.0, 3.0, 5.0)
-    parameters = layers.parameters(run.attrs)
+    parameters = basins.parameters(run.attrs)
     assert parameters == (
         "w0 = 6.2 rad/s,  c/m = 0.05 1/s,  p = 0.3,  Ω = 12 rad/s,  phase = 0.4,  "
         "Tr = 0.08 rad/s²;   quadratic drag (q = 0.01 1/rad),  "
@@ -257,7 +257,7 @@ def test_periods_without_drive_are_said_in_the_units_of_the_map(
     model: Rig | Pendulum, own: str, said: str
 ) -> None:
     result = pendmap.basins(model, Grid.square(8))
-    assert layers.unit(result, "settle") == f"periods of {own} to settle"
+    assert basins.unit(result, "settle") == f"periods of {own} to settle"
     assert said in result.attrs["summary"]
     assert "forcing" not in result.settle_periods.attrs["long_name"]
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 import pendmap
 from pendmap import Grid, InputError, Pendulum, figures, viewer
-from pendmap.store import KINDS
+from pendmap.files.dataset import KINDS
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,8 +14,9 @@ from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
 from drawn import made, named
-from pendmap import Effect, Formula, Pendulum, Rig, asymptotic, figures
-from pendmap.pictures import tongues as drawn
+from pendmap import Effect, Formula, Pendulum, Rig, figures
+from pendmap.analysis import critical_curves
+from pendmap.charts import tongues as drawn
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -230,9 +231,9 @@ def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_counts_twice() -> No
         assert (np.diff(one["p"].values[one["index"].values == k]) > 1e-6).all()
 
 
-@pytest.mark.parametrize("name", list(asymptotic.CURVES))
+@pytest.mark.parametrize("name", list(critical_curves.CURVES))
 def test_asymptotic_curves_have_the_order_they_say(name: str) -> None:
-    multiplier, formula = asymptotic.CURVES[name]
+    multiplier, formula = critical_curves.CURVES[name]
     # Towards the tip, with damping in proportion: detuning, p and gamma (or its root) all small.
     errors = []
     for size in (0.08, 0.04):

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 
 import pendmap
 from drawn import made
-from pendmap import InputError, palette
+from pendmap import InputError
+from pendmap.charts import palette
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,7 @@ import pendmap
 from models import DRAG, SWING
 from pendmap import Effect, InputError, Pendulum, Rig
 from pendmap.model.effects import library
-from pendmap.model.units import Units
+from pendmap.units import Units
 
 sizes = st.floats(1e-3, 1e3)
 signed = st.floats(-1e3, 1e3)

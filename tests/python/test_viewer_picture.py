@@ -19,7 +19,8 @@ import decays
 import motions
 import pendmap
 import synthetic
-from pendmap import palette, viewer
+from pendmap import viewer
+from pendmap.charts import palette
 from pendmap.identification import identify_experiment
 from pendmap.viewer import decay, window
 from recordings import ReadBack

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pendmap
-from pendmap.words import with_error, written
+from pendmap.formatting import with_error, written
 
 sizes = st.floats(-12, 6).map(lambda power: 10.0**power)
 

@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-__all__ = ["keep_inputs", "report_files"]
-
 
 def keep_inputs(
     inputs: Iterable[Path | None], outputs: Mapping[str, Iterable[Path | None]]

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import FrameType
 
-__all__ = ["command", "run"]
-
 FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -73,7 +71,7 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
         if cmd_name not in _COMMANDS:
             return None
-        module = importlib.import_module(f"pendmap.cli.{cmd_name}_command")
+        module = importlib.import_module(f"pendmap.cli.{cmd_name}")
         loaded: click.Command = module.command
         return loaded
 

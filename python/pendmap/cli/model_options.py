@@ -20,14 +20,6 @@ if TYPE_CHECKING:
 
     Command = Callable[..., Any]
 
-__all__ = [
-    "model_from",
-    "model_options",
-    "model_options_without",
-    "rig_from",
-    "varied_model_options",
-]
-
 _BARE = {
     "gamma": "Viscous damping c/(m w0).",
     "p": "Amplitude Y Omega^2/g of the drive.",

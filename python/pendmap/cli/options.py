@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.checks import MOST_CELLS, MOST_DRAWS, MOST_PERIODS, MOST_SEED, MOST_THREADS
 from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.types import NUMBER, InstructionSet, OutputFile, Whole
+from pendmap.errors import MOST_CELLS, MOST_DRAWS, MOST_PERIODS, MOST_SEED, MOST_THREADS
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
@@ -20,19 +20,6 @@ if TYPE_CHECKING:
 
     Command = Callable[..., Any]
     Decorator = Callable[[Command], Command]
-
-__all__ = [
-    "RESULTS",
-    "Outputs",
-    "check_view",
-    "draws_option",
-    "output_options",
-    "progress_options",
-    "rate_option",
-    "search_options",
-    "seed_option",
-    "simd_option",
-]
 
 _SIMD = "PENDMAP_SIMD"
 """Names the instruction set; the core reads it whenever a call begins."""

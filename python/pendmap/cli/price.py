@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from pendmap.words import counted
+from pendmap.formatting import counted
 
 if TYPE_CHECKING:
     from pendmap import _core
     from pendmap.model import Pendulum, Rig
-
-__all__ = ["say"]
 
 _TYPICAL: Final = 20
 """A start settles after about this part of its bound: 1/60 to 1/8 for gamma .01 to .0003."""

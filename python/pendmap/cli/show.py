@@ -13,7 +13,7 @@ import click
 
 from pendmap.errors import InputError, NotWrittenError, one_line
 from pendmap.files import COMPLETE, held_interrupts
-from pendmap.notebook import columns
+from pendmap.formatting import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pendmap.cli.options import Outputs
-
-__all__ = [
-    "Written",
-    "open_recording",
-    "open_viewer",
-    "plain",
-    "progress_bar",
-    "searched",
-    "show",
-    "write_all",
-    "write_table",
-]
 
 
 @contextlib.contextmanager
@@ -67,7 +55,7 @@ _SEARCHED = (
 
 def searched(dataset: xr.Dataset) -> dict[str, Any]:
     """Return what the JSON of a search over many pendulums says of the search."""
-    from pendmap.planes import undecided_cells
+    from pendmap.analysis.parameter_map import undecided_cells
 
     a = dataset.attrs
     places = {"undecided_at": undecided_cells(dataset)}
@@ -79,7 +67,7 @@ def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], 
     files = ((functools.partial(write, dataset), path) for write, path in _files(outputs))
     written = write_all(files)
     if outputs.as_json:
-        from pendmap.draws.said import fields
+        from pendmap.analysis.draws.summary import fields
 
         said = {"misses_record": dataset.attrs.get("misses_record"), **fields(dataset)}
         click.echo(json.dumps(plain(as_json(dataset) | said), allow_nan=False))
@@ -171,7 +159,7 @@ def open_recording(path: Path) -> None:
 def _files(outputs: Outputs) -> Iterator[tuple[Callable[[xr.Dataset, Path], Path], Path]]:
     # Each is imported when its turn comes: matplotlib and Rerun take a while.
     if outputs.out is not None:
-        from pendmap.store import save
+        from pendmap.files.dataset import save
 
         yield save, outputs.out
     if outputs.plot is not None:

@@ -10,24 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from pendmap.checks import MOST_CELLS, shown
-from pendmap.errors import InputError
+from pendmap.errors import MOST_CELLS, InputError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-__all__ = [
-    "AXIS",
-    "NUMBER",
-    "NUMBER_OR_RANGE",
-    "RANGE",
-    "VALUES",
-    "AxisText",
-    "OutputFile",
-    "ReportFile",
-    "Whole",
-]
 
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
@@ -75,7 +62,7 @@ class Whole(click.ParamType[int]):
             number = self.least - 1
         if not self.least <= number <= self.most:
             wanted = f"must be a whole number from {self.least} to {self.most}"
-            self.fail(f"{wanted}, got {shown(value)}", param, ctx)
+            self.fail(f"{wanted}, got {short_repr(value)}", param, ctx)
         return number
 
 
@@ -174,7 +161,7 @@ class InstructionSet(click.ParamType[str]):
         available = _core.simd_available()
         if value not in available:
             wanted = f"must be one of {', '.join(available)} on this processor"
-            self.fail(f"{wanted}, got {shown(value)}", param, ctx)
+            self.fail(f"{wanted}, got {short_repr(value)}", param, ctx)
         return str(value)
 
 
@@ -253,7 +240,7 @@ def _library(path: Path) -> None:
             f"({type(error).__name__}: {error}): it must be installed, or another output chosen"
         ) from error
     if suffix == ".zarr":
-        from pendmap.store import check_replaceable
+        from pendmap.files.dataset import check_replaceable
 
         check_replaceable(path)
 

@@ -24,13 +24,11 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import Evidence
     from pendmap.comparison.replay import Fits
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors
 
     Floats = NDArray[np.float64]
-
-__all__ = ["AFTER", "BEFORE", "Cycles", "cycles_of"]
 
 BEFORE: Final = "before"
 AFTER: Final = "after"

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification.joint import as_fit_run
-from pendmap.identification.reading import Reading, reading_of
+from pendmap.identification.methods.joint import as_fit_run
+from pendmap.identification.readings import Reading, reading_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from pendmap.records import Experiment, Run
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Evidence", "evidence_of", "held_parts", "in_blocks"]
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Parts of a run that are held back where no whole run is: a fifth, at large and small swings."""

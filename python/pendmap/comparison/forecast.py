@@ -25,12 +25,10 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import Evidence
     from pendmap.comparison.replay import Fits
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Forecast", "Gap", "RunGap", "forecasts_of", "gap_of"]
 
 REACH: Final = 2 / 3
 """Part of a held-out stretch that a forecast covers; it may start anywhere in the rest."""

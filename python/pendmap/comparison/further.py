@@ -14,8 +14,6 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Reasons", "attempted"]
-
 Reasons = dict[str, str]
 """Why a part was not computed, by its field in the JSON object."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendmap.identification.fitting import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
@@ -16,24 +16,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
     Floats = NDArray[np.float64]
-
-__all__ = [
-    "EXACT",
-    "STEP",
-    "Fits",
-    "Motion",
-    "Strength",
-    "acting",
-    "drives",
-    "replayed",
-    "settled",
-    "strength_of",
-]
 
 OWN: Final = ("w0", "c_over_m", "Tr", "torque")
 """Parameters that stand beside the model: damping may have been fitted negative, and a model has

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.state import State
 
-__all__ = ["Rival", "Standing", "standing_of"]
-
 THIRDS: int = 3
 """Parts of a single run, each of which a name must survive without."""
 

@@ -13,9 +13,9 @@ from pendmap.diagnosis.physical import within_physics
 from pendmap.diagnosis.refit import best_of
 from pendmap.diagnosis.refit import without as leave_out
 from pendmap.errors import FitDiverged, InputError
-from pendmap.identification.fitting import fit_runs
-from pendmap.identification.rough import rough_start
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.start import starting_values
+from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.rig import own_name
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import Evidence
     from pendmap.identification.runs import FitRun
-
-__all__ = ["baseline", "follows", "taken_by"]
 
 SOUND: Final = 1.5
 """Sum of squares for each degree of freedom up to which a fit is taken for what it is."""

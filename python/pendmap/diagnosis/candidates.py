@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap import checks
-from pendmap.errors import InputError
-from pendmap.identification.report import DRAG
+from pendmap.errors import InputError, short_repr
+from pendmap.identification.experiment import DRAG
 from pendmap.model.effects import Effect, definition, is_shape, library, middle
 from pendmap.model.formula import Formula
 from pendmap.model.rig import own_name
@@ -22,18 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.model import Rig
-    from pendmap.model.units import Units
-
-__all__ = [
-    "CORE",
-    "ZERO",
-    "Candidate",
-    "candidates",
-    "checked_own",
-    "choices_of",
-    "commonness",
-    "placed",
-]
+    from pendmap.units import Units
 
 ZERO: Final = "encoder_offset"
 """The sensor's zero: it says nothing of the pendulum, and does not count among the effects."""
@@ -204,7 +192,7 @@ def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
         if not isinstance(effect, Formula):
             raise InputError(
                 "effects must be a Formula, like Formula('mine', '-k*v^5', {'k': -3}), got "
-                f"{checks.shown(effect)}"
+                f"{short_repr(effect)}"
             )
         if not effect.proportional:
             size = effect.entry["parameters"][0]["name"]

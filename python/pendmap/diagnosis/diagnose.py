@@ -15,7 +15,7 @@ from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.functions import FunctionScore, call_once, divided, function_scores
 from pendmap.diagnosis.named import NamedEffect, named_effects
-from pendmap.diagnosis.next_experiment.advice import Advice, advice_of
+from pendmap.diagnosis.next_experiment.limits import Advice, advice_of
 from pendmap.diagnosis.physical import within_physics
 from pendmap.diagnosis.scores import Scores
 from pendmap.diagnosis.search import search
@@ -23,9 +23,9 @@ from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.diagnosis.verdict import Judgement, judge
 from pendmap.errors import FitDiverged, InputError
-from pendmap.identification.astray import refuse_astray
+from pendmap.formatting import Readable
+from pendmap.identification.fit import refuse_astray
 from pendmap.model.effects import definition
-from pendmap.notebook import Readable
 from pendmap.records.summary import unit_wrong
 from pendmap.residuals.by_run import RunByRun, run_by_run
 from pendmap.residuals.torque import Torque, residual_torque, standing_out
@@ -33,13 +33,11 @@ from pendmap.residuals.torque import Torque, residual_torque, standing_out
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
 
-    from pendmap.diagnosis.attempts import Attempt
     from pendmap.diagnosis.functions import TorqueFunction
+    from pendmap.diagnosis.search import Attempt
     from pendmap.diagnosis.state import Found
     from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
-
-__all__ = ["MOST_EFFECTS", "Discrepancy", "diagnose"]
 
 MOST_EFFECTS: Final = 3
 """So many effects are added at most."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.diagnosis.candidates import placed
-from pendmap.identification.fitting import TrajectoryFit, fit_runs
+from pendmap.identification.fit import TrajectoryFit, fit_runs
 from pendmap.identification.valley import nearer
 from pendmap.residuals.noise import Remainder, remainder_of
 
@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
-
-__all__ = [
-    "EXACT",
-    "FEW_STEPS",
-    "GENTLE",
-    "LITTLE",
-    "QUICK",
-    "Trial",
-    "fitted",
-    "settled",
-    "with_candidates",
-]
 
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
@@ -160,7 +148,7 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     """Fit a model to the evidence.
 
     ``zeroed`` are coefficients held at 0; the last arguments are those of
-    :func:`pendmap.identification.fitting.fit_runs`.
+    :func:`pendmap.identification.fit.fit_runs`.
     """
     fit = fit_runs(
         evidence.fitted,

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number, short_repr
 from pendmap.residuals.torque import freed, responses, windows_of
 
 if TYPE_CHECKING:
@@ -31,9 +30,6 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
-
-__all__ = ["FunctionScore", "TorqueFunction", "call_once", "divided", "function_scores"]
-
 
 UNSEEN: Final = 1e-4
 """A torque of which the fitted parameters follow all but this part does nothing of its own."""
@@ -74,14 +70,14 @@ class TorqueFunction:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
-            raise InputError(f"name must be a text, got {checks.shown(self.name)}")
+            raise InputError(f"name must be a text, got {short_repr(self.name)}")
         if not callable(self.function):
-            shown = checks.shown(self.function)
+            shown = short_repr(self.function)
             raise InputError(f"function must be a function of five arguments, got {shown}")
         if not isinstance(self.parameters, Mapping):
-            shown = checks.shown(self.parameters)
+            shown = short_repr(self.parameters)
             raise InputError(f"parameters must be a mapping of numbers, got {shown}")
-        kept = {str(n): checks.number(str(n), value) for n, value in self.parameters.items()}
+        kept = {str(n): check_number(str(n), value) for n, value in self.parameters.items()}
         object.__setattr__(self, "parameters", kept)
 
     def torque(self, place: Mapping[str, Floats], theta: Floats) -> Floats:
@@ -146,7 +142,7 @@ def divided(effects: object) -> tuple[list[TorqueFunction], list[Any]]:
         If they are no list.
     """
     if not isinstance(effects, list | tuple):
-        shown = checks.shown(effects)
+        shown = short_repr(effects)
         raise InputError(f"effects must be a list of Formula and TorqueFunction, got {shown}")
     functions = [effect for effect in effects if isinstance(effect, TorqueFunction)]
     return functions, [effect for effect in effects if not isinstance(effect, TorqueFunction)]

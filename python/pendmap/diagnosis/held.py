@@ -9,7 +9,7 @@ import numpy as np
 
 from pendmap.diagnosis.fitted_model import FEW_STEPS, LITTLE
 from pendmap.errors import FitDiverged
-from pendmap.identification.fitting import TrajectoryFit, fit_runs
+from pendmap.identification.fit import TrajectoryFit, fit_runs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.fitted_model import Trial, Windows
     from pendmap.identification.runs import FitRun
-
-__all__ = ["Held", "predictive", "tried"]
-
 
 FOLDS: Final = 5
 """Folds of stretches that are left out in turn: two fixed stretches alone are luck."""

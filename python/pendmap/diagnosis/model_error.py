@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.identification.runs import FitRun
 
-__all__ = ["model_errors", "weighted"]
-
 
 def model_errors(records: Evidence, trial: Trial) -> tuple[float, ...]:
     """Return the root mean square of what a model leaves in each fitted run, rad.

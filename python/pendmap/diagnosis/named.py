@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.comparison.further import Reasons, attempted
-from pendmap.diagnosis.intervals import Z95, profiles
-from pendmap.diagnosis.refit import elsewhere
-from pendmap.identification.conversion import interval
-from pendmap.identification.model_file import provenance
+from pendmap.diagnosis.refit import Z95, elsewhere, profiles
+from pendmap.identification.experiment import provenance
+from pendmap.identification.parameters import interval
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
 from pendmap.records.summary import doubted
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.verdict import Judgement
     from pendmap.model import Formula, Rig
     from pendmap.residuals.by_run import RunByRun
-
-__all__ = ["NamedEffect", "diagnosed_model", "named_effects", "values_of"]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Trial
 
-__all__ = ["within_physics"]
-
 OPPOSING: Final = ("c_over_m", "Tr")
 """Coefficients that oppose the motion: 0 or more."""
 

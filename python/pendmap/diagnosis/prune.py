@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.refit import Key
     from pendmap.diagnosis.state import State
 
-__all__ = ["pruned", "rivals_of"]
-
 
 def pruned(state: State, best: Trial) -> Trial:
     """Return a model without effects that gain too little, each in its cheapest form.

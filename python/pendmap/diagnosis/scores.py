@@ -45,8 +45,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["CONTAINS", "Score", "Scores", "scores_of"]
-
 PASS: Final = 16
 """So many directions the integrator carries at once: effects beyond them cost another pass, and
 each pass evaluates all effects that the model has."""

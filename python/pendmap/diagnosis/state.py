@@ -23,13 +23,11 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from pendmap.comparison.data import Evidence
-    from pendmap.diagnosis.attempts import Attempt
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.search import Attempt
     from pendmap.diagnosis.thresholds import Thresholds
     from pendmap.model import Formula
-
-__all__ = ["Found", "State"]
 
 SAME: Final = 0.2
 """Part of a standard error by which an error of the model may change and readings keep their

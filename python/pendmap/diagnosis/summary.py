@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.comparison.cycles import AFTER, BEFORE
 from pendmap.diagnosis.named import values_of
-from pendmap.model.unit_names import unit_of
+from pendmap.model.labels import unit_of
 from pendmap.records.summary import doubts, doubts_said, findings_said
 
 if TYPE_CHECKING:
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from pendmap.diagnosis.diagnose import Discrepancy
     from pendmap.diagnosis.state import Found
-
-__all__ = ["as_json", "as_text", "confined", "given_out", "ranking_table", "zeroed"]
 
 SAID: Final = {
     "none": "none: the baseline describes the records to within their noise",

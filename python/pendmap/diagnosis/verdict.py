@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import Found, State
     from pendmap.residuals.by_run import RunByRun
 
-__all__ = ["COEFFICIENTS", "Form", "Judgement", "features", "form_of", "judge", "probabilities"]
-
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
 SEVERAL: Final = 1.0

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pendmap.charts.basins import refuse_too_large
+from pendmap.charts.selection import shown
 from pendmap.errors import InputError
 from pendmap.figures import (
     basins,
@@ -19,9 +21,7 @@ from pendmap.figures import (
     tongues,
     trajectory,
 )
-from pendmap.figures.of_paper import draw_motions, draw_pendulum, draw_tongues, draw_tumbling
 from pendmap.figures.of_records import (
-    RunPanel,
     draw_comparison,
     draw_discrepancy,
     draw_identification,
@@ -29,9 +29,9 @@ from pendmap.figures.of_records import (
     draw_runs,
     write_report,
 )
+from pendmap.figures.runs import RunPanel
 from pendmap.figures.written import SUFFIXES, written
-from pendmap.pictures.layers import refuse_too_large
-from pendmap.pictures.selection import shown
+from pendmap.paper.tumbling import draw_motions, draw_pendulum, draw_tongues, draw_tumbling
 
 if TYPE_CHECKING:
     import os

@@ -13,20 +13,17 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from pendmap import palette
+from pendmap.charts import basins as layering
+from pendmap.charts import legend, palette, plane
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
-from pendmap.model.units import VELOCITY, Units
-from pendmap.pictures import layers as layering
-from pendmap.pictures import legend, plane
+from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["figure"]
 
 CELLS = 1200
 """Rows and columns of a map that a panel takes at most, unless the panel has more pixels."""

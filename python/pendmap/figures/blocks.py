@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from pendmap.identification import IdentificationReport
 
-__all__ = ["NOISE", "NOISE_SAID", "Block", "Box", "named", "say", "sentence"]
-
 HEADING: Final = 0.30
 """Inches of a heading."""
 ROW: Final = 0.19

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from pendmap.figures import blocks, style
 from pendmap.figures.gap import AFTER, name_runs
-from pendmap.pictures.names import unit_of
+from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,14 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from pendmap.diagnosis import Discrepancy
-
-__all__ = [
-    "coefficient_handles",
-    "draw_coefficients",
-    "draw_ranking",
-    "ranking_handles",
-    "shown_coefficients",
-]
 
 RANKED: Final = 8
 """Candidates in the ranking."""

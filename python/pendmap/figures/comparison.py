@@ -9,17 +9,17 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pendmap.charts import names
+from pendmap.charts.methods import MEASURED, look
+from pendmap.comparison.forced import ForcedComparison
+from pendmap.comparison.free import MODEL, RunComparison
 from pendmap.figures import blocks, forced, sides, style
 from pendmap.figures import sheet as sheets
 from pendmap.figures.decays import MOST, draw_residuals
 from pendmap.figures.errors import draw_panels
-from pendmap.identification.compare import MODEL, RunComparison
-from pendmap.identification.forced import ForcedComparison
-from pendmap.identification.joint import as_angles
-from pendmap.model.units import Units
-from pendmap.pictures import names
-from pendmap.pictures.methods import MEASURED, look
-from pendmap.words import counted
+from pendmap.formatting import counted
+from pendmap.identification.methods.joint import as_angles
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -28,12 +28,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from pendmap.comparison import Comparison
     from pendmap.figures.blocks import Box
-    from pendmap.identification import Comparison
 
     Compared = RunComparison | ForcedComparison
-
-__all__ = ["ALL", "CHOSEN", "figure"]
 
 ALL: Final = 3
 """Runs up to which each has a row of its own."""

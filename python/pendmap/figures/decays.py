@@ -10,14 +10,14 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pendmap.analysis.trajectory import simulate
+from pendmap.charts import names
+from pendmap.charts.methods import MEASURED, drawn, look
 from pendmap.figures import blocks, sides, style
 from pendmap.figures.half_cycles import course_of, first_and_last
-from pendmap.identification.report import BEST
+from pendmap.identification.methods.trajectory import METHOD as BEST
 from pendmap.identification.table1 import first_state, simulated_peaks
-from pendmap.model.units import Units
-from pendmap.pictures import names
-from pendmap.pictures.methods import MEASURED, drawn, look
-from pendmap.trajectory import simulate
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
-
-__all__ = ["BLOCK", "NOTHING", "Z95", "handles_of"]
 
 PEAK: Final = "peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 NEAR: Final = 5

@@ -14,14 +14,14 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pendmap.charts.identification import MINUS
+from pendmap.charts.methods import EVEN, MEASURED, ODD, look
 from pendmap.figures import blocks, sides, style
-from pendmap.identification.combined import CUT
-from pendmap.identification.decrement import triplets
-from pendmap.identification.digits import with_error
-from pendmap.identification.result import Estimate
+from pendmap.formatting import estimate_text
+from pendmap.identification.methods.base import Estimate
+from pendmap.identification.methods.combined import CUT
+from pendmap.identification.methods.decrement import triplets
 from pendmap.identification.table1 import first_state, simulated_peaks
-from pendmap.pictures.methods import EVEN, MEASURED, ODD, look
-from pendmap.pictures.table1 import MINUS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from pendmap.identification import Identification, IdentificationReport, Peaks
 
     Floats = NDArray[np.float64]
-
-__all__ = ["BLOCK", "Triplets", "triplets_of"]
 
 DELTA: Final = "\N{GREEK SMALL LETTER DELTA}"
 SIZE: Final = "middle peak |\N{GREEK SMALL LETTER THETA}| (rad)"
@@ -175,7 +173,7 @@ def _draw(
 
 def _removed(zero: Estimate) -> str:
     error = None if zero.stderr is None else 1e3 * zero.stderr
-    return f"{with_error(Estimate(1e3 * zero.value, error), minus=MINUS)} mrad"
+    return f"{estimate_text(Estimate(1e3 * zero.value, error), minus=MINUS)} mrad"
 
 
 def _delta(found: Identification) -> float:

@@ -9,22 +9,19 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 
-from pendmap import palette
+from pendmap.charts import bifurcation as drawn
+from pendmap.charts import names, palette, plane
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import headed, place
-from pendmap.model.units import Units
-from pendmap.pictures import diagrams as drawn
-from pendmap.pictures import names, plane
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from pendmap.pictures.diagrams import Family
-
-__all__ = ["figure"]
+    from pendmap.charts.bifurcation import Family
 
 _SIZE = (7.4, 6.8)
 _LEFT, _RIGHT, _TOP, _BELOW = 0.85, 0.2, 0.98, 0.5

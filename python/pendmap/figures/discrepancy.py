@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from pendmap.diagnosis import Discrepancy
 
-__all__ = ["figure"]
-
 SIZE: Final = (8.6, 12.76)
 """Width and height in inches."""
 

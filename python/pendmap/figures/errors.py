@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.patches import Patch
 
+from pendmap.charts import names
+from pendmap.charts.methods import drawn, look
 from pendmap.figures import blocks, sides, style
 from pendmap.figures.decays import NOTHING, Z95, handles_of
-from pendmap.model.units import Units
-from pendmap.pictures import names
-from pendmap.pictures.methods import drawn, look
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from pendmap.figures.blocks import Box
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
-
-__all__ = ["BLOCK", "draw_errors", "draw_panels"]
 
 PEAK: Final = "measured peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 _SI: Final = Units(si=True)

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from pendmap.records import Experiment, Finding, Run
 
-__all__ = ["figure"]
-
 MOST_RUNS: Final = 12
 """Strips of one figure; the text of ``look`` has every run."""
 

@@ -10,14 +10,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from pendmap.charts import basins as layering
+from pendmap.charts import lyapunov as drawn
+from pendmap.charts import names
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
-from pendmap.model.units import Units
-from pendmap.pictures import exponents as drawn
-from pendmap.pictures import layers as layering
-from pendmap.pictures import names
-from pendmap.words import counted
+from pendmap.formatting import counted
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["figure"]
 
 _LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
 _RATIO, _HEIGHT, _WIDTHS = 0.8, 4.3, {1: 6.0, 2: 8.8, 3: 12.4}

@@ -8,24 +8,22 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.patches import Patch
 
+from pendmap.charts import names, plane
+from pendmap.charts.methods import MEASURED, look
+from pendmap.comparison.forced_summary import written
+from pendmap.comparison.free import MODEL
 from pendmap.figures import style
-from pendmap.identification.compare import MODEL
-from pendmap.identification.forced_said import written
-from pendmap.model.units import Units
-from pendmap.pictures import names, plane
-from pendmap.pictures.methods import MEASURED, look
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from pendmap.identification import ForcedComparison
-    from pendmap.identification.forced import Statistic
+    from pendmap.comparison import ForcedComparison
+    from pendmap.comparison.forced import Statistic
 
     Floats = NDArray[np.float64]
-
-__all__ = ["draw_cycles", "draw_history", "draw_phase", "draw_statistics", "legend"]
 
 _SI: Final = Units(si=True)
 _WELLS: Final = 14

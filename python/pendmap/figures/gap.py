@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.charts.methods import look
 from pendmap.figures import blocks, sides, style
-from pendmap.pictures.methods import look
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,17 +19,6 @@ if TYPE_CHECKING:
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
     from pendmap.figures.blocks import Box
-
-__all__ = [
-    "AFTER",
-    "BEFORE",
-    "draw_by_run",
-    "draw_forecast",
-    "draw_residuals",
-    "models",
-    "name_runs",
-    "short",
-]
 
 BEFORE, AFTER = look("before").colour, look("after").colour
 

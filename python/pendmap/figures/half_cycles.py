@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 
+from pendmap.charts import names
+from pendmap.charts.methods import EVEN, MEASURED, ODD
 from pendmap.figures import blocks, sides, style
 from pendmap.figures.record import UNUSED
-from pendmap.model.units import Units
-from pendmap.pictures import names
-from pendmap.pictures.methods import EVEN, MEASURED, ODD
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
-
-__all__ = ["BLOCK", "Course", "course_of", "first_and_last"]
 
 NEAR: Final = 6
 """Half cycles that a near view holds."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from pendmap.errors import InputError
 from pendmap.figures import blocks, decays, decrements, errors, half_cycles, results_table
 from pendmap.figures import sheet as sheets
-from pendmap.identification.clock import span
+from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from pendmap.figures.blocks import Block
     from pendmap.identification import IdentificationReport
-
-__all__ = ["PARTS", "figure"]
 
 _BLOCKS: Final = {
     block.name: block

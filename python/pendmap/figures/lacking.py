@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.charts.diagnosis import ACCELERATION, OVER_SAID
 from pendmap.figures import style
 from pendmap.figures.gap import models
-from pendmap.pictures.diagnosis import ACCELERATION, OVER_SAID
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from pendmap.diagnosis import Discrepancy
-
-__all__ = ["draw_torque", "shown_over"]
 
 Z95: Final = 1.959963984540054
 

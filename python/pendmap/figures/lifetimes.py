@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pendmap.charts import basins as layering
+from pendmap.charts import lifetime as drawn
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
-from pendmap.pictures import layers as layering
-from pendmap.pictures import lifetimes as drawn
-from pendmap.words import counted
+from pendmap.formatting import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["figure"]
 
 _FIT, _BAND = "#d55e00", "#f4c3a0"
 _RATIO, _HEIGHT, _WIDTHS = 0.8, 4.6, {1: 6.0, 2: 9.6}

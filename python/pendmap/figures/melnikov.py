@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
+from pendmap.charts import basins as layering
+from pendmap.charts.melnikov import highest
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
-from pendmap.pictures import layers as layering
-from pendmap.pictures.melnikov import highest
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-__all__ = ["figure"]
 
 _LOOKS: dict[str, tuple[str, Any]] = {
     "loop": (style.INK, "-"),

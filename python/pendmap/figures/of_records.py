@@ -13,19 +13,10 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
+    from pendmap.comparison import Comparison
     from pendmap.diagnosis import Discrepancy
-    from pendmap.identification import Comparison, IdentificationReport
+    from pendmap.identification import IdentificationReport
     from pendmap.records import Experiment
-
-__all__ = [
-    "RunPanel",
-    "draw_comparison",
-    "draw_discrepancy",
-    "draw_identification",
-    "draw_record",
-    "draw_runs",
-    "write_report",
-]
 
 
 def draw_record(
@@ -79,7 +70,7 @@ def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Pat
     Parameters
     ----------
     comparison : Comparison
-        What ``pendmap.identification.compare`` returned.
+        What ``pendmap.comparison.free`` returned.
     path : str or path
         As of :func:`pendmap.figures.draw`.
 

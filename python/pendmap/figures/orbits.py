@@ -8,23 +8,21 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
+from pendmap.charts import basins as layering
+from pendmap.charts import orbits as drawn
+from pendmap.charts import plane
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
-from pendmap.model.units import VELOCITY, Units
-from pendmap.pictures import layers as layering
-from pendmap.pictures import orbits as drawn
-from pendmap.pictures import plane
-from pendmap.words import counted
+from pendmap.formatting import counted
+from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from pendmap.pictures.orbits import Closed
-
-__all__ = ["figure"]
+    from pendmap.charts.orbits import Closed
 
 
 def figure(

@@ -10,18 +10,16 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
+from pendmap.charts import parameter_map as drawn
+from pendmap.charts import plane
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
-from pendmap.pictures import plane
-from pendmap.pictures import planes as drawn
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["figure"]
 
 CELLS = 1200
 """Rows and columns of a layer that are drawn at most, unless the panel has more pixels."""

@@ -13,11 +13,11 @@ from matplotlib.transforms import ScaledTranslation
 from pendmap.errors import InputError
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
-from pendmap.records.local_fit import local_fit
+from pendmap.formatting import moment
 from pendmap.records.noise import noise_floor
-from pendmap.records.runs_of import true_runs
 from pendmap.records.summary import noise_said, noise_unit
-from pendmap.words import moment
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import true_runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records import Run
-
-__all__ = ["ANGLE", "FALSE", "UNUSED", "USED", "broken", "figure", "lone", "shown_line"]
 
 USED: Final = "#1d3557"
 UNUSED: Final = "#a9a9a9"

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
     from pendmap.report.document import Document
 
-__all__ = ["FIGURES", "SUFFIXES", "write"]
-
 SUFFIXES: Final = (".html", ".md")
 """The kinds of file that a report is."""
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from pendmap.charts import identification
 from pendmap.figures import blocks, style
-from pendmap.pictures import table1
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from pendmap.figures.blocks import Box
     from pendmap.identification import IdentificationReport
 
-__all__ = ["BLOCK"]
-
 LINE: Final = 0.2
 APART: Final = 0.14
 """Inches between columns at least."""
@@ -24,7 +22,7 @@ FONT: Final = 8.0
 
 
 def _height(report: IdentificationReport) -> float:
-    lines = len(table1.rows(report)) + len(table1.refused(report))
+    lines = len(identification.rows(report)) + len(identification.refused(report))
     return blocks.HEADING + LINE * (lines + 3) + 0.25
 
 
@@ -33,13 +31,13 @@ def _draw(
 ) -> None:
     del letters
     blocks.named(figure, box, title)
-    head, rows = table1.columns(report), table1.rows(report)
+    head, rows = identification.columns(report), identification.rows(report)
     split = [_folded(text) for text in head]
     widths = [
         max(style.inches(text, FONT) for text in (*name.split("\n"), *(row[k] for row in rows)))
         for k, name in enumerate(split)
     ]
-    refused = table1.refused(report)
+    refused = identification.refused(report)
     widths[0] = max([widths[0], *(style.inches(name, FONT) for name, _ in refused)])
     spare = box.width - 0.3 - sum(widths) - APART * (len(widths) - 1)
     # What does not fit by its own size is written smaller.
@@ -76,8 +74,8 @@ def _draw(
             color=style.QUIET,
         )  # fmt: skip
     note = "in brackets: standard error of the last digits"
-    if any(table1.RESTS in row for row in rows):
-        note += f";   {table1.RESTS}: the simulation stands still by then"
+    if any(identification.RESTS in row for row in rows):
+        note += f";   {identification.RESTS}: the simulation stands still by then"
     if rows:
         write(0, LINE * (len(rows) + len(refused) + 3) - 0.04, note, style.QUIET)
 

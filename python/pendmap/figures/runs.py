@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.charts import names, plane
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
-from pendmap.model.units import Units
-from pendmap.pictures import names, plane
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["RunPanel", "figure"]
 
 Floats = npt.NDArray[np.float64]
 

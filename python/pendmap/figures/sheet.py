@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-__all__ = ["Panel", "Sheet", "headed", "place"]
-
 LEFT, RIGHT, TOP, BOTTOM = 0.72, 0.22, 0.98, 0.55
 GAP, BAR, BAR_WIDTH, BAR_PAD = 0.62, 0.78, 0.13, 0.09
 STACK_GAP = 0.85

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.ticker import NullFormatter, NullLocator
 
+from pendmap.charts import names, plane
 from pendmap.figures import style
-from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-__all__ = ["angle_axis", "headroom", "log_axis", "middle_axis", "signed_log_axis", "wide_axis"]
 
 MOSTLY: Final = 95
 """Percent of the curve nearest to 0 that its straight part holds."""

@@ -11,8 +11,8 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import NullLocator
 
+from pendmap.charts import names, plane
 from pendmap.errors import InputError
-from pendmap.pictures import names, plane
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,21 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-    from pendmap.model.units import Units
-
-__all__ = [
-    "RC",
-    "check_size",
-    "colour_bar",
-    "colour_map",
-    "inches",
-    "log_ticks",
-    "phase_plane",
-    "resolution",
-    "scale",
-    "widest",
-    "write",
-]
+    from pendmap.units import Units
 
 INK = "#222222"
 QUIET = "#666666"

@@ -9,21 +9,19 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pendmap.critical_curves import NEAR
-from pendmap.critical_plane import PLANES, in_plane
+from pendmap.analysis.critical_curves import PLANES, in_plane
+from pendmap.analysis.tongues import NEAR
+from pendmap.charts import basins as layering
+from pendmap.charts import tongues as drawn
 from pendmap.errors import InputError
 from pendmap.figures import style
 from pendmap.figures.sheet import Panel, Sheet
-from pendmap.pictures import layers as layering
-from pendmap.pictures import tongues as drawn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
     from matplotlib.figure import Figure
-
-__all__ = ["figure"]
 
 _STABLE, _INVERTED = "#e3ecd8", "#9a6fb0"
 _FOLD = "#009e73"

@@ -9,21 +9,19 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.patches import Patch
 
-from pendmap.energy import energy
+from pendmap.analysis.trajectory import energy
+from pendmap.charts import basins as layering
+from pendmap.charts import names, plane
+from pendmap.charts.curves import envelope
 from pendmap.errors import InputError
 from pendmap.figures import sheet as sheets
 from pendmap.figures import style
-from pendmap.model.units import Units
-from pendmap.pictures import layers as layering
-from pendmap.pictures import names, plane
-from pendmap.pictures.curves import envelope
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["PARTS", "figure"]
 
 PARTS = ("history", "energy", "phase", "section")
 """Parts of the figure by the name a user types."""

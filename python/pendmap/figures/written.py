@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-__all__ = ["SUFFIXES", "written"]
-
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
 

@@ -11,22 +11,20 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.errors import InputError
-from pendmap.identification.clock import from_first
-from pendmap.identification.coarse import coarse_finder, is_coarse
-from pendmap.identification.finder import Finder
-from pendmap.identification.reading import reading_of
+from pendmap.identification.coarse_finder import coarse_finder, is_coarse
+from pendmap.identification.peak_finder import Finder
+from pendmap.identification.readings import reading_of
 from pendmap.identification.turning import outline
 from pendmap.records.resampled import measured
+from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.identification.coarse import CoarseFinder
-    from pendmap.identification.ends import End
+    from pendmap.identification.coarse_finder import CoarseFinder
+    from pendmap.identification.turning import End
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Peaks", "find_peaks", "samples"]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -17,18 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.model import Rig
-    from pendmap.model.units import Units
-
-__all__ = [
-    "SHARPEST",
-    "FitRun",
-    "Pivot",
-    "RodSensor",
-    "bare_run",
-    "bare_windows",
-    "rig_of",
-    "tolerance_of",
-]
+    from pendmap.units import Units
 
 FORCED_WINDOW_SWINGS: Final = 3.0
 """The longest window of a forced run, in periods of small swings: forced motions may be chaotic,
@@ -216,7 +204,7 @@ def _bare_pivot(pivot: Pivot, rig: Rig, units: Units) -> dict[str, Any]:
     powers = {"acceleration": 0, "velocity": 1, "position": 2}
     if pivot.quantity not in powers:
         raise InputError(
-            f"quantity must be one of {', '.join(powers)}, got {checks.shown(pivot.quantity)}"
+            f"quantity must be one of {', '.join(powers)}, got {short_repr(pivot.quantity)}"
         )
     factor = units.w0 ** powers[pivot.quantity] / rig.gravity
 

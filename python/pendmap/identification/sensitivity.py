@@ -8,28 +8,18 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, core_errors
-from pendmap.identification.fitting import prepared
+from pendmap.identification.fit import prepared
 from pendmap.identification.runs import bare_windows, tolerance_of
-from pendmap.model.units import Units
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
-
-__all__ = [
-    "STATE",
-    "Sensitivities",
-    "WindowSlopes",
-    "freed_together",
-    "lengths",
-    "sensitivities",
-    "window_slopes",
-]
 
 STATE: Final = 2
 """Columns of an initial state."""
@@ -163,7 +153,7 @@ def sensitivities(
     runs : sequence of FitRun
         Its records.
     candidates : sequence of str
-        Further parameters, as of :func:`pendmap.identification.fitting.score`.
+        Further parameters, as of :func:`pendmap.identification.fit.score`.
     model : Rig
         The fit's model with the candidates' effects in it.
 

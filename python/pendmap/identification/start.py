@@ -11,18 +11,16 @@ from scipy.optimize import differential_evolution
 from scipy.special import ellipk
 
 from pendmap.errors import InputError
-from pendmap.identification import energy_balance, repair
-from pendmap.identification.envelope import envelope
+from pendmap.identification.methods import energy_balance, repaired
 from pendmap.identification.peaks import Peaks, find_peaks, samples
+from pendmap.identification.period import envelope
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.identification.result import Identification
+    from pendmap.identification.methods.base import Identification
 
     Floats = NDArray[np.float64]
-
-__all__ = ["StartingValues", "global_start", "starting_values"]
 
 _DAMPING: Final = (1e-5, 0.5)
 """Range of ``c_over_m / w0`` that is searched."""
@@ -88,7 +86,7 @@ def starting_values(
     balance = energy_balance.identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks)
     if _sound(balance):
         return _clipped(balance)
-    mended = repair.from_peaks(peaks)
+    mended = repaired.from_peaks(peaks)
     if _sound(mended):
         return _clipped(mended)
     if len(peaks.turned) > 3:  # noqa: PLR2004 (four unknowns)
@@ -100,7 +98,7 @@ def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
     """Search all of the plausible damping for the envelope of the peaks.
 
     Differential evolution over ``c_over_m / w0``, ``Tr / w0^2``, the first peak and the zero error
-    on :func:`pendmap.identification.envelope.envelope`; distances count by
+    on :func:`pendmap.identification.period.envelope`; distances count by
     ``2 (sqrt(1 + r^2) - 1)``, so that false peaks cannot lead it away. ``w0`` is the median over
     half cycles of what each says alone, its amplitude taken into account.
 

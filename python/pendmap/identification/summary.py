@@ -6,25 +6,15 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
-from pendmap.identification.digits import interval, with_error
-from pendmap.identification.left_out import left_out
-from pendmap.identification.report import DRAG
+from pendmap.formatting import estimate_text, interval
+from pendmap.identification.experiment import DRAG, left_out
 from pendmap.records.summary import doubts, findings_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pendmap.identification.report import IdentificationReport
-    from pendmap.identification.result import Identification
-
-__all__ = [
-    "COLUMNS",
-    "as_json",
-    "as_text",
-    "foremost",
-    "methods_table",
-    "table1_table",
-]
+    from pendmap.identification.experiment import IdentificationReport
+    from pendmap.identification.methods.base import Identification
 
 COLUMNS: Final = {
     "w0": "w0 (rad/s)",
@@ -117,7 +107,7 @@ def _drag(report: IdentificationReport) -> Iterator[str]:
     drag = report.with_drag.fit
     name = next(n for n in drag.estimates if n.startswith(DRAG))
     yield (
-        f"With {DRAG} ({name.partition('.')[2]} = {with_error(drag.estimates[name])}) the "
+        f"With {DRAG} ({name.partition('.')[2]} = {estimate_text(drag.estimates[name])}) the "
         f"residual is {drag.rms:.3g} rad, {report.joint.fit.rms:.3g} without: --effect {DRAG} "
         "fits it, diagnose looks for more"
     )
@@ -135,7 +125,7 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
         yield f"{best.method}: {best.used}"
         for name, estimate in {**best.estimates, **best.derived}.items():
             if estimate.ci95 is not None:
-                yield f"  {name} = {with_error(estimate)}, 95 % in {interval(estimate)}"
+                yield f"  {name} = {estimate_text(estimate)}, 95 % in {interval(estimate)}"
     yield from _drag(report)
     if report.table.left_out:
         yield f"{report.run.name}: {report.table.left_out}"
@@ -164,7 +154,7 @@ def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[st
     rows = []
     for method, found in report.methods.items():
         known = {**found.estimates, **found.derived}
-        shown = [with_error(known[name]) if name in known else "" for name in names]
+        shown = [estimate_text(known[name]) if name in known else "" for name in names]
         if not found.applicable:
             shown = ["not applicable", *[""] * (len(names) - 1)]
         rows.append([method, *shown])

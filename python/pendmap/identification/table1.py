@@ -8,33 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.analysis.trajectory import simulate
 from pendmap.errors import InputError
 from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.trajectory import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.identification.result import Identification
+    from pendmap.identification.methods.base import Identification
     from pendmap.model import Rig
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
-
-__all__ = [
-    "PeakErrors",
-    "Row",
-    "State",
-    "Table1",
-    "errors_of",
-    "first_state",
-    "peak_errors",
-    "table1",
-    "table_of",
-    "table_of_run",
-]
 
 PERIODS: Final = (0.26, 1.54)
 """Periods of the paper's table, s. No rig near 6 rad/s has the first: its shortest one stands in

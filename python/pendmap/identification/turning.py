@@ -7,15 +7,18 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import ellipe, ellipk
 
-from pendmap.records.steps import step_of
+from pendmap.records.resolution import step_of
+from pendmap.signal.half_cycles import swings
+from pendmap.signal.window_polynomial import fit_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Outline", "median_of_five", "outline", "zigzags"]
 
 _SMOOTHING: Final = 0.1
 """Half width of the running mean over the period."""
@@ -160,3 +163,212 @@ def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[
         else:
             kept.append(k)
     return np.array(kept, np.intp)
+
+
+# The two ends of a decay: the release, and the last half cycle that stops.
+
+
+_SURE_END: Final = 4.0
+_LATENESS: Final = 5 / 32
+"""What a quartic makes of ``s abs(s)``: half the slope that it has at 0, over the window."""
+_DOUBT: Final = 0.2
+_STILL: Final = 1e-3
+"""A velocity below this, over amplitude and w0, is none: the even form itself is off by as much."""
+
+
+@dataclasses.dataclass(frozen=True)
+class End:
+    """The end of a half cycle: when, where (rad), how surely, of which kind; the window, s."""
+
+    time: float
+    angle: float
+    stderr_time: float
+    stderr_angle: float
+    kind: str
+    window: float = 0.0
+
+    def late(self, theta_r: float) -> End:
+        """Return the turn as it is without the lateness that friction gives a quartic's turn.
+
+        ``5/32 h theta_r / sin A`` for a window of half width ``h``; what is not known of it (the
+        law of friction, the next order) is in the error.
+        """
+        size = abs(self.angle)
+        bend = math.sin(min(max(size, 2 * theta_r + 1e-9), 3.0))
+        shift = _LATENESS * self.window * theta_r / bend
+        # The next order is larger by theta_r / A: near the end it is all that is known.
+        unsure = shift * min(_DOUBT + theta_r / max(size, 1e-9), 1.0)
+        error = math.hypot(self.stderr_time, unsure)
+        return dataclasses.replace(self, time=self.time - shift, stderr_time=error)
+
+
+def release(
+    time: Floats, theta: Floats, sigma: float, scale: tuple[float, float], course: Outline
+) -> End | None:
+    """Return the release from rest at which the record begins, if it does.
+
+    Either the first sample is the release (then the angle is even about it), or the pendulum was
+    held for a while (then a level part joins a falling one without a step of the velocity).
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s and rad.
+    sigma : float
+        Noise, rad.
+    scale : (float, float)
+        Rough natural frequency, rad/s, and half width of a window, s.
+    course : Outline
+        The rough course of the record.
+    """
+    if course.left == 0:
+        return None
+    w0, half = scale
+    step = float(np.median(np.diff(time)))
+    level, leaves = float(np.median(theta[: max(course.left // 2, 3)])), float(time[course.left])
+    bend = w0**2 * max(math.sin(min(abs(level), math.pi)), 0.02)
+    quick = math.sqrt(2 * (6 * sigma + 1e-9) / bend)
+    half = max(half, 5.5 * step)
+    if leaves - time[0] > 2 * quick + 4 * step:
+        return _joined(time, theta, sigma, (float(time[0]), leaves, half), "release")
+    even = fit_around(time, theta, float(time[0]), half, (0, 2, 4), sigma=sigma)
+    moving = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 4), sigma=sigma)
+    if even is None or moving is None:
+        return None
+    # A velocity, or a bend away from the middle, is a record that begins in motion.
+    (angle, gain), (bend, _) = even.at(float(time[0])), even.at(float(time[0]), 2)
+    speed, speed_gain = moving.at(float(time[0]), 1)
+    slack = _STILL * abs(angle) * w0
+    if bend * angle >= 0 or abs(speed) > _SURE_END * speed_gain * sigma + slack:
+        return None
+    return End(float(time[0]), angle, step / 10, gain * sigma, "release")
+
+
+def stop(
+    time: Floats, theta: Floats, sigma: float, course: Outline, before: list[End]
+) -> End | None:
+    """Return where the pendulum came to rest in the half cycle after the last turn, if it is seen.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s and rad.
+    sigma : float
+        Noise, rad.
+    course : Outline
+        The rough course of the record.
+    before : list of End
+        The peaks before it.
+    """
+    if course.rest is None or not before:
+        return None
+    last, rests = before[-1], float(time[course.rest])
+    if not 0.1 < (rests - last.time) / course.period < 0.9:  # noqa: PLR2004 (a half, roughly)
+        return None
+    half = 0.25 * course.period
+    found = _joined(time[::-1] * -1.0, theta[::-1], sigma, (-time[-1], -rests, half), "stop")
+    if found is None or abs(found.angle - last.angle) < _SURE_END * last.stderr_angle:
+        return None
+    return dataclasses.replace(found, time=-found.time)
+
+
+def _joined(
+    time: Floats, theta: Floats, sigma: float, where: tuple[float, float, float], kind: str
+) -> End | None:
+    """Fit a level that goes over into ``level + b s^2 + d s^4``, s the time since it left.
+
+    ``where`` holds the begin of the level, about when it is left, and how far to look on.
+    """
+    begin, leaves, half = where
+    use = (time >= begin) & (time <= leaves + half)
+    t, x = time[use], theta[use]
+    if t.size < 6:  # noqa: PLR2004 (parameters and two more)
+        return None
+
+    def solved(instant: float) -> tuple[float, Floats, Floats]:
+        s = np.maximum(t - instant, 0.0) / half
+        rows = np.column_stack((np.ones_like(s), s**2, s**4))
+        inverse = np.asarray(np.linalg.pinv(rows.T @ rows, hermitian=True), np.float64)
+        coefficients = inverse @ (rows.T @ x)
+        residual = x - rows @ coefficients
+        return float(residual @ residual), coefficients, inverse
+
+    # The sum of squares is flat where the level takes all and has ripples: first a scan.
+    scan = np.linspace(max(leaves - half, begin), leaves + half / 2, 61)
+    nearest = int(np.argmin([solved(float(at))[0] for at in scan]))
+    low, high = float(scan[max(nearest - 1, 0)]), float(scan[min(nearest + 1, 60)])
+    best = minimize_scalar(lambda at: solved(at)[0], bounds=(low, high), method="bounded")
+    at = float(best.x)
+    least, coefficients, inverse = solved(at)
+    # The curvature of the sum of squares gives the error of the instant.
+    shift = max((high - low) / 10, 1e-9)
+    curvature = (solved(at + shift)[0] - 2 * least + solved(at - shift)[0]) / shift**2
+    error = sigma * math.sqrt(2 / curvature) if curvature > 0 else half
+    level_error = sigma * math.sqrt(max(float(inverse[0, 0]), 0.0))
+    return End(at, float(coefficients[0]), min(error, half), level_error, kind)
+
+
+# Where a search may start: natural frequency and damping to some percent, from half swings.
+
+
+FEWEST_SWINGS: Final = 2
+"""Half swings that a start needs."""
+QUIET: Final = 10.0
+"""Readings at rest lie within so many standard errors."""
+
+
+def rough_start(
+    time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
+) -> dict[str, float] | None:
+    """Return starting values of ``w0``, ``c_over_m`` and ``Tr`` of a free decay.
+
+    A half swing of amplitude ``A`` takes ``2 K(m) / w0`` with ``m = sin(A/2)**2``; from one to the
+    next the energy ``w0**2 (1 - cos A)`` falls by ``c_over_m w0 8 (E(m) - (1 - m) K(m))`` (the
+    integral of the velocity over the angle) and ``2 A Tr``.
+
+    Parameters
+    ----------
+    time, theta : ndarray of float, shape (n,)
+        In s and rad.
+    sigma : float
+        Standard error of the readings, rad: smaller swings are left out.
+
+    Returns
+    -------
+    dict or None
+        None where there are fewer than three swings.
+    """
+    tail = theta[-max(len(theta) // 10, 1) :]
+    # Of a motion that goes on at the end the mean says little.
+    centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0
+    half = swings(time, theta - centre, least=4.0 * sigma)
+    peaks = np.minimum(np.abs(half.peak), math.pi - 1e-3)
+    if len(peaks) < FEWEST_SWINGS:
+        return None
+    m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
+    w0 = float(np.median(2 * ellipk(m) / np.diff(half.crossing)))
+    if len(peaks) < FEWEST_SWINGS + 1:
+        return {"w0": w0, "c_over_m": 0.02 * w0, "Tr": 1e-3 * w0**2}
+    viscous, friction = rough_damping(peaks)
+    # Neither begins at 0, where a step may be too large.
+    return {"w0": w0, "c_over_m": max(viscous, 1e-4) * w0, "Tr": max(friction, 1e-5) * w0**2}
+
+
+def rough_damping(peaks: NDArray[np.float64]) -> tuple[float, float]:
+    """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from peaks in a row.
+
+    Parameters
+    ----------
+    peaks : ndarray of float, shape (n,)
+        Three or more, rad, in (0, pi).
+    """
+    from scipy.optimize import nnls  # noqa: PLC0415 (heavy)
+
+    m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
+    action = 8 * (ellipe(m) - (1 - m) * ellipk(m))
+    columns = np.stack([0.5 * (action[1:] + action[:-1]), peaks[1:] + peaks[:-1]], axis=1)
+    lost = np.diff(np.cos(peaks))
+    # Energies of small swings are known better: their error is about A sigma.
+    weight = 1 / (peaks[1:] + peaks[:-1])
+    (viscous, friction), _ = nnls(columns * weight[:, None], lost * weight)
+    return float(viscous), float(friction)

@@ -20,11 +20,9 @@ from pendmap.identification.sensitivity import sensitivities
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
-
-__all__ = ["nearer"]
 
 STAGES: Final = 8
 """Exponents that are tried at most."""

@@ -10,7 +10,7 @@ from pendmap.model.files import load_model, save_model
 from pendmap.model.formula import Formula, load_formulas
 from pendmap.model.pendulum import PRESETS, Pendulum, effects_of
 from pendmap.model.rig import Rig, without_dimensions
-from pendmap.model.units import Units
+from pendmap.units import Units
 
 __all__ = [
     "PRESETS",

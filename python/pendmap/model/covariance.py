@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from numpy.typing import NDArray
-
-__all__ = ["Covariance", "covariance_of", "misses", "said_of", "without"]
 
 MISSES: Final = 1.5
 """Residual over noise above which a model misses its record."""
@@ -82,7 +79,7 @@ def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
     table = notes["covariance"]
     names, rows = table.get("names"), table.get("matrix")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"covariance: names must be a list of names, got {checks.shown(names)}")
+        raise InputError(f"covariance: names must be a list of names, got {short_repr(names)}")
     try:
         matrix = np.asarray(rows, dtype=np.float64)
     except (TypeError, ValueError):
@@ -99,7 +96,7 @@ def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
             f"covariance: between_runs must be a table of names among {', '.join(names)}"
         )
     for name, deviation in between.items():
-        matrix[names.index(name), names.index(name)] += checks.number(name, deviation) ** 2
+        matrix[names.index(name), names.index(name)] += check_number(name, deviation) ** 2
     kept = [k for k, name in enumerate(names) if "[" not in name and name not in ("bias", "tilt")]
     return Covariance(tuple(names[k] for k in kept), matrix[np.ix_(kept, kept)])
 

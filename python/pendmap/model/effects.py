@@ -9,16 +9,13 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_flag, check_number, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from pendmap.model.formula import Formula, FormulaKey
-    from pendmap.model.units import Units
-
-__all__ = ["Effect", "definition", "is_shape", "library", "middle", "opposes"]
+    from pendmap.units import Units
 
 _NO_SHAPE: Final = ("size", "phase")
 
@@ -65,7 +62,7 @@ def definition(name: object) -> dict[str, Any]:
         near = difflib.get_close_matches(str(name), known, n=1)
         hint = f", perhaps {near[0]}" if near else ""
         raise InputError(
-            f"name must be an effect of the library, got {checks.shown(name)}{hint}; "
+            f"name must be an effect of the library, got {short_repr(name)}{hint}; "
             "pendmap effects lists all"
         )
     return known[name]
@@ -110,7 +107,7 @@ class Effect:
 
     def __post_init__(self) -> None:
         if self.formula is not None and self.formula.name != self.name:
-            raise InputError(f"name must be {self.formula.name}, got {checks.shown(self.name)}")
+            raise InputError(f"name must be {self.formula.name}, got {short_repr(self.name)}")
         names = [entry["name"] for entry in self.definition["parameters"]]
         given = _mapping(f"{self.name}: parameters", self.parameters, names)
         missing = [name for name in names if name not in given]
@@ -118,20 +115,20 @@ class Effect:
             raise InputError(
                 f"{self.name}: {missing[0]} is missing: it needs {', '.join(self.described())}"
             )
-        values = {name: checks.number(f"{self.name}: {name}", given[name]) for name in names}
+        values = {name: check_number(f"{self.name}: {name}", given[name]) for name in names}
         object.__setattr__(self, "parameters", values)
         given = _mapping(f"{self.name}: ci95", self.ci95, names)
         bounds = {n: _interval(f"{self.name}: ci95 of {n}", given[n]) for n in names if n in given}
         object.__setattr__(self, "ci95", bounds)
         if self.probability is not None:
-            share = checks.number(f"{self.name}: probability", self.probability)
+            share = check_number(f"{self.name}: probability", self.probability)
             if not 0 <= share <= 1:
                 raise InputError(
                     f"{self.name}: probability must be a number from 0 to 1, got {share:g}"
                 )
             object.__setattr__(self, "probability", share)
         if self.approximate is not None:
-            checks.flag(f"{self.name}: approximate", self.approximate)
+            check_flag(f"{self.name}: approximate", self.approximate)
 
     def __hash__(self) -> int:
         return hash((self.name, *self.parameters.values()))
@@ -243,21 +240,19 @@ class Effect:
 
 def _mapping(what: str, value: object, names: list[str]) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
-        raise InputError(
-            f"{what} must be a mapping of {', '.join(names)}, got {checks.shown(value)}"
-        )
+        raise InputError(f"{what} must be a mapping of {', '.join(names)}, got {short_repr(value)}")
     unknown = [name for name in value if name not in names]
     if unknown:
         raise InputError(
-            f"{what}: {checks.shown(unknown[0])} is not known: it must be one of {', '.join(names)}"
+            f"{what}: {short_repr(unknown[0])} is not known: it must be one of {', '.join(names)}"
         )
     return value
 
 
 def _interval(what: str, value: object) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        raise InputError(f"{what} must be [low, high], got {checks.shown(value)}")
-    low, high = (checks.number(what, bound) for bound in value)
+        raise InputError(f"{what} must be [low, high], got {short_repr(value)}")
+    low, high = (check_number(what, bound) for bound in value)
     if low > high:
         raise InputError(f"{what} must be [low, high], the lower first, got [{low:g}, {high:g}]")
     return low, high

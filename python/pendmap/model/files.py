@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number, check_type, check_whole, short_repr
 from pendmap.files import read_toml, toml_text, whole_file
 from pendmap.model import quantities
 from pendmap.model.covariance import without
@@ -17,9 +16,7 @@ from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula, formulas_of
 from pendmap.model.pendulum import Pendulum
 from pendmap.model.rig import COUNTERPARTS, Rig
-from pendmap.model.units import Units
-
-__all__ = ["load_model", "save_model"]
+from pendmap.units import Units
 
 _FORMAT: Final = 1
 """Version of the layout of model files, in their key ``format_version``."""
@@ -106,7 +103,7 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
         If the file cannot be written.
     """
     if not isinstance(model, Rig):
-        checks.of_type("model", model, Pendulum, "Pendulum(p=0.6)")
+        check_type("model", model, Pendulum, "Pendulum(p=0.6)")
     numbers = {name: getattr(model, name) for name in model.numbers()}
     if isinstance(model, Rig) and model.Omega == 0:
         del numbers["Omega"]  # nothing is driven
@@ -141,20 +138,20 @@ def _check_top(content: dict[str, Any]) -> None:
         tables = "[pendulum], [[formula]], [[effect]], [covariance], [provenance]"
         raise InputError(f"{shown} is not known: it must be one of {tables} and format_version")
     version = content.get("format_version", _FORMAT)
-    checks.whole("format_version", version, 1, _FORMAT)
+    check_whole("format_version", version, 1, _FORMAT)
     _check_notes({name: content[name] for name in _NOTES if name in content})
 
 
 def _check_notes(notes: object) -> None:
     if not isinstance(notes, Mapping):
-        raise InputError(f"notes must be a mapping, got {checks.shown(notes)}")
+        raise InputError(f"notes must be a mapping, got {short_repr(notes)}")
     for name, table in notes.items():
         if name not in _NOTES:
             raise InputError(
-                f"{checks.shown(name)} is not known: it must be one of {', '.join(_NOTES)}"
+                f"{short_repr(name)} is not known: it must be one of {', '.join(_NOTES)}"
             )
         if not isinstance(table, Mapping):
-            raise InputError(f"{name} must be a table [{name}], got {checks.shown(table)}")
+            raise InputError(f"{name} must be a table [{name}], got {short_repr(table)}")
 
 
 def _is_si(table: dict[str, Any]) -> bool:
@@ -173,7 +170,7 @@ def _is_si(table: dict[str, Any]) -> bool:
 
 
 def _shown(key: str) -> str:
-    return key if key.isidentifier() else checks.shown(key)
+    return key if key.isidentifier() else short_repr(key)
 
 
 def _instead(key: str) -> str:
@@ -221,7 +218,7 @@ def _pendulum(
             raise InputError(
                 f"has no dimensions: {name} must be given with a model in SI; here it is p or omega"
             )
-    numbers = {name: checks.number(name, value) for name, value in table.items()}
+    numbers = {name: check_number(name, value) for name, value in table.items()}
     zeta = numbers.pop("zeta", None)
     if zeta is not None and "gamma" not in typed:
         gamma = 2 * quantities.check("zeta", zeta)
@@ -237,7 +234,7 @@ def _pendulum(
 
 def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, ...]:
     if not isinstance(tables, list):
-        raise InputError(f"effect must be [[effect]], one table each, got {checks.shown(tables)}")
+        raise InputError(f"effect must be [[effect]], one table each, got {short_repr(tables)}")
     effects = []
     for count, table in enumerate(tables, 1):
         try:
@@ -249,7 +246,7 @@ def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, .
 
 def _effect(table: object, formulas: Mapping[str, Formula]) -> Effect:
     if not isinstance(table, dict):
-        raise InputError(f"must be a table, got {checks.shown(table)}")
+        raise InputError(f"must be a table, got {short_repr(table)}")
     unknown = [key for key in table if key not in _EFFECT]
     if unknown:
         raise InputError(

@@ -9,16 +9,13 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap import checks
-from pendmap.errors import InputError, core_errors
+from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.files import read_toml
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pendmap.model.effects import Effect
-
-__all__ = ["Formula", "FormulaKey", "formulas_of", "load_formulas"]
 
 _DAMPING: Final = ("c_over_m", "zeta", "gamma", "Tr", "theta_r")
 _DRIVE: Final = ("p", "Omega", "omega", "phi", "phase")
@@ -109,10 +106,10 @@ class Formula:
 
         for what in ("name", "term", "revealed_by"):
             if not isinstance(getattr(self, what), str):
-                shown = checks.shown(getattr(self, what))
+                shown = short_repr(getattr(self, what))
                 raise InputError(f"formula: {what} must be a text, got {shown}")
         if not isinstance(self.parameters, Mapping) or not self.parameters:
-            shown = checks.shown(self.parameters)
+            shown = short_repr(self.parameters)
             raise InputError(
                 f"formula '{self.name}': parameters must be like {{'k': 1.5}}, with their powers "
                 f"of w0, got {shown}"
@@ -184,7 +181,7 @@ class Formula:
 
         called = str(getattr(function, "__name__", "")) if name is None else name
         if not callable(function):
-            shown = checks.shown(function)
+            shown = short_repr(function)
             raise InputError(f"function must be a function of five arguments, got {shown}")
         if not isinstance(parameters, Mapping):
             return cls(called, "0", parameters)  # which says what is wrong with them
@@ -206,12 +203,12 @@ def formulas_of(tables: object) -> dict[str, Formula]:
         If one is not as :class:`Formula` wants it, or a name is there twice.
     """
     if not isinstance(tables, list):
-        raise InputError(f"formula must be [[formula]], one table each, got {checks.shown(tables)}")
+        raise InputError(f"formula must be [[formula]], one table each, got {short_repr(tables)}")
     found: dict[str, Formula] = {}
     for count, table in enumerate(tables, 1):
         where = f"[[formula]] {count}"
         if not isinstance(table, dict):
-            raise InputError(f"{where} must be a table, got {checks.shown(table)}")
+            raise InputError(f"{where} must be a table, got {short_repr(table)}")
         unknown = [key for key in table if key not in _FORMULA]
         if unknown:
             known = ", ".join(_FORMULA)
@@ -259,12 +256,12 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
 
 def _parameter(name: object, given: object, names: list[Any]) -> _ParameterKey:
     if not isinstance(name, str):
-        raise InputError(f"parameter must be a name, got {checks.shown(name)}")
+        raise InputError(f"parameter must be a name, got {short_repr(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
     unknown = [key for key in said if key not in _PARAMETER]
     if unknown:
         raise InputError(
-            f"parameter '{name}': {checks.shown(unknown[0])} is not known: it must be one "
+            f"parameter '{name}': {short_repr(unknown[0])} is not known: it must be one "
             f"of {', '.join(_PARAMETER)}"
         )
     if "power" not in said:
@@ -281,21 +278,21 @@ def _parameter(name: object, given: object, names: list[Any]) -> _ParameterKey:
 
 def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | None]:
     if not isinstance(value, str):
-        return checks.number(f"parameter '{name}': power", value), None
+        return check_number(f"parameter '{name}': power", value), None
     match = _LESS.fullmatch(value)
     if match is None or match[1] not in names or match[1] == name:
         others = " or ".join(f'"2 - {n}"' for n in names if n != name)
         raise InputError(
             f"parameter '{name}': power must be a number"
             + (f", or {others}" if others else "")
-            + f", got {checks.shown(value)}"
+            + f", got {short_repr(value)}"
         )
     return 2.0, names.index(match[1])
 
 
 def _text(name: str, what: str, value: object) -> str:
     if not isinstance(value, str):
-        raise InputError(f"parameter '{name}': {what} must be a text, got {checks.shown(value)}")
+        raise InputError(f"parameter '{name}': {what} must be a text, got {short_repr(value)}")
     return value
 
 
@@ -306,7 +303,7 @@ def _role(name: str, value: object, *, first: bool) -> str:
     known = [role for role in _core.roles() if (role == "size") == first]
     if value not in known:
         raise InputError(
-            f"parameter '{name}': role must be one of {', '.join(known)}, got {checks.shown(value)}"
+            f"parameter '{name}': role must be one of {', '.join(known)}, got {short_repr(value)}"
         )
     return str(value)
 
@@ -317,14 +314,14 @@ def _unit(power: float, less: int | None, names: list[Any]) -> str:
 
 def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        shown = checks.shown(value)
+        shown = short_repr(value)
         raise InputError(f"parameter '{name}': {what} must be [low, high], got {shown}")
     low, high = value
     infinite = what == "range"
     ends = (
         float(end)
         if infinite and isinstance(end, float) and math.isinf(end)
-        else checks.number(f"parameter '{name}': {what}", end)
+        else check_number(f"parameter '{name}': {what}", end)
         for end in (low, high)
     )
     low, high = ends

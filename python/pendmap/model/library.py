@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from pendmap.model.formula import Formula
 
-__all__ = ["EffectDefinition", "EffectParameter", "effects", "of_formulas"]
-
 
 @dataclasses.dataclass(frozen=True)
 class EffectParameter:

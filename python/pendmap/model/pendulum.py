@@ -7,18 +7,15 @@ import json
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap import checks
-from pendmap.errors import InputError, core_errors
+from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
 from pendmap.model.covariance import said_of
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula, FormulaKey
-from pendmap.model.units import NONDIMENSIONAL, Units
+from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
-
-__all__ = ["PRESETS", "Kernel", "Pendulum", "checked_effects", "effects_of"]
 
 Kernel = tuple[
     float, float, float, float, float, float, float, list[tuple[str | FormulaKey, list[float]]]
@@ -86,7 +83,7 @@ class Pendulum:
 
     def __post_init__(self) -> None:
         for name in self.numbers():
-            object.__setattr__(self, name, checks.number(name, getattr(self, name)))
+            object.__setattr__(self, name, check_number(name, getattr(self, name)))
         for name in ("gamma", "theta_r"):
             if getattr(self, name) < 0:
                 raise InputError(f"{name} must be 0 or more, got {getattr(self, name):g}")
@@ -214,9 +211,9 @@ def checked_effects(
         If one is no effect, or says what a parameter says already.
     """
     if not isinstance(effects, list | tuple):
-        raise InputError(f"{what} must be a tuple of Effect, got {checks.shown(effects)}")
+        raise InputError(f"{what} must be a tuple of Effect, got {short_repr(effects)}")
     for effect in effects:
-        checks.of_type(what, effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
+        check_type(what, effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
         if effect.formula is not None:
             continue
         # The library names the only parameter of such an effect as the paper names it.

@@ -5,22 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-__all__ = [
-    "GRAVITY",
-    "GROUPS",
-    "OPTIONAL",
-    "SI_UNITS",
-    "check",
-    "natural_frequency",
-    "one",
-    "resolve",
-]
 
 GRAVITY: Final = 9.81
 """Acceleration of gravity where nothing is said, m/s^2."""
@@ -68,7 +56,7 @@ def check(name: str, value: object) -> float:
     InputError
         If it is no finite number, or outside its range.
     """
-    number = checks.number(name, value)
+    number = check_number(name, value)
     low, high = _W0
     if name == "w0" and not low <= number <= high:
         raise InputError(f"w0 must be a number from {low:g} to {high:g} rad/s, got {number:g}")

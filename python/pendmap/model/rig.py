@@ -6,21 +6,18 @@ import dataclasses
 import functools
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number, check_type
 from pendmap.model import quantities
 from pendmap.model.covariance import said_of
 from pendmap.model.effects import definition, library
 from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
-from pendmap.model.units import Units
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
     from pendmap.model.effects import Effect
-
-__all__ = ["COUNTERPARTS", "Rig", "own_name", "without_dimensions"]
 
 COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
     "gamma": ("c_over_m", 1),
@@ -108,7 +105,7 @@ class Rig:
         for name in self.numbers():
             value = getattr(self, name)
             idle = name == "Omega" and value == 0
-            number = checks.number(name, value) if idle else quantities.check(name, value)
+            number = check_number(name, value) if idle else quantities.check(name, value)
             object.__setattr__(self, name, number)
         own = {bare: (si, getattr(self, si)) for bare, (si, _) in COUNTERPARTS.items()}
         object.__setattr__(self, "effects", checked_effects(self.effects, own))
@@ -185,7 +182,7 @@ class Rig:
         gravity : float
             As of :class:`Rig`.
         """
-        checks.of_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
+        check_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
         units = Units(quantities.check("w0", w0), si=True)
         numbers = {
             si: units.given(getattr(pendulum, bare), power)
@@ -295,7 +292,7 @@ def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:
     """
     if isinstance(model, Rig):
         return model.pendulum, model.units
-    checks.of_type("pendulum", model, Pendulum, "Pendulum(p=0.6)")
+    check_type("pendulum", model, Pendulum, "Pendulum(p=0.6)")
     return model, model.units
 
 

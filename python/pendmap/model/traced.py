@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
-
-__all__ = ["term_of"]
 
 _SUM, _PRODUCT, _POWER, _WHOLE = range(4)
 """How strongly a text is bound together; what binds less is put in brackets."""
@@ -156,7 +153,7 @@ def _text(value: object) -> _Text:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
-        raise _UnreadableError(f"the value {checks.shown(value)}")
+        raise _UnreadableError(f"the value {short_repr(value)}")
     number = float(value)
     if not math.isfinite(number):
         raise _UnreadableError(f"the value {number}")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.model.quantities import GRAVITY
-from pendmap.records.accelerometer import Accelerometer
+from pendmap.records.rod_sensors import Accelerometer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
-
-__all__ = ["check"]
 
 SHARE: Final = 0.12
 """Periods that derivatives are taken over: shorter ones drown in noise, longer ones lose the

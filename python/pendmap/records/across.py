@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from pendmap.records.experiment import Run
 
-__all__ = ["checked_together"]
-
 ONE_RIG: Final = 0.05
 """Share by which periods of small swings of one pendulum may differ: 10 % of its length."""
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.formatting import counted
 from pendmap.records.experiment import Finding
-from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Run
 
     Floats = NDArray[np.float64]
-
-__all__ = ["COPIED", "once_each"]
 
 COPIED: Final = "same-record"
 

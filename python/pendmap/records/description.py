@@ -6,10 +6,9 @@ import dataclasses
 import difflib
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap import checks
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_flag, check_number, check_whole, short_repr
 from pendmap.files import read_toml
-from pendmap.records.accelerometer import Place, place_of
+from pendmap.records.rod_sensors import Place, place_of
 from pendmap.records.units import CHANNELS, PIVOT_UNITS
 
 if TYPE_CHECKING:
@@ -17,17 +16,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from pendmap.records.experiment import Kind
-
-__all__ = [
-    "ALONE",
-    "NAME",
-    "RATE",
-    "Column",
-    "Description",
-    "Reader",
-    "RunPlan",
-    "read_description",
-]
 
 NAME: Final = "experiment.toml"
 
@@ -161,7 +149,7 @@ def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, among: s
         near = difflib.get_close_matches(key.lower(), [k.lower() for k in known], 1, 0.55)
         meant = next((k for k in known if near and k.lower() == near[0]), None)
         perhaps = f", perhaps {meant} is meant" if meant else ""
-        shown = key if key.isidentifier() else checks.shown(key)
+        shown = key if key.isidentifier() else short_repr(key)
         place = f"{where}: " if where else ""
         raise InputError(
             f"{place}{shown} is not known{perhaps}: it must be one of {among or ', '.join(known)}"
@@ -171,7 +159,7 @@ def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, among: s
 def _table(value: object, where: str, example: str = "") -> dict[str, Any]:
     if not isinstance(value, dict):
         like = f" like {example}" if example else ""
-        raise InputError(f"{where} must be a table{like}, got {checks.shown(value)}")
+        raise InputError(f"{where} must be a table{like}, got {short_repr(value)}")
     return value
 
 
@@ -180,14 +168,14 @@ def _rig(table: dict[str, Any]) -> dict[str, Any]:
     known: dict[str, Any] = {}
     for name, value in table.items():
         if name == "encoder_counts":
-            known[name] = checks.whole(f"[rig]: {name}", value, 1, _MOST_COUNTS)
+            known[name] = check_whole(f"[rig]: {name}", value, 1, _MOST_COUNTS)
         else:
             known[name] = _positive(f"[rig]: {name}", value)
     return known
 
 
 def _number(name: str, value: object) -> float:
-    number = checks.number(name, value)
+    number = check_number(name, value)
     if abs(number) > _LARGEST:
         raise InputError(f"{name} must be a number up to {_LARGEST:g}, got {number:g}")
     return number
@@ -202,7 +190,7 @@ def _positive(name: str, value: object) -> float:
 
 def _text(name: str, value: object) -> str:
     if not isinstance(value, str) or not value:
-        raise InputError(f"{name} must be a text, got {checks.shown(value)}")
+        raise InputError(f"{name} must be a text, got {short_repr(value)}")
     return value
 
 
@@ -212,7 +200,7 @@ def _column(channel: str, value: object) -> Column:
         return Column(name=_text(where, value))
     if not isinstance(value, dict):
         like = f'{channel} = {{ name = "...", unit = "..." }}'
-        raise InputError(f"{where} must be a table like {like}, got {checks.shown(value)}")
+        raise InputError(f"{where} must be a table like {like}, got {short_repr(value)}")
     own = {"acceleration": _PLACE, "trigger": _TRIGGER}.get(channel, ())
     _keys(value, (*_COLUMN, *own), where)
     name = _text(f"{where}: name", value["name"]) if "name" in value else None
@@ -227,7 +215,7 @@ def _column(channel: str, value: object) -> Column:
     edge = value.get("edge")
     if edge is not None and edge not in _EDGES:
         known = " or ".join(f'"{each}"' for each in _EDGES)
-        raise InputError(f"{where}: edge must be {known}, got {checks.shown(edge)}")
+        raise InputError(f"{where}: edge must be {known}, got {short_repr(edge)}")
     phase = _number(f"{where}: phase", value["phase"]) if "phase" in value else None
     column = Column(name, unit, scale, zero, place, edge, phase)
     if unit is not None and scale is None:
@@ -240,18 +228,18 @@ def _reader(table: dict[str, Any]) -> Reader:
     delimiter, decimal = table.get("delimiter"), table.get("decimal")
     if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1):
         wanted = 'one character, like ";" or "\\t"'
-        raise InputError(f"[reader]: delimiter must be {wanted}, got {checks.shown(delimiter)}")
+        raise InputError(f"[reader]: delimiter must be {wanted}, got {short_repr(delimiter)}")
     if decimal not in (None, ".", ","):
-        raise InputError(f'[reader]: decimal must be "." or ",", got {checks.shown(decimal)}')
+        raise InputError(f'[reader]: decimal must be "." or ",", got {short_repr(decimal)}')
     if delimiter is not None and delimiter in '"\r\n\0+-.0123456789eE':
         raise InputError(
-            f"[reader]: delimiter must be what numbers do not need, got {checks.shown(delimiter)}"
+            f"[reader]: delimiter must be what numbers do not need, got {short_repr(delimiter)}"
         )
     if delimiter is not None and delimiter == decimal:
         raise InputError(
             f"[reader]: delimiter and decimal must be different, got {decimal!r} for both"
         )
-    skip = checks.whole("[reader]: skip_rows", table.get("skip_rows", 0), 0, _MOST_SKIPPED)
+    skip = check_whole("[reader]: skip_rows", table.get("skip_rows", 0), 0, _MOST_SKIPPED)
     return Reader(delimiter, decimal, skip)
 
 
@@ -263,7 +251,7 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
     pivot, factor = _pivot(table["pivot"], where) if "pivot" in table else (None, 1.0)
     kind = table.get("kind", "forced" if drive or pivot else "free")
     if kind not in ("free", "forced"):  # whatever it is, a list too
-        raise InputError(f'{where}: kind must be "free" or "forced", got {checks.shown(kind)}')
+        raise InputError(f'{where}: kind must be "free" or "forced", got {short_repr(kind)}')
     if kind == "free" and drive:
         raise InputError(f'{where}: kind must be "forced" where there is a drive, got "free"')
     if drive and pivot:
@@ -280,7 +268,7 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
         lab_time_s=_number(f"{where}: lab_time_s", table.get("lab_time_s", 0.0)),
         from_s=low,
         to_s=high,
-        hold_out=checks.flag(f"{where}: hold_out", table.get("hold_out", False)),
+        hold_out=check_flag(f"{where}: hold_out", table.get("hold_out", False)),
         drive=drive,
         pivot=pivot,
         pivot_scale=factor,
@@ -323,7 +311,7 @@ def _pivot(value: object, where: str) -> tuple[dict[str, str], float]:
         if key not in {"scale", "sign"}
     }
     if named.get("unit", "m/s2") not in PIVOT_UNITS:
-        shown = checks.shown(named["unit"])
+        shown = short_repr(named["unit"])
         known = ", ".join(PIVOT_UNITS)
         raise InputError(f"{where}: pivot: unit must be one of {known}, got {shown}")
     return named, sign * scale

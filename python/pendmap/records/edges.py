@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.steps import step_of
-from pendmap.words import counted
+from pendmap.formatting import counted
+from pendmap.records.resolution import step_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
-
-__all__ = ["check", "logs_edges", "say", "spread"]
 
 ALL: Final = 0.95
 """Share of the lines that are one count from the line before: of equal times only a few are."""

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import Reader
 
-__all__ = ["ENGINES", "read_workbook"]
-
 ENGINES: Final = {b"PK\x03\x04": "openpyxl", b"\xd0\xcf\x11\xe0": "xlrd"}
 """What reads a workbook, by how it begins: .xlsx and .xls."""
 

@@ -15,12 +15,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from pendmap.records.accelerometer import Accelerometer
-    from pendmap.records.gyroscope import Gyroscope
+    from pendmap.records.rod_sensors import Accelerometer, Gyroscope
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Experiment", "Finding", "Run", "Segment"]
 
 Kind = Literal["free", "forced"]
 
@@ -176,7 +173,7 @@ class Run:
     @property
     def rate_hz(self) -> float:
         """Samples a second, from the whole record without its gaps."""
-        from pendmap.records.intervals import intervals_of
+        from pendmap.signal.robust import intervals_of
 
         return 1 / intervals_of(self.time).tick if self.time.size > 1 else 0.0
 

@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.local_fit import even_weights
-from pendmap.records.robust import broad_scale
+from pendmap.signal.local_polynomial import even_weights
+from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
-__all__ = ["SpeedLaw", "law_of", "speed_of"]
 
 REACH: Final = 0.7
 """Radians of phase to either side from which a speed is taken: it is right to a few thousandths,
@@ -41,7 +40,7 @@ standard errors by a few per cent."""
 DITHERED: Final = 0.55
 """Noise over count below which slow readings say nothing about noise."""
 
-FEWEST: Final = 200
+FEWEST_READINGS: Final = 200
 """Residuals from which two numbers are taken."""
 
 ROUNDS: Final = 30
@@ -193,7 +192,7 @@ def _adapted(
 
     Adapts ``E r^2 = a + b v^2`` by iterated weights ``1 / (a + b v^2)^2``.
     """
-    if residual.size < FEWEST:
+    if residual.size < FEWEST_READINGS:
         return None
     power = residual**2
     unit = float(np.mean(square))

@@ -9,30 +9,26 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.formatting import counted, moment
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
-from pendmap.records.gyroscope import gyroscope_of
-from pendmap.records.local_fit import local_fit
 from pendmap.records.noise import noise_of
 from pendmap.records.releases import enough, grown, held_short, releases
-from pendmap.records.robust import normal_scale
-from pendmap.records.runs_of import true_runs
-from pendmap.records.scale import periods_of
+from pendmap.records.rod_sensors import gyroscope_of
+from pendmap.records.scale import middle_of, periods_of
 from pendmap.records.swinging import let_go, swinging
-from pendmap.records.swings import after_turns, swings
-from pendmap.records.zero import middle_of
-from pendmap.words import counted, moment
+from pendmap.signal.half_cycles import after_turns, swings
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import normal_scale, true_runs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.records.accelerometer import Accelerometer
+    from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
     Places = tuple[int, int]
-
-__all__ = ["check", "check_zero", "moves"]
 
 STILL: Final = 8.0
 """Standard deviations of noise within which a whole period must stay to be no motion: white

@@ -10,7 +10,7 @@ gain, is noise. Three things spoil that, and each has its remedy here:
   pendulum passes at least a count from one to the next; slower than that nothing can be said but
   that an even error within a count has the standard deviation count/sqrt(12), and that is the
   least that is reported. Where nothing moves, how often each count is shown says more
-  (:mod:`pendmap.records.still`).
+  (:mod:`pendmap.records.resolution`).
 - Outliers: what is beyond eight standard deviations (robust, from quantiles, among samples of
   similar speed) is left out with all windows that it is part of, then a plain root mean square is
   taken. The median alone would be wrong by a tenth for the even errors of a counter.
@@ -28,12 +28,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.clean_fit import FEWEST, clean, only, rms, stderr
-from pendmap.records.following import apart, followed
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
-from pendmap.records.local_fit import LocalFit, local_fit
-from pendmap.records.steps import step_of
-from pendmap.records.still import still_noise
+from pendmap.records.local_fits import FEWEST, apart, clean, followed, only, rms, stderr
+from pendmap.records.resolution import step_of, still_noise
+from pendmap.signal.local_polynomial import LocalFit, local_fit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,14 +39,9 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Run
 
     Floats = NDArray[np.float64]
+    from pendmap.records.work import Work
+    from pendmap.signal.local_polynomial import LocalFit
 
-__all__ = [
-    "NoiseFloor",
-    "SpeedRange",
-    "fastest",
-    "noise_floor",
-    "noise_of",
-]
 
 EVERY: Final = 0.06
 """Radians of its own phase that a motion may pass between samples and be followed by a quartic:
@@ -251,3 +244,19 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
             sigma = max(rms(part), least)
             found.append(SpeedRange(float(low), float(high), sigma, stderr(part), part.middle.size))
     return found
+
+
+# What the noise itself tells: a clock that is not what its stamps say.
+
+
+def check(work: Work) -> None:
+    """Say so where noise grows with speed."""
+    if work.integrated:
+        return  # a late reading of a rate errs with the acceleration
+    floor = noise_of(
+        work.time, work.theta, trusted=work.trusted, count=0.0 if work.edges else work.count
+    )
+    if floor.law is not None:
+        interval = float(np.median(np.diff(work.time)))
+        part = f"{100 * floor.law.tau / interval:.0f} % of the interval"
+        work.say("noise-grows-with-speed", f"{floor.law} ({part})")

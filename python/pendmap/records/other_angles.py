@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from pendmap.records.text import Table
 
-__all__ = ["position_of"]
-
 POSITION: Final = "pos(ition)?"
 
 AGREE: Final = 0.9

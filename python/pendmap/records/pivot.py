@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.local_fit import local_fit
-from pendmap.records.steps import step_of
+from pendmap.records.resolution import step_of
+from pendmap.signal.local_polynomial import local_fit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
-
-__all__ = ["smooth"]
 
 DERIVATIVES: Final = {"m": 2, "m/s": 1}
 

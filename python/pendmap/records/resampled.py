@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.following import FARTHEST
-from pendmap.records.local_fit import local_fit
+from pendmap.formatting import counted
+from pendmap.records.local_fits import FARTHEST
 from pendmap.records.noise import DITHERED, fastest
-from pendmap.records.robust import normal_scale
-from pendmap.records.steps import step_of
-from pendmap.words import counted
+from pendmap.records.resolution import step_of
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Resampled", "check", "measured"]
 
 ORDERS: Final = {"held": 1, "straight lines": 2, "cubics": 4}
 """The difference that vanishes between readings, by how the samples between were made."""

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records import false_samples
-from pendmap.records.gyroscope import angle_of_rate
+from pendmap.formatting import counted
+from pendmap.records import outliers
 from pendmap.records.noise import noise_of
-from pendmap.records.runs_of import equal_runs
-from pendmap.records.spikes import find_spikes
-from pendmap.records.steps import step_of
+from pendmap.records.outliers import find_spikes
+from pendmap.records.resolution import step_of
+from pendmap.records.rod_sensors import angle_of_rate
 from pendmap.records.swinging import swinging
-from pendmap.words import counted
+from pendmap.signal.robust import equal_runs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["check", "say_steps"]
 
 SAME: Final = 5
 """Equal readings in a row that may be a clipped or frozen sensor."""
@@ -58,7 +57,7 @@ def check(work: Work) -> None:
     work.count = _count(work)
     _clipped(work, "rad")
     _frozen(work)
-    false_samples.find(work)
+    outliers.find(work)
 
 
 def _count(work: Work) -> float:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.formatting import counted
 from pendmap.records import acceleration_check
-from pendmap.records.local_fit import local_fit
 from pendmap.records.units import PIVOT_UNITS
-from pendmap.words import counted
+from pendmap.signal.local_polynomial import local_fit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
 
     Floats = NDArray[np.float64]
-
-__all__ = ["check"]
 
 ALIKE: Final = 0.8
 """Correlation from which two channels show the same motion."""

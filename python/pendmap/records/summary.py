@@ -8,27 +8,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.formatting import counted, moment
 from pendmap.records.noise import noise_floor
 from pendmap.records.samples import FINEST
-from pendmap.words import counted, moment
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
-
-__all__ = [
-    "as_json",
-    "as_text",
-    "doubted",
-    "doubts",
-    "doubts_said",
-    "findings_said",
-    "noise_said",
-    "noise_unit",
-    "unit_wrong",
-]
 
 UNITS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
 """Findings that a unit or a scale is wrong: unless that is mended, so is all that is fitted."""

@@ -13,16 +13,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.runs_of import true_runs
-from pendmap.records.swings import swings
+from pendmap.signal.half_cycles import swings
+from pendmap.signal.robust import true_runs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
     Places = tuple[int, int]
-
-__all__ = ["QUIET", "Swinging", "let_go", "middle_over", "swinging"]
 
 QUIET: Final = 5.0
 """Standard errors below which a reading is no swing."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.words import counted
+from pendmap.formatting import counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Places = tuple[int, int]
-
-__all__ = ["Beat", "beat_of", "begun", "check_drive", "edges_of"]
 
 BETWEEN: Final = 0.02
 """Share of the samples that may lie between two levels: those of a slow edge."""

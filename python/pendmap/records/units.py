@@ -12,16 +12,6 @@ from pendmap.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = [
-    "ANGULAR_ACCELERATIONS",
-    "CHANNELS",
-    "PIVOT_UNITS",
-    "Channel",
-    "name_and_unit",
-    "plain",
-    "spelling",
-]
-
 PIVOT_UNITS: Final = {
     "m/s2": ("m/s2", 1.0),
     "g": ("m/s2", 9.80665),

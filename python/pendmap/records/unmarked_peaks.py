@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["check"]
-
 FEWEST: Final = 6
 """Readings that show a pattern."""
 

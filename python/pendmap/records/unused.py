@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from pendmap.records.description import RunPlan
     from pendmap.records.text import Table
 
-__all__ = ["ask", "changes", "head_of"]
-
 MOTOR: Final = re.compile(
     r"\b(torques?|drehmoment|couple|tau|currents?|strom|motors?|pwm|duty|effort|actuator|u)\b"
 )

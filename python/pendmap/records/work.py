@@ -9,22 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.formatting import counted
 from pendmap.records.experiment import Finding, Segment
-from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from pendmap.records.accelerometer import Accelerometer
     from pendmap.records.channels import Channels
     from pendmap.records.description import RunPlan
+    from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.text import Table
 
     Floats = NDArray[np.float64]
-
-__all__ = ["FEWEST", "Work"]
 
 FEWEST = 5
 """Samples that a record must have; fewer show no swing."""

@@ -8,20 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 
-__all__ = [
-    "Block",
-    "Document",
-    "Formula",
-    "Items",
-    "Name",
-    "Paragraph",
-    "Picture",
-    "Section",
-    "Strong",
-    "Table",
-    "Text",
-]
-
 
 @dataclasses.dataclass(frozen=True)
 class Name:

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from pendmap.report.document import Block, Document, Text
 
-__all__ = ["as_html"]
-
 STYLE: Final = """
 body { max-width: 56rem; margin: 2rem auto; padding: 0 1rem; color: #222; background: #fff;
        font: 1rem/1.5 system-ui, sans-serif; }

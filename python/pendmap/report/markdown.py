@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from pendmap.report.document import Block, Document, Text
 
-__all__ = ["as_markdown"]
-
 SPECIAL: Final = re.compile(r"([\\`*_{}\[\]<>#|~$&!])")
 """What Markdown would take for a mark."""
 

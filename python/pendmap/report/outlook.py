@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.next_experiment.advice import MARGIN
-from pendmap.diagnosis.next_experiment.limits import SURELY
-from pendmap.identification.left_out import left_out
-from pendmap.pictures.names import unit_of
+from pendmap.diagnosis.next_experiment.limits import MARGIN, SURELY
+from pendmap.formatting import counted
+from pendmap.identification.experiment import left_out
+from pendmap.model.labels import unit_of
 from pendmap.report.document import Items, Name, Paragraph, Section, Strong, Table
 from pendmap.report.wording import chance, gained, joined, number
-from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,9 +20,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.next_experiment.limits import Limit
     from pendmap.diagnosis.next_experiment.power import Outlook
     from pendmap.report.document import Block, Text
-
-__all__ = ["following", "set_aside"]
-
 
 ROWS: Final = 8
 """Kinds of run that the table of proposals shows."""

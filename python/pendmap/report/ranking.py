@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.alternatives import Rival, Standing
     from pendmap.report.document import Block
 
-__all__ = ["ranked"]
-
 RIVALS: Final = 4
 """Rivals of an effect that are shown."""
 

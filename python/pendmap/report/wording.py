@@ -5,31 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from pendmap.formatting import written
+from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
-from pendmap.pictures.names import unit_of
 from pendmap.report.document import Name, Strong, Table
-from pendmap.words import written
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from pendmap.diagnosis import Discrepancy, NamedEffect
-
-__all__ = [
-    "chance",
-    "compared",
-    "gained",
-    "joined",
-    "lead",
-    "mrad",
-    "number",
-    "own_parameters",
-    "quantity",
-    "share",
-    "stated",
-    "values",
-    "within",
-]
 
 Parts = tuple[str | Name | Strong, ...]
 

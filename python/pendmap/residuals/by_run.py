@@ -15,11 +15,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.residuals.noise import Remainder
-
-__all__ = ["RunByRun", "run_by_run"]
 
 CHANCE: Final = 1e-3
 """Probability that noise alone makes a parameter differ between runs, below which it differs."""

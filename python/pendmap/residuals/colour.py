@@ -40,8 +40,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Laws", "laws_of"]
-
 COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 101))
 """Correlations from sample to sample that are tried."""
 

@@ -23,12 +23,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Remainder", "remainder_of"]
 
 FOR_SURE: Final = 1e9
 """So many amplitudes tell a level for sure."""

@@ -16,12 +16,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
 
     Floats = NDArray[np.float64]
-
-__all__ = ["BINS", "PHASES", "Spectra", "spectra_of"]
 
 BINS: Final = 256
 """Bins of frequency, from 0 to half the rate of sampling."""

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["Response", "calm_responses", "frequencies", "instants"]
-
 KEPT: Final = 4
 """Frequencies, or instants, that are kept."""
 

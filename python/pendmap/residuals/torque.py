@@ -30,14 +30,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
     from pendmap.residuals.noise import Remainder
 
     Floats = NDArray[np.float64]
-
-__all__ = ["OVER", "freed", "residual_torque", "responses", "standing_out", "windows_of"]
 
 OVER: Final = {
     "angle": "rad",

@@ -11,10 +11,10 @@ import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pendmap.charts.basins import refuse_too_large
+from pendmap.charts.selection import shown
 from pendmap.errors import InputError
 from pendmap.files import whole_file
-from pendmap.pictures.layers import refuse_too_large
-from pendmap.pictures.selection import shown
 from pendmap.viewer import (
     basins,
     diagrams,

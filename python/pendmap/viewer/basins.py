@@ -9,16 +9,13 @@ import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap import palette
-from pendmap.model.units import Units
-from pendmap.pictures import layers as layering
-from pendmap.pictures import legend, plane
+from pendmap.charts import basins as layering
+from pendmap.charts import legend, palette, plane
+from pendmap.units import Units
 from pendmap.viewer import frame
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 CELLS = 4096
 """Rows and columns of an image at most: graphics processors take no larger ones for sure."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.pictures import names
+from pendmap.charts import names
 from pendmap.viewer import columns, frame, series
 from pendmap.viewer.columns import Look
 from pendmap.viewer.comparison import drawn_at
@@ -20,9 +20,8 @@ from pendmap.viewer.series import Series
 
 if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
-    from pendmap.identification.fitting import FitRun, TrajectoryFit
-
-__all__ = ["Beside", "beside", "log", "magnified", "views"]
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
 
 Floats = npt.NDArray[np.float64]
 

@@ -11,8 +11,6 @@ import rerun as rr
 
 from pendmap.viewer import frame
 
-__all__ = ["FASTEST", "LATEST", "Look", "at", "points", "strips"]
-
 Floats = npt.NDArray[np.float64]
 
 FASTEST, LATEST = 1e30, 9e9

@@ -10,16 +10,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
+from pendmap.analysis.trajectory import simulate
 from pendmap.errors import InputError
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.table1 import first_state
-from pendmap.trajectory import simulate
 
 if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport
     from pendmap.records import Run
-
-__all__ = ["INSTANTS", "PER_SWING", "Comparison", "comparisons", "drawn_at"]
 
 Floats = npt.NDArray[np.float64]
 

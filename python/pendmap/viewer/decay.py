@@ -11,16 +11,14 @@ import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.model.units import Units
-from pendmap.pictures import names, plane
+from pendmap.charts import names, plane
+from pendmap.units import Units
 from pendmap.viewer import columns, frame, series
 from pendmap.viewer.columns import Look
 from pendmap.viewer.series import Series
 
 if TYPE_CHECKING:
     from pendmap.viewer.comparison import Comparison
-
-__all__ = ["log", "views"]
 
 Floats = npt.NDArray[np.float64]
 

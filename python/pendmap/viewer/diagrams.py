@@ -8,16 +8,14 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.model.units import Units
-from pendmap.pictures import diagrams as drawn
-from pendmap.pictures import names, plane
+from pendmap.charts import bifurcation as drawn
+from pendmap.charts import names, plane
+from pendmap.units import Units
 from pendmap.viewer import frame
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:

@@ -11,9 +11,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap import report
+from pendmap.charts.diagnosis import OVER_SAID
 from pendmap.errors import InputError
 from pendmap.files import whole_file
-from pendmap.pictures.diagnosis import OVER_SAID
 from pendmap.viewer import beside, columns, frame
 from pendmap.viewer.beside import AFTER, BEFORE
 from pendmap.viewer.panel import Panel
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from pendmap.diagnosis import Discrepancy
     from pendmap.viewer.beside import Beside
-
-__all__ = ["record_discrepancy"]
 
 Z95 = 1.959963984540054
 

@@ -10,17 +10,14 @@ import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap import palette
-from pendmap.model.units import Units
-from pendmap.pictures import exponents as drawn
-from pendmap.pictures import names, plane
+from pendmap.charts import lyapunov as drawn
+from pendmap.charts import names, palette, plane
+from pendmap.units import Units
 from pendmap.viewer import frame
 from pendmap.viewer.panel import Panel
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 Floats = npt.NDArray[np.float64]
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.pictures.names import unit_of
-from pendmap.words import counted, written
+from pendmap.formatting import counted, written
+from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from pendmap.identification import Estimate, Identification, IdentificationReport
-
-__all__ = ["page"]
 
 COMPARED: Final = ("w0", "c_over_m", "Tr")
 """What all methods are compared by."""

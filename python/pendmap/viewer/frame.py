@@ -11,8 +11,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.model.units import NONDIMENSIONAL, VELOCITY, Units
-from pendmap.pictures import names, plane
+from pendmap.charts import names, plane
+from pendmap.units import NONDIMENSIONAL, VELOCITY, Units
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -20,21 +20,6 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
     import xarray as xr
-
-__all__ = [
-    "INK",
-    "Frame",
-    "describe",
-    "identified",
-    "pieces",
-    "recording",
-    "screen",
-    "strict",
-    "summary",
-    "text",
-    "write",
-    "written",
-]
 
 INK = (150, 150, 150)
 """Lines and labels in a mid tone: the background may be light or dark."""

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from pendmap.identification import IdentificationReport
 
-__all__ = ["record_identification"]
-
 
 def record_identification(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
     """Write the recording of an identification, with the layout in which the viewer shows it.

@@ -8,16 +8,14 @@ import numpy as np
 import numpy.typing as npt
 import rerun.blueprint as rrb
 
-from pendmap import palette
-from pendmap.pictures import lifetimes as drawn
+from pendmap.charts import lifetime as drawn
+from pendmap.charts import palette
 from pendmap.viewer import frame
 from pendmap.viewer.panel import Panel
 
 if TYPE_CHECKING:
     import rerun as rr
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 Floats = npt.NDArray[np.float64]
 

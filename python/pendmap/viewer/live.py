@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     Floats = npt.NDArray[np.float64]
 
-__all__ = ["ADDRESS", "Live", "NobodyListensError", "check_address"]
-
 ADDRESS: Final = "127.0.0.1:9876"
 """Where a viewer listens unless it is told otherwise."""
 

@@ -8,14 +8,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.pictures.melnikov import highest
+from pendmap.charts.melnikov import highest
 from pendmap.viewer import frame
 from pendmap.viewer.panel import Panel
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 _COLOURS = {"loop": (40, 40, 40), "forward": (213, 94, 0), "backward": (0, 114, 178)}
 _OWN = (204, 121, 167)

@@ -8,17 +8,14 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap import palette
-from pendmap.model.units import Units
-from pendmap.pictures import orbits as drawn
-from pendmap.pictures import plane
+from pendmap.charts import orbits as drawn
+from pendmap.charts import palette, plane
+from pendmap.units import Units
 from pendmap.viewer import frame
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:

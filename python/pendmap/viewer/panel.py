@@ -10,13 +10,11 @@ import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.pictures import plane
+from pendmap.charts import plane
 from pendmap.viewer import frame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-__all__ = ["Panel"]
 
 Floats = npt.NDArray[np.float64]
 

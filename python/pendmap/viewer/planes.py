@@ -8,14 +8,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap import palette
-from pendmap.pictures import planes as drawn
+from pendmap.charts import palette
+from pendmap.charts import parameter_map as drawn
 from pendmap.viewer import frame
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 SIZE, STRIPE = 1200, 8
 """Pixels of the picture of kinds, and of a stripe in it."""

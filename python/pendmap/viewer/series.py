@@ -10,8 +10,6 @@ import rerun as rr
 
 from pendmap.viewer import columns
 
-__all__ = ["Series", "log"]
-
 Floats = npt.NDArray[np.float64]
 
 

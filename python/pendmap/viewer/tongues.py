@@ -8,15 +8,13 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.critical_curves import NEAR
-from pendmap.pictures import tongues as drawn
+from pendmap.analysis.tongues import NEAR
+from pendmap.charts import tongues as drawn
 from pendmap.viewer import frame
 from pendmap.viewer.panel import Panel
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["blueprint", "log"]
 
 _ROOTS = {"omega-p": ("tongues", "Frequency and amplitude"), "e-alpha2": ("paper", "Eq. 1.4")}
 _CURVES = {1: ("plus", (213, 94, 0)), -1: ("minus", (0, 114, 178))}

@@ -11,10 +11,10 @@ import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.energy import energy
+from pendmap.analysis.trajectory import energy
+from pendmap.charts import curves, names, plane
 from pendmap.errors import InputError
-from pendmap.model.units import TIME, Units
-from pendmap.pictures import curves, names, plane
+from pendmap.units import TIME, Units
 from pendmap.viewer import columns, frame
 from pendmap.viewer.columns import FASTEST, LATEST, Look
 
@@ -24,23 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     Attributes = Mapping[Any, Any]
-
-__all__ = [
-    "BINS",
-    "Motion",
-    "behind",
-    "blueprint",
-    "curve",
-    "frame_of",
-    "layout",
-    "log",
-    "moving",
-    "refuse_beyond",
-    "section",
-    "series",
-    "still",
-    "summary",
-]
 
 Floats = npt.NDArray[np.float64]
 

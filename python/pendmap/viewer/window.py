@@ -14,15 +14,6 @@ from pathlib import Path
 
 from pendmap.errors import InputError
 
-__all__ = [
-    "NoDisplayError",
-    "NotARecordingError",
-    "RecordingNotFoundError",
-    "ViewerError",
-    "check_display",
-    "open_viewer",
-]
-
 MAGIC = b"RRF2"
 """How a recording begins."""
 

@@ -6,18 +6,15 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.ageing import AGEING
-from pendmap.virtual_rig.damping import DAMPING
-from pendmap.virtual_rig.readings import READINGS
-from pendmap.virtual_rig.stands import STANDS
-from pendmap.virtual_rig.torques import TORQUES
+from pendmap.virtual_rig.effects.damping import AGEING, DAMPING
+from pendmap.virtual_rig.effects.readings import READINGS
+from pendmap.virtual_rig.effects.stand import STANDS
+from pendmap.virtual_rig.effects.torques import TORQUES
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from pendmap.virtual_rig.effect import Effect
-
-__all__ = ["ANY", "EFFECTS", "NONE", "describe", "draw", "draws_size"]
+    from pendmap.virtual_rig.effects.base import Effect
 
 EFFECTS: Final[dict[str, type[Effect]]] = {
     effect.full_name(): effect for effect in (*DAMPING, *AGEING, *TORQUES, *STANDS, *READINGS)

@@ -10,19 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.effect import Motion
+from pendmap.virtual_rig.effects.base import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.virtual_rig.drive import Drive
-    from pendmap.virtual_rig.effect import Effect
+    from pendmap.virtual_rig.effects.base import Drive, Effect
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Equation", "Parameters"]
 
 
 @dataclasses.dataclass(frozen=True)

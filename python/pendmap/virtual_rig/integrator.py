@@ -12,17 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendmap.virtual_rig.collocation import NODES, basis
+from pendmap.virtual_rig.events import first_switches
 from pendmap.virtual_rig.lanes import Lanes, Starts
+from pendmap.virtual_rig.path import NODES, basis
 from pendmap.virtual_rig.step import solve
-from pendmap.virtual_rig.switches import first_switches
 
 if TYPE_CHECKING:
     from pendmap.virtual_rig.equation import Equation
     from pendmap.virtual_rig.path import Path
     from pendmap.virtual_rig.step import Step
-
-__all__ = ["Starts", "integrate"]
 
 
 def integrate(equation: Equation, starts: Starts) -> list[Path]:

@@ -14,13 +14,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.virtual_rig.effect import Motion
+    from pendmap.virtual_rig.effects.base import Motion
     from pendmap.virtual_rig.equation import Equation
 
     Floats = NDArray[np.float64]
     Indices = NDArray[np.intp]
-
-__all__ = ["Lanes", "Starts"]
 
 _FIRST: Final = 0.25
 """The first step, as a share of the longest."""

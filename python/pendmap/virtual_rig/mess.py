@@ -13,19 +13,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.virtual_rig.effect import Effect
-from pendmap.virtual_rig.readings import fading
+from pendmap.virtual_rig.effects.base import Effect
+from pendmap.virtual_rig.effects.readings import fading
 
 if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
-    from pendmap.virtual_rig.effect import Motion
+    from pendmap.virtual_rig.effects.base import Motion
     from pendmap.virtual_rig.sensor import Sensor
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Mess", "Texture"]
 
 ORDERS: Final = (2, 40)
 """Orders per turn of a texture, the least and the greatest."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from numpy.random import Generator
 
-__all__ = ["PRESETS", "Preset", "RunPlan"]
-
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.readings import fading
+from pendmap.virtual_rig.effects.readings import fading
 
 if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
-
-__all__ = ["Sensor"]
 
 _LONGEST_GAP: Final = 20
 """Samples that a dropout can swallow."""

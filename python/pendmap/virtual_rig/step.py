@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.virtual_rig import collocation as gauss
+from pendmap.virtual_rig import path as gauss
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Indices = NDArray[np.intp]
-
-__all__ = ["Step", "solve"]
 
 TOLERANCE: Final = 1e-11
 """Largest last coefficients of a velocity's polynomial, rad/s."""

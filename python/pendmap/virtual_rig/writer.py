@@ -16,10 +16,8 @@ from pendmap.files import check_room, toml_text, whole_file, whole_folder
 if TYPE_CHECKING:
     import os
 
-    from pendmap.virtual_rig.effect import Effect
+    from pendmap.virtual_rig.effects.base import Effect
     from pendmap.virtual_rig.experiment import Experiment, Run
-
-__all__ = ["FORMAT_VERSION", "Places", "held_out", "places", "write"]
 
 FORMAT_VERSION: Final = 1
 """Version of the layout of the truth file."""

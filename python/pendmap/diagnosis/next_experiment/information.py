@@ -21,10 +21,10 @@ from pendmap.comparison.data import held_parts
 from pendmap.comparison.replay import Motion, replayed
 from pendmap.diagnosis.candidates import placed
 from pendmap.errors import FitDiverged
-from pendmap.identification.free import PER_RUN
+from pendmap.formatting import counted
+from pendmap.identification.parameters import PER_RUN
 from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
 from pendmap.identification.sensitivity import window_slopes
-from pendmap.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,13 +36,11 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.next_experiment.proposals import Planned, Proposal, Start
     from pendmap.diagnosis.state import Found
-    from pendmap.identification.fitting import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.sensitivity import WindowSlopes
 
     Floats = NDArray[np.float64]
     Windows = tuple[tuple[int, int, int, float, float], ...]
-
-__all__ = ["Columns", "Information", "Prospects"]
 
 FOLLOWED: Final = 1e-9
 """Directions of the others whose information is less than this part of the greatest are none."""

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from pendmap.diagnosis.candidates import Candidate, candidates
-from pendmap.diagnosis.intervals import Z95
 from pendmap.diagnosis.next_experiment.information import Prospects
 from pendmap.diagnosis.next_experiment.proposals import menu_of
+from pendmap.diagnosis.refit import Z95
 from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
@@ -32,19 +32,6 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.next_experiment.proposals import Proposal
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Found
-
-__all__ = [
-    "CLEAR",
-    "HALF",
-    "Aim",
-    "Outlook",
-    "Prospect",
-    "one_left",
-    "seen",
-    "separated",
-    "tightened",
-    "wrong_name",
-]
 
 CLEAR: Final = 25.0
 """``s G`` from which a wrong name has a chance of 0.6 % at most."""

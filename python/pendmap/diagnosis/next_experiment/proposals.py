@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.words import counted
+from pendmap.formatting import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import Evidence
     from pendmap.identification.runs import FitRun
-
-__all__ = ["Planned", "Proposal", "Start", "menu_of"]
 
 RELEASES: Final = (0.5, 1.2, 2.0, 2.8)
 """Angles of release, rad, as far as the rig has them: small swings, and up to nearly inverted."""

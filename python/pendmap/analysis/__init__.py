@@ -1,0 +1,1 @@
+"""Analyses of one pendulum: one module a command."""

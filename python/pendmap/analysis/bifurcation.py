@@ -1,0 +1,343 @@
+"""Bifurcation diagrams: attractors along one parameter, all of them, and followed up and down."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core
+from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, undecided
+from pendmap.analysis.regimes import kind_of
+from pendmap.analysis.summary import box_said, of_model
+from pendmap.analysis.sweep import STARTS, CellSearch, title, varied, without_damping
+from pendmap.errors import check_callable, check_number, core_errors
+from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.formatting import counted
+from pendmap.model import without_dimensions
+from pendmap.units import VELOCITY
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from pendmap.analysis.grid import Grid
+    from pendmap.analysis.sweep import Varied
+    from pendmap.model import Pendulum, Rig
+    from pendmap.units import Units
+
+
+_SAME = 1e-4
+"""Points of orbits that are so near, in rad and in units of velocity, are one."""
+
+_LISTED = 12
+
+
+def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    ranges: Mapping[str, tuple[float, float, int]],
+    *,
+    start: tuple[float, float] | None = None,
+    starts: int = STARTS,
+    box: Grid | None = None,
+    tol: float = 1e-6,
+    max_periods: int | None = None,
+    threads: int | None = None,
+    seed: int = 0,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """Stroboscopic points of the attractors against one parameter.
+
+    At every value all attractors are searched as by :func:`pendmap.parameter_map`: from several
+    starts, and from what neighbouring values have. Besides, one motion is followed as the parameter
+    slowly grows, and one as it falls: at each value it goes on from where it was, moved by 1e-6,
+    until it has arrived on an attractor. Where the two differ there is hysteresis.
+
+    Attractors at neighbouring values that are alike (same kind, period and winding, points near one
+    another) make a branch. At a bifurcation one branch ends and others begin.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; the parameter that varies replaces its own.
+    ranges : mapping of str to (float, float, int)
+        One parameter with first value, last value (both included) and how many; names as of
+        :func:`pendmap.parameter_map`.
+    start : (float, float), optional
+        Angle and velocity from which both sweeps start; by default each on the attractor that most
+        starts end on there.
+    starts, box, tol, max_periods, threads, seed, progress
+        As of :func:`pendmap.parameter_map`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
+        ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
+        ``entry_value`` and ``entry_branch``; ``undecided``, ``failed`` and ``chaos_periods`` over
+        the parameter as of that function; branches over ``branch``: ``branch_kind``,
+        ``branch_w``, ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the
+        entry that the sweep is on, -1 where that is none of them; its points there over ``loose``.
+
+    Raises
+    ------
+    InputError
+        If a parameter or value is not allowed, the model has an effect that no map can have, or no
+        step reaches ``tol``.
+    MemoryError
+        If there is too little memory for the values.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    (axis,) = varied(model, ranges, 1)
+    check_callable("progress", progress)
+    search = CellSearch(starts, box, tol, max_periods, threads, seed)
+    theta, velocity = search.initial(units)
+    first = None
+    if start is not None:
+        angle, speed = (check_number("start", part) for part in start)
+        first = (angle, units.bare(speed, VELOCITY))
+    began = time.perf_counter()
+    with core_errors():
+        raw = _core.bifurcation(
+            pendulum.parameters,
+            axis.kernel,
+            theta,
+            velocity,
+            starts,
+            first,
+            tol,
+            max_periods,
+            search.workers,
+            progress,
+        )
+    dataset = _dataset(raw, axis, units)
+    dataset.attrs = {
+        "kind": "bifurcation",
+        "title": title(model, axis),
+        **model.attributes,
+        "section": model.units.section,
+        "varied": axis.name,
+        "points": dataset.sizes["point"],
+        **search.attributes(raw, units),
+        "seconds": time.perf_counter() - began,
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [
+        *_summary(dataset),
+        *without_damping(model, axis),
+        *of_model(model, "attractors are"),
+    ]
+    dataset.attrs["summary"] = "\n".join(lines)
+    return dataset
+
+
+def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
+    names = [
+        kind_of(kind, int(n), int(w))
+        for kind, n, w in zip(raw["kind"], raw["n"], raw["w"], strict=True)
+    ]
+    kinds = sorted(set(names))
+    which = np.array([kinds.index(name) for name in names], dtype=np.intp)
+    found = branches(raw, axis.values.size)
+    owner = raw["point_entry"]
+    value = axis.values[raw["cell"]] if raw["cell"].size else np.empty(0)
+    speed = {"units": units.of_velocity}
+    ends = np.array([[own[0], own[-1]] for own in found.members], dtype=np.intp).reshape(-1, 2)
+    loose = {
+        key: np.concatenate([raw[f"up_{key}"], raw[f"down_{key}"]])
+        for key in ("value", "theta", "velocity")
+    }
+    data: dict[str, Any] = {
+        **entries(raw, which, units),
+        "entry_value": ("entry", value, axis.attributes),
+        "entry_branch": ("entry", found.of_entry),
+        "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
+        "branch_w": ("branch", raw["w"][ends[:, 0]]),
+        "branch_first": ("branch", value[ends[:, 0]], axis.attributes),
+        "branch_last": ("branch", value[ends[:, 1]], axis.attributes),
+        "point_entry": ("point", owner),
+        "point_value": ("point", value[owner], axis.attributes),
+        "point_theta": ("point", raw["point_theta"], {"units": "rad"}),
+        "point_velocity": ("point", units.given(raw["point_velocity"], VELOCITY), speed),
+        "up": (axis.name, raw["up"], {"comment": "entry, -1: none"}),
+        "down": (axis.name, raw["down"], {"comment": "entry, -1: none"}),
+        "undecided": (axis.name, raw["undecided"]),
+        "failed": (axis.name, raw["failed"]),
+        "chaos_periods": (axis.name, raw["chaos_periods"], {"comment": CHAOS_PERIODS}),
+        "loose_sweep": (
+            "loose",
+            np.repeat([1, -1], [raw["up_value"].size, raw["down_value"].size]),
+        ),
+        "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
+        "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
+        "loose_velocity": ("loose", units.given(loose["velocity"], VELOCITY), speed),
+    }
+    coordinates = {
+        **axis.coordinates,
+        "kind": ("kind", np.array(kinds, dtype=str)),
+        "entry": ("entry", np.arange(which.size)),
+    }
+    return xr.Dataset(data, coords=coordinates)
+
+
+def _summary(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    name = a["varied"]
+    values = dataset[name].values
+    count = dataset.sizes["branch"]
+    joined = counted(count, "branch", "branches")
+    lines = [
+        f"{name} = {values[0]:g} to {values[-1]:g}: {counted(values.size, 'value')}, {joined}."
+    ]
+    first, last = dataset["branch_first"].values, dataset["branch_last"].values
+    longest = np.argsort(-(last - first), kind="stable")[:_LISTED]
+    for k in sorted(longest, key=lambda k: (first[k], last[k])):
+        kind = str(dataset["kind"].values[int(dataset["branch_kind"][k])])
+        sense = {1: ", forward", -1: ", backward"}.get(int(np.sign(dataset["branch_w"][k])), "")
+        lines.append(f"{kind}{sense}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
+    if count > _LISTED:
+        lines.append(f"{count - _LISTED} shorter branches are in the result.")
+    lines += _hysteresis(dataset, name) if count else ["Nothing attracts, as far as was seen."]
+    lines += [*chaos(a), *undecided(a)]
+    where = dataset["undecided"].values > 0
+    if where.any():
+        lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")
+    lines.append(
+        f"{counted(a['starts'], 'start')} a value, {box_said(a)}; {counted(a['points'], 'point')}; "
+        f"error after 5 periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "
+        f"{counted(a['threads'], 'thread')}."
+    )
+    return lines
+
+
+def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
+    """Say where the sweeps are on attractors of two kinds, or on two of one kind."""
+    up, down = dataset["up"].values, dataset["down"].values
+    kind = np.append(dataset["entry_kind"].values, -1)
+    differ = kind[up] != kind[down]
+    lines = ["Up and down are on the same kinds of attractor everywhere."]
+    if differ.any():
+        lines = [
+            f"Up and down differ at {name} = {_spans(dataset[name].values, differ)}: hysteresis."
+        ]
+    others = ~differ & (up != down)
+    if others.any():
+        images = all(_mirrored(dataset, up[k], down[k]) for k in np.flatnonzero(others))
+        which = "mirror images of one another" if images else "different attractors of one kind"
+        lines.append(f"They are on {which} at {name} = {_spans(dataset[name].values, others)}.")
+    return lines
+
+
+def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
+    """Return the widest ranges of values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
+    spans = sorted(zip(edges[::2], edges[1::2] - 1, strict=True), key=lambda s: s[0] - s[1])[:3]
+    said = ", ".join(
+        f"{values[i]:.4g} to {values[j]:.4g}" if j > i else f"{values[i]:.4g}"
+        for i, j in sorted(spans)
+    )
+    return said + (" and less" if len(edges) > 2 * len(spans) else "")
+
+
+def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:
+    """Whether two attractors are mirror images: orbits by a point, chaos by its sense."""
+    n, w = dataset["entry_n"].values, dataset["entry_w"].values
+    if n[one] != n[other] or w[one] != -w[other]:
+        return False
+    if n[one] == 0:
+        return bool(w[one] != 0)
+    # The points stand in the order of their attractors.
+    owner = dataset["point_entry"].values
+    first, there = (slice(*np.searchsorted(owner, (k, k + 1))) for k in (one, other))
+    theta, velocity = dataset["point_theta"].values, dataset["point_velocity"].values
+    apart = np.abs(np.exp(1j * theta[there]) - np.exp(-1j * theta[first][0]))
+    apart += np.abs(velocity[there] + velocity[first][0])
+    return bool(apart.min() < _SAME)
+
+
+# Branches: attractors at neighbouring values of a parameter that are one and the same.
+
+
+_NEAR = 0.3
+"""Nearest points of neighbouring attractors of one branch are nearer than this, in rad and 1."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Branches:
+    """Which branch each attractor belongs to.
+
+    Attributes
+    ----------
+    of_entry : ndarray
+        Branch of each entry, from 0.
+    members : list of list of int
+        Entries of each branch, value by value.
+    """
+
+    of_entry: NDArray[np.int32]
+    members: list[list[int]]
+
+
+def branches(raw: dict[str, Any], values: int) -> Branches:
+    """Link attractors at neighbouring values.
+
+    Two are linked where kind, period and winding agree and their points are nearest to one another,
+    and near; chaos of one kind and sense is linked whatever its points.
+
+    Parameters
+    ----------
+    raw : dict
+        ``cell``, ``kind``, ``n``, ``w`` of the entries, and ``point_entry``, ``point_theta``,
+        ``point_velocity``, as the core gives them.
+    values : int
+        How many values the parameter has.
+    """
+    cell = raw["cell"]
+    bounds = np.searchsorted(cell, np.arange(values + 1))
+    first = np.searchsorted(raw["point_entry"], np.arange(cell.size + 1))
+    plane = np.stack([raw["point_theta"], raw["point_velocity"]], axis=1)
+    key = [
+        (kind, int(n), int(w)) for kind, n, w in zip(raw["kind"], raw["n"], raw["w"], strict=True)
+    ]
+    of_entry = np.full(cell.size, -1, dtype=np.int32)
+    members: list[list[int]] = []
+    for value in range(values):
+        here = range(bounds[value], bounds[value + 1])
+        before = range(bounds[value - 1], bounds[value]) if value else range(0)
+        pairs = sorted(
+            (apart, a, b)
+            for a in before
+            for b in here
+            if key[a] == key[b]
+            and (apart := _apart(plane, first, a, b, closed=key[a][1] > 0)) < _NEAR
+        )
+        taken: set[int] = set()
+        for _, a, b in pairs:
+            if a not in taken and of_entry[b] < 0:
+                taken.add(a)
+                of_entry[b] = of_entry[a]
+                members[of_entry[a]].append(b)
+        for b in here:
+            if of_entry[b] < 0:
+                of_entry[b] = len(members)
+                members.append([b])
+    return Branches(of_entry, members)
+
+
+def _apart(
+    plane: NDArray[np.float64], first: NDArray[np.intp], a: int, b: int, *, closed: bool
+) -> float:
+    """Return how far the first point of ``a`` is from the nearest of ``b``; 0 for chaos."""
+    if not closed:
+        return 0.0
+    gap = plane[first[b] : first[b + 1]] - plane[first[a]]
+    gap[:, 0] = (gap[:, 0] + np.pi) % (2 * np.pi) - np.pi
+    return float(np.hypot(gap[:, 0], gap[:, 1]).min())

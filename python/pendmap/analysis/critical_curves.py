@@ -1,0 +1,272 @@
+"""Where critical curves need more frequencies: they turn, end or bend between two of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+
+Floats: TypeAlias = NDArray[np.float64]
+
+_BENT = 2e-3
+"""A line may miss its curve by this part of the picture's height."""
+
+_APART = 4e-3
+"""Where a curve turns back its two sides come so near, in parts of that height."""
+
+_STRIP = 1e-6
+"""A stable strip narrower than this is a line, and rounding decides whether its edges are found."""
+
+_STEP = 1 / 1000
+_NOSE = 1e-6
+"""Bends and turns are resolved down to these parts of the picture's width: at a turn the height
+goes with the root of the distance."""
+
+_GRADED = 4.5
+"""An interval is at most this many times as long as its neighbours."""
+
+_ROUNDS = 24
+_IN_VIEW = 1.05
+
+
+def denser(
+    frequencies: Floats,
+    found: list[Any],
+    solve: Callable[[Floats], list[Any]],
+    curves: Callable[[Any], list[tuple[Floats, Floats]]],
+    views: Sequence[Callable[[Floats, Floats], tuple[Floats, Floats]]],
+) -> tuple[Floats, list[Any]]:
+    """Return frequencies with others between them, and what is found at each.
+
+    Parameters
+    ----------
+    frequencies : ndarray
+        Ascending, two or more.
+    found : list
+        What was found at each of them; stays as it is.
+    solve : callable
+        Returns what is found at each of some others.
+    curves : callable
+        Takes what was found at one of them: amplitudes, ascending, and multipliers, for each model;
+        the last amplitude is the largest that was looked for.
+    views : sequence of callable
+        Take frequencies and amplitudes into a picture that is [0, 1] wide and high.
+
+    Notes
+    -----
+    Intervals are halved in which a curve begins or ends, and beside a place where it bends, as long
+    as that is in view. Which, does not depend on anything but the model and the frequencies.
+    """
+    found = list(found)
+    for _ in range(_ROUNDS):
+        rows = [curves(one) for one in found]
+        wanted = np.zeros(frequencies.size - 1, dtype=bool)
+        for view in views:
+            x = view(frequencies, np.zeros_like(frequencies))[0]
+            for model in zip(*rows, strict=True):
+                columns = [
+                    _Column.of(view(np.full_like(p, w), p)[1], multiplier)
+                    for w, (p, multiplier) in zip(frequencies, model, strict=True)
+                ]
+                wanted |= _wanted(x, columns)
+        halved = _graded(np.diff(frequencies), wanted)
+        if not halved.size:
+            break
+        between = (frequencies[halved] + frequencies[halved + 1]) / 2
+        more = solve(between)
+        frequencies = np.insert(frequencies, halved + 1, between)
+        for k, one in sorted(zip(halved, more, strict=True), key=lambda pair: -pair[0]):
+            found.insert(k + 1, one)
+    return frequencies, found
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Critical points at one frequency, in parts of the picture's height."""
+
+    heights: Floats
+    multiplier: Floats
+    end: float
+    """The height of the largest amplitude that was looked for."""
+
+    @classmethod
+    def of(cls, heights: Floats, multiplier: Floats) -> Self:
+        """Leave out those on both sides of a stable strip that is only a line."""
+        kept: list[int] = []
+        for k, height in enumerate(heights[:-1]):
+            other = kept and multiplier[kept[-1]] == -multiplier[k]
+            if other and height - heights[kept[-1]] < _STRIP:
+                kept.pop()
+            else:
+                kept.append(k)
+        return cls(heights[kept], multiplier[kept], float(heights[-1]))
+
+
+def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
+    """Tell which intervals are to be halved for the curves of one model."""
+    widths = np.abs(np.diff(x))
+    wanted = np.zeros(widths.size, dtype=bool)
+    for k, (a, b) in enumerate(pairwise(columns)):
+        if a.heights.size != b.heights.size and widths[k] > _NOSE:
+            wanted[k] |= _seen_to_end(a, b)
+    for k in range(1, x.size - 1):
+        before, here, after = (one.heights for one in columns[k - 1 : k + 2])
+        if not here.size == before.size == after.size:
+            continue
+        part = (x[k] - x[k - 1]) / (x[k + 1] - x[k - 1])
+        off = np.abs(before + part * (after - before) - here) > _BENT
+        if (off & (np.minimum(before, after) < _IN_VIEW)).any():
+            wanted[k - 1] |= bool(widths[k - 1] > _STEP)
+            wanted[k] |= bool(widths[k] > _STEP)
+    return wanted
+
+
+def _seen_to_end(a: _Column, b: _Column) -> bool:
+    """Whether curves that go no further in one of two columns are seen to end.
+
+    They are those neighbours in the longer one that leave the rest nearest to the shorter one. A
+    curve ends where it turns back, beside its other side, or at the largest amplitude.
+    """
+    short, long = sorted((a, b), key=lambda one: one.heights.size)
+    extra = long.heights.size - short.heights.size
+
+    def left(k: int) -> float:
+        kept = np.delete(long.heights, slice(k, k + extra))
+        return float(np.abs(kept - short.heights).sum())
+
+    first = min(range(short.heights.size + 1), key=left)
+    gone = slice(first, first + extra)
+    heights, multiplier = long.heights[gone], long.multiplier[gone]
+    ended = long.end - heights < _APART
+    turns = (np.diff(heights) < _APART) & (np.diff(multiplier) == 0)
+    ended[1:] |= turns
+    ended[:-1] |= turns
+    return bool((~ended & (heights < _IN_VIEW)).any())
+
+
+def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the places of intervals to halve, those much longer than their neighbours too."""
+    while True:
+        after = np.where(wanted, widths / 2, widths)
+        longer = np.zeros_like(wanted)
+        longer[1:] |= after[1:] > _GRADED * after[:-1]
+        longer[:-1] |= after[:-1] > _GRADED * after[1:]
+        longer &= ~wanted
+        if not longer.any():
+            return np.flatnonzero(wanted)
+        wanted = wanted | longer
+
+
+# The planes in which critical curves are drawn, and what a picture of each shows.
+
+
+PLANES = ("omega-p", "e-alpha2")
+"""Eq. 1.2's ``(omega, p)``, and eq. 1.4's ``(alpha^2, e) = (1/omega^2, p/omega^2)``."""
+
+_HIGHEST = 2.6
+"""Largest ``e`` of a picture in the plane of eq. 1.4, if so much was computed."""
+
+
+def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
+    """Return points given by frequency and amplitude in one of :data:`PLANES`."""
+    if plane == PLANES[0]:
+        return omega, p
+    square = 1 / np.asarray(omega) ** 2
+    return square, p * square
+
+
+def window(omega: Floats, p_max: float, plane: str) -> tuple[tuple[float, float], float]:
+    """Return from where to where a picture is wide, and up to where it is high from 0.
+
+    A single frequency stands in the middle.
+    """
+    low, high = float(omega[0]), float(omega[-1])
+    if plane == PLANES[0]:
+        aside = 0.0 if low < high else 0.05 * low
+        return (low - aside, high + aside), p_max
+    return (0.0, 1 / low**2), min(_HIGHEST, p_max / low**2)
+
+
+def in_picture(
+    omega: Floats, p_max: float, plane: str
+) -> Callable[[Floats, Floats], tuple[Floats, Floats]]:
+    """Return the map from frequency and amplitude into a picture that is [0, 1] wide and high."""
+    (left, right), top = window(omega, p_max, plane)
+
+    def to(at: Floats, p: Floats) -> tuple[Floats, Floats]:
+        x, y = in_plane(at, p, plane)
+        return (x - left) / (right - left), y / top
+
+    return to
+
+
+# Critical curves of the damped Mathieu equation by perturbation, beside the exact ones.
+#
+# For ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` a periodic solution is written with the
+# few harmonics that matter, and those which are not resonant are eliminated: what the methods of
+# Struble, of averaging and of multiple scales give at the same order.
+#
+# **First tongue**, about ``omega = 2``: ``th = A cos(omega tau/2) + B sin(omega tau/2)`` alone gives
+#
+# ``a^2 + c^2 = p^2/4``, ``a = 1 - omega^2/4``, ``c = gamma omega/2``: first order.
+#
+# The third harmonic answers with ``C = (p/2) A / (9 omega^2/4 - 1)`` and acts back with ``(p/2) C``,
+# which adds ``k p^2``, ``k = 1/(9 omega^2 - 4)``, to ``a``: second order,
+#
+# ``(a + k p^2)^2 + c^2 = p^2/4``.
+#
+# **Second tongue**, about ``omega = 1``: ``th = C0 + A cos(omega tau) + B sin(omega tau)`` and the
+# second harmonic. ``C0 = -(p/2) A`` takes ``p^2/2`` off the stiffness of the cosine alone, the second
+# harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
+#
+# ``(a - (1/2 - s) p^2)(a + s p^2) + c^2 = 0``, ``a = 1 - omega^2``, ``c = gamma omega``: second
+# order.
+#
+# Damping of the harmonics that are eliminated is left out: it is of the next order.
+
+
+def first_tongue(omega: Floats, gamma: float) -> Floats:
+    """Critical ``p`` of the first tongue to first order; nan nearer to the second tongue."""
+    a, c = 1 - omega**2 / 4, gamma * omega / 2
+    return np.where(omega > 1.0, 2 * np.hypot(a, c), np.nan)
+
+
+def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
+    """Critical ``p`` of the first tongue to second order; nan where the expansion has none."""
+    a, c = 1 - omega**2 / 4, gamma * omega / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        k = 1 / (9 * omega**2 - 4)
+        # k^2 P^2 + (2 a k - 1/4) P + a^2 + c^2 = 0 in P = p^2: the root that is not far away.
+        half = 1 / 8 - a * k
+        square = (a**2 + c**2) / (half + np.sqrt(half**2 - k**2 * (a**2 + c**2)))
+        found = np.sqrt(square)
+    # Left of 2/3 the third harmonic is resonant before the first.
+    return np.where((omega > 1.0) & np.isfinite(found), found, np.nan)
+
+
+def second_tongue(omega: Floats, gamma: float) -> Floats:
+    """Critical ``p`` of the second tongue to second order; nan where the expansion has none."""
+    a, c = 1 - omega**2, gamma * omega
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = 1 / (4 * (4 * omega**2 - 1))
+        # s (1/2 - s) P^2 + a (1/2 - 2 s) P - (a^2 + c^2) = 0.
+        leading, half = s * (0.5 - s), a * (0.5 - 2 * s) / 2
+        square = (-half + np.sqrt(half**2 + leading * (a**2 + c**2))) / leading
+        found = np.sqrt(square)
+    # Left of 1/sqrt(2) the second harmonic is nearly resonant itself.
+    return np.where((omega > np.sqrt(0.5)) & np.isfinite(found), found, np.nan)
+
+
+CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {
+    "tongue 1, first order": (-1, first_tongue),
+    "tongue 1, second order": (-1, first_tongue_second_order),
+    "tongue 2, second order": (1, second_tongue),
+}
+"""What each is called, the multiplier on it, and its formula."""

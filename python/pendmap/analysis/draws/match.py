@@ -1,0 +1,75 @@
+"""Attractors and orbits of one model found again in another that is nearly the same."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+
+_APART = math.pi
+"""How far apart those are of which one has no points."""
+
+
+def plain(name: str) -> str:
+    """Return a name without the angle that tells it from others of the same name.
+
+    That angle (``oscillation 2:0 at +0.1234``) moves with the parameters.
+    """
+    return name.partition(" at ")[0]
+
+
+def names_of(dataset: xr.Dataset, one: str) -> list[str]:
+    """Return the names of the attractors or orbits of a dataset."""
+    return [str(name) for name in dataset[one].values]
+
+
+def points_of(dataset: xr.Dataset, one: str) -> list[NDArray[np.float64]]:
+    """Return the stroboscopic points of each attractor or orbit, shape (M, 2)."""
+    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    owner = dataset[f"point_{one}"].values
+    return [points[owner == k] for k in dataset["id"].values]
+
+
+def matched(
+    names: list[str],
+    points: list[NDArray[np.float64]],
+    others: list[str],
+    theirs: list[NDArray[np.float64]],
+) -> list[int]:
+    """Return for each of the others which of the known ones it is, or -1.
+
+    Those of one :func:`plain` name are paired, so that the sum of the distances of pairs is least.
+
+    Parameters
+    ----------
+    names, others : list of str
+        Names of what is known, and of what is to be found again.
+    points, theirs : list of ndarray of float, shape (M, 2)
+        Their points, angle and velocity.
+    """
+    found = [-1] * len(others)
+    for name in dict.fromkeys(map(plain, others)):
+        mine = [k for k, own in enumerate(names) if plain(own) == name]
+        new = [k for k, own in enumerate(others) if plain(own) == name]
+        if not mine:
+            continue
+        far = np.array([[distance(points[i], theirs[j]) for j in new] for i in mine])
+        for i, j in zip(*linear_sum_assignment(far), strict=True):
+            found[new[j]] = mine[i]
+    return found
+
+
+def distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Return the mean distance from points of one to the nearest of another, angles on a circle."""
+    if not (one.size and other.size):
+        return _APART
+    away = one[:, None] - other[None]
+    away[..., 0] = np.remainder(away[..., 0] + math.pi, math.tau) - math.pi
+    return float(np.hypot(away[..., 0], away[..., 1]).min(axis=1).mean())

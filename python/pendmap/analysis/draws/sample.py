@@ -1,0 +1,209 @@
+"""Models drawn from the covariance that a model file holds."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.errors import MOST_DRAWS, MOST_SEED, InputError, check_whole, short_repr
+from pendmap.model.covariance import covariance_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from numpy.typing import NDArray
+
+    from pendmap.model import Pendulum, Rig
+
+
+Progress = Callable[[int, int], object]
+
+_TRIES: Final = 1000
+"""Draws in a row that may all be outside what is allowed."""
+
+_LEVELS: Final = (0.025, 0.975)
+"""The ends of a 95 % interval."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Draws:
+    """Models drawn from the uncertainty of one.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The parameters that vary.
+    values : ndarray of float, shape (N, K)
+        Their values, in the model's own units.
+    models : tuple of Pendulum or Rig
+        The models, N.
+    seed : int
+        What they were drawn with.
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    models: tuple[Pendulum | Rig, ...]
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.models)
+
+    @property
+    def variables(self) -> dict[str, Any]:
+        """The values as a variable ``drawn`` over (draw, parameter), with the names."""
+        comment = {"comment": "parameters of each draw, in the units of the model"}
+        return {
+            "drawn": (("draw", "parameter"), self.values, comment),
+            "parameter": ("parameter", np.array(self.names, dtype=str)),
+        }
+
+    @property
+    def attributes(self) -> dict[str, int]:
+        """``draws`` and ``draws_seed`` of a dataset."""
+        return {"draws": len(self), "draws_seed": self.seed}
+
+    def each(self, progress: Progress | None) -> Iterator[tuple[Pendulum | Rig, Progress | None]]:
+        """Give each model, and what its own computation reports its progress to."""
+        for k, model in enumerate(self.models):
+            yield model, part(progress, k + 1, len(self) + 1)
+
+
+def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
+    """Return models drawn from the Gaussian of a model's ``[covariance]``.
+
+    ``x = m + A z``, ``A A^T`` the covariance with the variance between runs, ``m`` the model's own
+    values, ``z`` standard normal. A draw is drawn again where a damping or friction would be below
+    0, the size of an effect of damping would change its sign, or no model has such a value: the
+    Gaussian is cut off there. The first draws of many are those of few.
+
+    Parameters
+    ----------
+    model : Pendulum or Rig
+        With ``notes`` as a model file has them (:func:`pendmap.load_model`).
+    count : int
+        How many models, 2 to 10000.
+    seed : int
+        Draws them.
+
+    Raises
+    ------
+    InputError
+        If the model has no covariance, one that is none, or hardly any draw is allowed.
+
+    Examples
+    --------
+    >>> from pendmap import Rig
+    >>> notes = {"covariance": {"names": ["w0"], "matrix": [[0.01]]}}
+    >>> found = drawn(Rig(w0=6.0, notes=notes), 100, seed=1)
+    >>> bool(abs(found.values.std() - 0.1) < 0.02)
+    True
+    """
+    number = check_whole("draws", count, 2, MOST_DRAWS)
+    known = covariance_of(model.notes)
+    if known is None:
+        raise InputError(
+            "draws: the model must have a [covariance], as the model files of identify and diagnose"
+            " have, got none"
+        )
+    middle = np.array([_value(model, name) for name in known.names])
+    root = known.root
+    signs = _signs(model, known.names, middle)
+    source = np.random.default_rng(check_whole("seed", seed, 0, MOST_SEED))
+    values, models = [], []
+    for _ in range(number):
+        for _ in range(_TRIES):
+            x = middle + root @ source.standard_normal(len(known.names))
+            if (x * signs < 0).any():
+                continue
+            try:
+                one = _with(model, dict(zip(known.names, x.tolist(), strict=True)))
+            except InputError:
+                continue
+            break
+        else:
+            raise InputError(
+                f"draws: the [covariance] must leave room for allowed values, got none in {_TRIES}"
+                " draws"
+            )
+        values.append(x)
+        models.append(one)
+    return Draws(known.names, np.array(values), tuple(models), seed)
+
+
+def interval(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Return mean, standard deviation and the ends of the 95 % interval over the last axis.
+
+    Values that are no numbers are left out; where there is none, nothing is a number.
+    """
+    known = np.isfinite(values)
+    count = known.sum(axis=-1)
+    filled = np.where(known, values, 0.0)
+    mean = np.where(count > 0, filled.sum(axis=-1) / np.maximum(count, 1), np.nan)
+    away = np.where(known, values - mean[..., None], 0.0)
+    spread = np.sqrt((away**2).sum(axis=-1) / np.maximum(count - 1, 1))
+    spread = np.where(count > 1, spread, np.nan)
+    if not values.size:  # which numpy gives no quantiles of
+        return mean, spread, mean, mean
+    safe = np.where((count > 0)[..., None], values, 0.0)
+    low, high = np.nanquantile(safe, _LEVELS, axis=-1)
+    return mean, spread, np.where(count > 0, low, np.nan), np.where(count > 0, high, np.nan)
+
+
+def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
+    """Return what one of so many equal parts of a computation reports its progress to."""
+    if progress is None:
+        return None
+
+    def report(done: int, total: int) -> None:
+        progress(number * total + done, parts * total)
+
+    return report
+
+
+def _value(model: Pendulum | Rig, name: str) -> float:
+    if name in model.numbers():
+        return float(getattr(model, name))
+    which, _, parameter = name.rpartition(".")
+    for effect in model.effects:
+        if effect.name == which and parameter in effect.parameters:
+            return float(effect.parameters[parameter])
+    raise InputError(f"covariance: {short_repr(name)} must be a parameter of the model, got none")
+
+
+def _signs(
+    model: Pendulum | Rig, names: tuple[str, ...], middle: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return 1 or -1 where a parameter keeps its sign: the sizes of effects of damping; else 0.
+
+    What the model itself refuses below 0 needs no mention.
+    """
+    sizes = {
+        f"{effect.name}.{entry['name']}"
+        for effect in model.effects
+        if effect.brakes
+        for entry in effect.definition["parameters"]
+        if entry["role"] == "size"
+    }
+    return np.array([np.sign(x) if n in sizes else 0.0 for n, x in zip(names, middle, strict=True)])
+
+
+def _with(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:
+    """Return the model with these values; its effects without their intervals."""
+    own = {name: x for name, x in values.items() if name in model.numbers()}
+    effects = tuple(
+        dataclasses.replace(
+            effect,
+            parameters={
+                name: values.get(f"{effect.name}.{name}", x)
+                for name, x in effect.parameters.items()
+            },
+            ci95={},
+        )
+        for effect in model.effects
+    )
+    changed: dict[str, Any] = {**own, "effects": effects}
+    return dataclasses.replace(model, **changed)

@@ -1,0 +1,406 @@
+"""How the share of starts whose end is uncertain falls with the error of a start."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import xarray as xr
+from scipy.special import gammaincc
+
+from pendmap import _core
+from pendmap.errors import InputError
+from pendmap.formatting import Readable, written
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import numpy.typing as npt
+
+    from pendmap.formatting import Table
+
+    Floats = npt.NDArray[np.float64]
+    Labels = npt.NDArray[np.int16]
+
+
+_LEAST_SCALES: Final = 3
+"""Distances that a power law is fitted to at least."""
+_TELLING: Final = 5.0
+"""Variance of a count above which its deviation is normal enough to judge the law by."""
+_UNLIKELY: Final = 0.01
+"""Chance of a misfit below which the greatest distance is left out: there the law ends."""
+_PART: Final = 16
+"""Distances on a grid reach up to this part of its shorter side."""
+_STRIPS: Final = 16
+"""Strips of a grid that are left out one by one to see what the exponent owes to each."""
+_ROUNDS: Final = 100
+_TIMES: Final = 1.96
+"""Standard errors in half an interval."""
+_EPS: Final = 1e-12
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class UncertaintyExponent(Readable):
+    """The exponent of ``f(eps) ~ eps^value``, and what it was found from.
+
+    Attributes
+    ----------
+    value, stderr : float
+        The exponent and its standard error.
+    ci95 : (float, float)
+        Its interval.
+    dimension, dimension_ci95 : float, (float, float)
+        Box-counting dimension ``2 - value`` of the boundary.
+    eps : ndarray, shape (N,)
+        Distances, rising, in ``unit``.
+    uncertain, tried : ndarray of int, shape (N,)
+        Starts whose label changes within ``eps``, and starts.
+    unit : str
+        ``"window"`` (sides of the window) or ``"cell"``.
+    scales : int
+        The law was fitted to so many of the distances, the smallest ones.
+    """
+
+    value: float
+    stderr: float
+    ci95: tuple[float, float]
+    eps: Floats
+    uncertain: npt.NDArray[np.int64]
+    tried: npt.NDArray[np.int64]
+    unit: str
+    scales: int
+
+    @property
+    def dimension(self) -> float:
+        """Box-counting dimension of the boundary."""
+        return 2.0 - self.value
+
+    @property
+    def dimension_ci95(self) -> tuple[float, float]:
+        """Its interval."""
+        return 2.0 - self.ci95[1], 2.0 - self.ci95[0]
+
+    @property
+    def share(self) -> Floats:
+        """``f(eps)``, shape (N,)."""
+        return np.asarray(self.uncertain / np.maximum(self.tried, 1))
+
+    def __repr__(self) -> str:
+        return f"UncertaintyExponent({self._value})"
+
+    def said(self) -> tuple[Sequence[Table], Iterable[str]]:
+        """Return the shares as a table, and the exponent."""
+        rows = [
+            [f"{eps:.3g}", f"{share:.4g}", "yes" if k < self.scales else ""]
+            for k, (eps, share) in enumerate(zip(self.eps, self.share, strict=True))
+        ]
+        table = [f"eps ({self.unit})", "uncertain share", "fitted"], rows
+        return [table], [f"Uncertainty exponent {self._value}, dimension {self.dimension:.4g}."]
+
+    @property
+    def _value(self) -> str:
+        low, high = (written(end, self.stderr) for end in self.ci95)
+        return f"{written(self.value, self.stderr)} [{low}, {high}]"
+
+
+def uncertainty_exponent(
+    labels: npt.ArrayLike | xr.Dataset, *, periodic: tuple[bool, bool] = (False, False)
+) -> UncertaintyExponent:
+    """Uncertainty exponent of a basin boundary, and with it its dimension.
+
+    A start known to within ``eps`` is uncertain if its label is another at a distance ``eps`` on
+    one side or the other. Their share falls as ``f(eps) ~ eps^alpha``, and ``2 - alpha`` is the
+    box-counting dimension of the boundary in the plane: 1 where it is smooth (alpha = 1); where
+    alpha is small, knowing starts much better foretells hardly more ends.
+
+    Of a dataset of :func:`pendmap.basins` it is what the map found by starts of its own: anew for
+    each distance, in directions drawn at random, down to 1.5e-8 of the window's sides, so that
+    counts are independent. Where the map shows every change of label that a pilot meets, most
+    starts are drawn near those, each with its weight, and the counts are those of as many starts
+    drawn evenly as tell the share as precisely. Of labels on a grid the distances are 1, 2, 3, 4,
+    6, ... cells, along both axes at once, from every cell. Labels on a grid tell
+    nothing below a cell: where filaments are thinner, the exponent is that of what is seen.
+
+    The law is fitted by its binomial likelihood to the smallest distances, to all of them up to
+    where it breaks (a misfit less likely than 1 %), and the interval is widened by what misfit
+    remains. On a grid neighbouring cells are no independent starts: they count for as many as the
+    spread between strips of the plane allows; beyond an edge that is not periodic lies the plane's
+    mirror image. Starts with an unknown end near by, undecided or failed, are left out. Attractors
+    that are mirror images of one another count as two.
+
+    Parameters
+    ----------
+    labels : array_like of int, shape (M, N), or xarray.Dataset
+        Numbers of attractors from 1; 0 and below where the end is not known. Or a map of
+        :func:`pendmap.basins`.
+    periodic : (bool, bool)
+        Whether the last row has the first one as its neighbour, and the last column likewise. Of a
+        dataset not needed.
+
+    Returns
+    -------
+    UncertaintyExponent
+        ``value``, ``stderr``, ``ci95``, ``dimension`` and the counts.
+
+    Raises
+    ------
+    InputError
+        If these are no labels of a plane; if there is no boundary, or too few distances; of a
+        dataset without counts (no basins, or ``check=False``) or of a part of a map.
+
+    References
+    ----------
+    C. Grebogi, S. W. McDonald, E. Ott & J. A. Yorke (1983), Physics Letters A 99, 415;
+    S. W. McDonald et al. (1985), Physica D 17, 125.
+    """
+    if isinstance(labels, xr.Dataset):
+        return _of_map(labels)
+    cells, _ = numbered(labels)
+    eps, uncertain, tried = _on_grid(cells, periodic)
+    hit, all_ = uncertain.sum(axis=(1, 2)), tried.sum(axis=(1, 2))
+    # Neighbouring cells tell much the same: they count for as many as their spread would have.
+    fewer = np.maximum.reduce(
+        [_spread(uncertain.sum(axis=axis), tried.sum(axis=axis)) for axis in (1, 2)]
+    )
+    found = fitted(eps, hit / fewer, all_ / fewer, "cell")
+    if found is None:
+        raise InputError("labels have no boundary at enough distances: there is no exponent")
+    counts = (values.astype(np.int64) for values in (hit, all_))
+    return dataclasses.replace(found, **dict(zip(("uncertain", "tried"), counts, strict=True)))
+
+
+def fitted(
+    eps: npt.ArrayLike, uncertain: npt.ArrayLike, tried: npt.ArrayLike, unit: str = "window"
+) -> UncertaintyExponent | None:
+    """Fit ``f ~ eps^alpha`` to independent binomial counts, shapes (N,).
+
+    None where fewer than three distances have uncertain starts.
+    """
+    far, hit, all_ = (np.asarray(values, dtype=float) for values in (eps, uncertain, tried))
+    order = np.argsort(far)
+    far, hit, all_ = (values[order] for values in (far, hit, all_))
+    scales = far.size
+    while True:
+        if np.count_nonzero(hit[:scales]) < _LEAST_SCALES:
+            return None
+        value, error, misfit, degrees = _law(far[:scales], hit[:scales], all_[:scales])
+        few = np.count_nonzero(hit[: scales - 1]) < max(_LEAST_SCALES + 1, hit.size // 3)
+        if degrees <= 1 or few or gammaincc(degrees / 2, misfit / 2) > _UNLIKELY:
+            break
+        scales -= 1
+    wide = max(1.0, misfit / degrees) if degrees > 0 else 1.0
+    error *= math.sqrt(wide)
+    return UncertaintyExponent(
+        value=value,
+        stderr=error,
+        ci95=(value - _TIMES * error, value + _TIMES * error),
+        eps=far,
+        uncertain=hit.astype(np.int64),
+        tried=all_.astype(np.int64),
+        unit=unit,
+        scales=scales,
+    )
+
+
+def _law(eps: Floats, hit: Floats, tried: Floats) -> tuple[float, float, float, int]:
+    """Exponent, its error, Pearson's misfit and its degrees of freedom, by maximum likelihood."""
+    log = np.log(eps)
+    terms = np.stack([np.ones_like(log), log - log.mean()], axis=1)
+    weight = np.sqrt(hit + 0.25)
+    first = np.log((hit + 0.25) / (tried + 0.5))
+    rates = np.linalg.lstsq(terms * weight[:, None], first * weight, rcond=None)[0]
+    for _ in range(_ROUNDS):  # Fisher's scoring
+        share = np.clip(np.exp(terms @ rates), _EPS, 1 - 1e-6)
+        known = terms.T @ ((tried * share / (1 - share))[:, None] * terms)
+        step = np.linalg.solve(known, terms.T @ ((hit - tried * share) / (1 - share)))
+        rates += step / max(1.0, float(np.abs(step).max()))
+        if np.abs(step).max() < _EPS:
+            break
+    share = np.clip(np.exp(terms @ rates), _EPS, 1 - 1e-6)
+    spread = tried * share * (1 - share)
+    telling = spread >= _TELLING
+    misfit = float((((hit - tried * share) ** 2) / spread)[telling].sum())
+    error = math.sqrt(max(float(np.linalg.inv(known)[1, 1]), 0.0))
+    return float(rates[1]), error, misfit, int(telling.sum()) - 2
+
+
+def _spread(hit: Floats, tried: Floats) -> Floats:
+    """Variance of each share from strip to strip over the binomial one, 1 at least.
+
+    Counts have the shape (distances, strips); strips are left out one by one (jackknife).
+    """
+    count = hit.shape[1]
+    whole = np.maximum(tried.sum(axis=1), 1.0)
+    share = hit.sum(axis=1) / whole
+    rest = np.maximum(tried.sum(axis=1, keepdims=True) - tried, 1.0)
+    without = (hit.sum(axis=1, keepdims=True) - hit) / rest
+    variance = (count - 1) * without.var(axis=1)
+    binomial = np.maximum(share * (1 - share), _EPS) / whole
+    fewer: Floats = np.maximum(variance / binomial, 1.0)
+    return fewer
+
+
+def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats, Floats]:
+    """Distances in cells, and counts of uncertain and of all cells in strips both ways.
+
+    Counts have the shape (distances, rows of strips, columns of strips).
+    """
+    shorter = min(cells.shape)
+    powers = 2 ** np.arange(max(1, int(math.log2(max(shorter, 2)))))
+    steps = np.unique(np.concatenate([powers, 3 * powers[:-1]]))
+    steps = steps[steps <= max(shorter // _PART, 1)]
+    strips = [np.linspace(0, side, min(_STRIPS, side) + 1)[:-1].astype(int) for side in cells.shape]
+    counts: list[list[Floats]] = [[], []]
+    far, (height, width) = int(steps[-1]), cells.shape
+    # Beyond an edge lies the other one, or the plane's mirror image: its boundary is as dense.
+    wider = cells
+    for axis in (0, 1):
+        beyond = [(far, far) if k == axis else (0, 0) for k in (0, 1)]
+        wider = np.pad(wider, beyond, mode="wrap" if periodic[axis] else "symmetric")
+    for step in steps.tolist():
+        tried, uncertain = cells > 0, np.zeros(cells.shape, dtype=bool)
+        for down, right in ((step, 0), (-step, 0), (0, step), (0, -step)):
+            top, left = far + down, far + right
+            beside = wider[top : top + height, left : left + width]
+            tried &= beside > 0
+            uncertain |= beside != cells
+        for found, which in zip(counts, (tried & uncertain, tried), strict=True):
+            rows = np.add.reduceat(which.astype(float), strips[0], axis=0)
+            found.append(np.add.reduceat(rows, strips[1], axis=1))
+    return steps.astype(float), np.array(counts[0]), np.array(counts[1])
+
+
+def fitted_map(dataset: xr.Dataset) -> UncertaintyExponent | None:
+    """The law of a map that has counts; None where they are too few."""
+    eps, uncertain, tried = (
+        dataset[name].values for name in ("uncertainty_eps", "uncertain", "uncertainty_tried")
+    )
+    return fitted(eps, uncertain, tried)
+
+
+def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
+    if "uncertainty_eps" not in dataset:
+        raise InputError(
+            "this dataset has no counts of uncertain starts: it must be a map of pendmap.basins "
+            "of 10,000 cells or more whose labels tell basins apart, made with check=True; or "
+            "dataset['label']"
+        )
+    if dataset["label"].size != dataset.attrs["cells"]:
+        raise InputError(
+            "this is a part of a map, and the counts of uncertain starts are of the whole: it must "
+            "be the whole map, or labels on a grid, dataset['label']"
+        )
+    found = fitted_map(dataset)
+    if found is None:
+        raise InputError("too few starts of this map are uncertain: there is no exponent")
+    return found
+
+
+# How finely basins are interwoven, box by box.
+
+
+BOX: Final = 5
+"""Side of a box in cells, as in the core."""
+_SURE: Final = 1.96
+_MOST_LABELS: Final = 32_767
+
+
+@dataclasses.dataclass(frozen=True)
+class BasinEntropy:
+    """Entropies of the labels in boxes of 5 x 5 cells.
+
+    Attributes
+    ----------
+    value : float
+        Basin entropy: the mean over all boxes.
+    boundary : float
+        Boundary basin entropy: the mean over the boxes that hold more than one label; 0 without.
+    boundary_stderr : float
+        Its standard error, from the spread over those boxes; infinite with fewer than two.
+    boxes, boundary_boxes : int
+        Their numbers.
+    """
+
+    value: float
+    boundary: float
+    boundary_stderr: float
+    boxes: int
+    boundary_boxes: int
+
+    @property
+    def is_fractal(self) -> bool:
+        """Whether the log 2 criterion says that the boundary is fractal; see `passes_log2`."""
+        return passes_log2(self.boundary, self.boundary_stderr)
+
+
+def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
+    """Basin entropy and boundary basin entropy of labels on a grid.
+
+    In a box of 5 x 5 cells ``S_i = -sum p ln p``, ``p`` the shares of the labels in it. Basin
+    entropy is ``S_b = sum S_i / N`` over all N boxes, boundary basin entropy
+    ``S_bb = sum S_i / N_b`` over the N_b boxes with more than one label. ``S_b`` says how
+    unpredictable ends are: 0 in one basin, ``ln K`` where K labels are spread at random. On a
+    smooth boundary at most few boxes hold more than two labels, so ``S_bb`` stays below ``ln 2``;
+    above it the boundary is fractal. Below it nothing follows: many fractal boundaries are there,
+    and all of those between two labels alone.
+    Both depend on the size of a cell; compare maps with cells of one size.
+
+    Parameters
+    ----------
+    labels : array_like of int, shape (M, N)
+        Numbers of attractors from 1; 0 and below where the end is not known. Those cells are left
+        out, as are cells beyond the last whole box; below 5 cells a side the whole side is a box.
+        Attractors that are mirror images of one another count as two.
+
+    Returns
+    -------
+    BasinEntropy
+        Both entropies and the numbers of boxes.
+
+    Raises
+    ------
+    InputError
+        If these are no whole numbers in a plane.
+
+    References
+    ----------
+    A. Daza, A. Wagemakers, B. Georgeot, D. Guery-Odelin & M. A. F. Sanjuan (2016), Scientific
+    Reports 6, 31416.
+    """
+    cells, _ = numbered(labels)
+    found = _core.texture(np.ascontiguousarray(cells).ravel(), cells.shape[1])
+    return BasinEntropy(
+        value=found["basin_entropy"],
+        boundary=found["boundary_basin_entropy"],
+        boundary_stderr=found["boundary_stderr"],
+        boxes=found["boxes"],
+        boundary_boxes=found["boundary_boxes"],
+    )
+
+
+def passes_log2(boundary: float, stderr: float) -> bool:
+    """Whether a boundary basin entropy is above ln 2 by more than twice its standard error."""
+    return boundary - _SURE * stderr > math.log(2)
+
+
+def numbered(labels: npt.ArrayLike) -> tuple[Labels, npt.NDArray[np.int64]]:
+    """Return labels of a plane as small numbers, 0 where the end is not known, and what they were.
+
+    Raises
+    ------
+    InputError
+        If these are no whole numbers in a plane.
+    """
+    given = np.asarray(labels)
+    if given.ndim != 2 or not given.size:  # noqa: PLR2004 (a plane)
+        raise InputError(f"labels must have the shape (M, N), both above 0, got {given.shape}")
+    if given.dtype.kind not in "iu":
+        raise InputError(f"labels must be whole numbers, got {given.dtype}")
+    known, place = np.unique(np.maximum(given, 0), return_inverse=True)
+    if known.size > _MOST_LABELS:
+        raise InputError(f"labels must be at most {_MOST_LABELS} different ones, got {known.size}")
+    first = 0 if known[0] == 0 else 1
+    cells = (place.reshape(given.shape) + first).astype(np.int16)
+    return cells, known.astype(np.int64)

@@ -1,0 +1,210 @@
+"""Grids of initial conditions."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import numbers
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.errors import MOST_CELLS, InputError, check_number, check_type, check_whole, short_repr
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+
+FASTEST: Final = 3.0
+"""The greatest velocity of the default window, over ``w0`` with a rig."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """``count`` equal cells between ``low`` and ``high``; values are the cells' centres.
+
+    Raises
+    ------
+    InputError
+        If the bounds are not finite and in order, or the count is no whole number from 1 to 100000.
+    """
+
+    low: float
+    high: float
+    count: int
+
+    def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            object.__setattr__(self, name, check_number(name, getattr(self, name)))
+        if not 0 < self.high - self.low < math.inf:
+            raise InputError(
+                "bounds must be two finite numbers, the lower first, and a finite distance apart, "
+                f"got {self.low:g}:{self.high:g}"
+            )
+        object.__setattr__(self, "count", check_whole("count", self.count, 1, MOST_CELLS))
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """Centres of the cells, shape (count,)."""
+        index = np.arange(self.count, dtype=np.float64)
+        return self.low + (index + 0.5) * ((self.high - self.low) / self.count)
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """Edges of the cells, shape (count + 1,)."""
+        return np.linspace(self.low, self.high, self.count + 1)
+
+    @property
+    def as_tuple(self) -> tuple[float, float, int]:
+        """``(low, high, count)``."""
+        return (self.low, self.high, self.count)
+
+
+@dataclasses.dataclass(frozen=True)
+class Grid:
+    """Cells of the plane of initial conditions.
+
+    Parameters
+    ----------
+    theta : Axis
+        Angle, rad; ``(low, high, count)`` does as well.
+    velocity : Axis
+        Velocity ``d theta / d tau``, in rad/s for a :class:`pendmap.Rig`; likewise.
+
+    Raises
+    ------
+    InputError
+        If one is no axis.
+    """
+
+    theta: Axis = Axis(-math.pi, math.pi, 1000)
+    velocity: Axis = Axis(-3.0, 3.0, 1000)
+
+    def __post_init__(self) -> None:
+        for name in ("theta", "velocity"):
+            axis = getattr(self, name)
+            if isinstance(axis, tuple | list) and len(axis) == 3:  # noqa: PLR2004
+                object.__setattr__(self, name, Axis(*axis))
+            else:
+                check_type(name, axis, Axis, "Axis(-3, 3, 100)")
+
+    @classmethod
+    def square(cls, count: int, w0: float = 1.0) -> Grid:
+        """Return the default window with ``count`` cells on each side.
+
+        Velocities reach from ``-3 w0`` to ``3 w0``: with the ``w0`` of a :class:`pendmap.Rig` the
+        window is the same as without dimensions.
+        """
+        fastest = FASTEST * check_number("w0", w0)
+        return cls(Axis(-math.pi, math.pi, count), Axis(-fastest, fastest, count))
+
+    @classmethod
+    def of(cls, given: object, count: int, w0: float) -> Grid:
+        """Return a grid as given, or the default window with so many cells on each side.
+
+        Parameters
+        ----------
+        given : Grid, int or None
+            A number is that of the cells on each side.
+        count : int
+            Cells on each side where nothing is given.
+        w0 : float
+            As of :meth:`square`.
+
+        Raises
+        ------
+        InputError
+            If it is something else.
+        """
+        if given is None or (isinstance(given, numbers.Integral) and not isinstance(given, bool)):
+            return cls.square(count if given is None else int(given), w0)
+        example = "100, Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
+        check_type("grid", given, cls, example)
+        return given  # type: ignore[return-value]
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return self.theta.count * self.velocity.count
+
+
+def coordinate(
+    name: str,
+    centres: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    attributes: Mapping[str, str],
+) -> dict[str, Any]:
+    """Return a coordinate of cells and, by the CF conventions, the bounds of each cell.
+
+    Bounds are a coordinate of their own: a selection of cells takes along those of its cells.
+
+    Parameters
+    ----------
+    name : str
+        Name of the axis and of its dimension.
+    centres : ndarray, shape (N,)
+        Its values.
+    edges : ndarray, shape (N + 1,)
+        Edges of its cells.
+    attributes : mapping
+        Units and long name.
+    """
+    bounds = f"{name}_bounds"
+    pairs = np.stack([edges[:-1], edges[1:]], axis=1)
+    return {
+        name: (name, centres, {**attributes, "bounds": bounds}),
+        bounds: ((name, "bound"), pairs),
+    }
+
+
+def frequencies(values: ArrayLike) -> NDArray[np.float64]:
+    """Return frequencies ``Omega/w0`` of the drive as an array, shape (N,).
+
+    Raises
+    ------
+    InputError
+        If they are no numbers above 0, in ascending order.
+    """
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError, OverflowError):
+        array = np.array([np.nan])
+    good = array.ndim == 1 and 0 < array.size <= MOST_CELLS
+    if not (good and np.isfinite(array).all() and (array > 0).all() and (np.diff(array) > 0).all()):
+        raise InputError(
+            f"omega must be numbers above 0 in ascending order, got {short_repr(values)}"
+        )
+    return array
+
+
+def starts(
+    theta: ArrayLike, velocity: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return angles and velocities of a list of starts as two arrays, shape (N,).
+
+    Raises
+    ------
+    InputError
+        If they are no numbers, not of one dimension, not as many, or not finite.
+    """
+    arrays = []
+    for name, given in (("theta", theta), ("velocity", velocity)):
+        try:
+            array: NDArray[np.float64] = np.ascontiguousarray(given, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(
+                f"{name} must be an array (N,) of numbers, got {short_repr(given)}"
+            ) from None
+        if np.ndim(given) != 1:
+            raise InputError(f"{name} must have the shape (N,), got {np.shape(given)}")
+        if not np.isfinite(array).all():
+            raise InputError(f"{name} must hold finite starts only, got a value that is not finite")
+        arrays.append(array)
+    angles, speeds = arrays
+    if angles.size != speeds.size:
+        raise InputError(
+            f"theta has {angles.size} values and velocity has {speeds.size}: they must be as many"
+        )
+    return angles, speeds

@@ -1,0 +1,415 @@
+"""Transient chaos: how long it lives before an attractor captures it."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core
+from pendmap.analysis import survival
+from pendmap.analysis.basins import basins_of
+from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.lifetime import lifetime_over
+from pendmap.analysis.grid import FASTEST
+from pendmap.analysis.grid import starts as checked
+from pendmap.analysis.summary import of_model, window_said
+from pendmap.analysis.survival import growth_on_saddle
+from pendmap.errors import MOST_PERIODS, MOST_SEED, InputError, check_whole
+from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.formatting import counted, with_error
+from pendmap.model import without_dimensions
+from pendmap.units import RATE, TIME, VELOCITY, Units
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.model import Pendulum, Rig
+
+    Floats = NDArray[np.float64]
+
+
+_STARTS: Final = 40_000
+_MOST_STARTS: Final = 10_000_000
+_SURE: Final = 3.0
+"""Standard errors by which the exponent must exceed the rate of escape."""
+_DRAWN: Final = 4000
+"""Periods of a survival curve that are kept."""
+
+
+def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    theta: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    *,
+    starts: int = _STARTS,
+    from_period: int | None = None,
+    max_periods: int | None = None,
+    tol: float = 1e-6,
+    threads: int | None = None,
+    seed: int = 0,
+    draws: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """Mean lifetime of transient chaos: the exponential tail of the times until capture.
+
+    Starts drawn from a window run until an attractor captures them. Chaos that does not last is a
+    chaotic saddle: what is still on it after ``t`` periods decays as ``exp(-t / mean)``. The mean
+    is the maximum of the likelihood, the sum of all times beyond ``from_period``, those cut off at
+    the bound included, over the number of captures; its standard error is ``mean /
+    sqrt(captured)``.
+
+    An exponential tail alone is no chaos: starts near the edge of a smooth basin leave the saddle
+    on it at a rate ``kappa`` too. There ``kappa`` is the saddle's own exponent ``lambda``; on a
+    chaotic saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its
+    entropy (Kantz & Grassberger 1985). So growth is measured along trajectories while they live,
+    and where ``lambda`` does not exceed ``kappa`` there is no transient chaos, and no lifetime.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; with a rig velocities are in rad/s.
+    theta, velocity : array_like, shape (N,), optional
+        Starts at ``tau = 0``; by default drawn at random from [-pi, pi] x [-3, 3], with a rig from
+        [-pi, pi] x [-3 w0, 3 w0].
+    starts : int
+        How many are drawn; 100 to ten million.
+    from_period : int, optional
+        Where the tail begins. By default where the data say so: twice the earliest period from
+        which two tests (of a Weibull shape, and of a rate that changes) find it exponential.
+    max_periods : int, optional
+        The bound after which a start is given up, as for :func:`pendmap.basins`.
+    tol : float
+        As for :func:`pendmap.basins`.
+    threads : int, optional
+        Number of threads; by default one a processor. The result does not depend on it.
+    seed : int
+        Draws the starts.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: the
+        interval of the mean lifetime (:func:`pendmap.analysis.draws.lifetime.lifetime_over`). ``seed``
+        draws them.
+    progress : callable, optional
+        Called now and then with what is done and in all.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``captured`` over ``attractor`` and ``elapsed``: the number that each attractor has captured
+        within so many periods. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, what the mean
+        would be from other beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
+        never) and ``label`` over ``start``. Attributes ``mean_periods``, ``stderr``,
+        ``from_period``, ``persistent`` (1 where every start ends on chaos; ``exponent`` is that of
+        the most chaotic attractor then), ``transient_chaos``, ``escape_rate`` and ``entropy`` per
+        period, ``exponent`` on the saddle, ``saddle_dimension``; nan where one has no meaning.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range, or the model has an effect that no map can have.
+    MemoryError
+        If there is too little memory for the starts.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+
+    References
+    ----------
+    Kantz & Grassberger (1985), Physica D 17, 75; Lai & Tel (2011), Transient Chaos, chapter 2.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
+    if from_period is not None:
+        from_period = check_whole("from_period", from_period, 0, MOST_PERIODS)
+    seed = check_whole("seed", seed, 0, MOST_SEED)
+    if (theta is None) != (velocity is None):
+        raise InputError("both or none of theta and velocity must be given, got one")
+    window = ""
+    if theta is None or velocity is None:
+        draw = np.random.default_rng(seed)
+        reach = units.given(FASTEST, VELOCITY)
+        theta = draw.uniform(-math.pi, math.pi, starts)
+        velocity = draw.uniform(-reach, reach, starts)
+        window = window_said((-math.pi, math.pi), (-reach, reach), units)
+    angles, speeds = checked(theta, velocity)
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
+    began = time.perf_counter()
+    found = basins_of(
+        model,
+        angles,
+        speeds,
+        tol=tol,
+        max_periods=max_periods,
+        threads=threads,
+        seed=seed,
+        check=False,
+        progress=progress,
+    )
+    label = found["label"].values.astype(np.int64)
+    settle = found["settle_periods"].values.astype(np.int64)
+    times = settle[settle >= 0]
+    bound, censored = int(found.attrs["max_periods"]), int((label == 0).sum())
+    fitted = None
+    if times.size and found.attrs["plane"] == "basins":
+        if from_period is None:
+            fitted = survival.begin(times, censored, bound)
+        elif from_period < bound:
+            fitted = survival.tail(times, censored, bound, from_period)
+            fitted = fitted if fitted.captured else None
+    saddle = growth_on_saddle(found, fitted, pendulum, threads)
+    dataset = xr.Dataset(
+        {
+            **{
+                name: found[name]
+                for name in found.data_vars
+                if "attractor" in found[name].dims or "point" in found[name].dims
+            },
+            **_curves(found, times, censored, bound),
+            "start_theta": found["start_theta"],
+            "start_velocity": found["start_velocity"],
+            "capture_period": ("start", settle.astype(np.int32), {"comment": "-1: never"}),
+            "label": found["label"],
+        },
+        coords={"attractor": found["attractor"]},
+    )
+    dataset.attrs = {
+        "kind": "lifetime",
+        "title": model.title,
+        **model.attributes,
+        "section": model.units.section,
+        **_attributes(found, fitted, saddle, pendulum, units),
+        "starts": angles.size,
+        "captured": int(times.size),
+        "censored": censored,
+        "failed": int((label < 0).sum()),
+        "chaotic_share": _chaotic(found),
+        "max_periods": bound,
+        "chaos_bound": found.attrs["chaos_bound"],
+        "from_period_given": int(from_period is not None),
+        "tol": found.attrs["tol"],
+        "reached_error": found.attrs["reached_error"],
+        "steps_per_period": found.attrs["steps_per_period"],
+        "seconds": time.perf_counter() - began,
+        "simd": found.attrs["simd"],
+        "threads": found.attrs["threads"],
+        "seed": seed,
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = summary(dataset, found)
+    if window:
+        lines.append(f"Starts are drawn in {window}.")
+    lines += [*of_model(model, "these lifetimes are")]
+    dataset.attrs["summary"] = "\n".join(lines)
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Callable[[int, int], object] | None) -> xr.Dataset:
+        return lifetime(
+            one,
+            angles,
+            speeds,
+            from_period=from_period,
+            max_periods=max_periods,
+            tol=tol,
+            threads=threads,
+            seed=seed,
+            progress=report,
+        )
+
+    return lifetime_over(dataset, several, again, whole)
+
+
+def _chaotic(found: xr.Dataset) -> float:
+    """Share of the starts that end on a chaotic attractor."""
+    chaos = np.array([str(kind).endswith("chaos") for kind in found["kind"].values], dtype=bool)
+    return float(found["fraction"].values[chaos].sum())
+
+
+def _curves(
+    found: xr.Dataset, times: NDArray[np.int64], censored: int, bound: int
+) -> dict[str, Any]:
+    """Captures up to each period by each attractor; tails from all beginnings."""
+    label, settle = found["label"].values, found["settle_periods"].values
+    last = bound if censored else int(times.max(initial=0)) + 1
+    elapsed = np.unique(np.linspace(0, last, min(last, _DRAWN) + 1).round().astype(np.int64))
+    by = [
+        np.searchsorted(np.sort(settle[(label == k) & (settle >= 0)]), elapsed, side="right")
+        for k in found["id"].values
+    ]
+    captured = np.array(by, dtype=np.int64).reshape(len(by), elapsed.size)
+    tails = survival.residual(times, censored, bound) if times.size else []
+    return {
+        "captured": (
+            ("attractor", "elapsed"),
+            captured,
+            {"long_name": "starts captured within so many periods"},
+        ),
+        "elapsed": ("elapsed", elapsed, {"long_name": "periods"}),
+        "tail_mean": (
+            "tail_begin",
+            np.array([t.mean for t in tails], dtype=float),
+            {"long_name": "mean time left, periods"},
+        ),
+        "tail_stderr": ("tail_begin", np.array([t.stderr for t in tails], dtype=float)),
+        "tail_exponential": (
+            "tail_begin",
+            np.array([min(t.weibull, t.steady) for t in tails], dtype=float),
+            {"comment": "chance of times as unlike an exponential's, the lesser of two tests"},
+        ),
+        "tail_begin": (
+            "tail_begin",
+            np.array([t.begin for t in tails], dtype=np.int64),
+            {"long_name": "periods"},
+        ),
+    }
+
+
+def _attributes(
+    found: xr.Dataset,
+    fitted: survival.Tail | None,
+    saddle: tuple[float, float, int],
+    pendulum: Pendulum,
+    units: Units,
+) -> dict[str, Any]:
+    period = pendulum.period
+    growth, error, followed = saddle
+    persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)
+    chaotic, rate = False, math.nan
+    if fitted is not None:
+        # In a period the share 1/mean leaves.
+        rate = -math.log1p(-1 / fitted.mean) if fitted.mean > 1 else math.inf
+        chaotic = bool(growth - rate > _SURE * math.hypot(error, rate / math.sqrt(fitted.captured)))
+    mean, stderr = (fitted.mean, fitted.stderr) if fitted and chaotic else (math.nan, math.nan)
+    exponent, exponent_error = growth / period, error / period
+    dimension = math.nan
+    if persistent:
+        largest = int(np.argmax(found["exponent"].values))
+        exponent = units.bare(float(found["exponent"].values[largest]), RATE)
+        exponent_error = units.bare(float(found["exponent_stderr"].values[largest]), RATE)
+    elif chaotic and not pendulum.theta_r and not pendulum.effects:
+        dimension = (growth - rate) * (1 / growth + 1 / (growth + pendulum.gamma * period))
+    return {
+        "mean_periods": mean,
+        "stderr": stderr,
+        "mean_time": units.given(mean * period, TIME),
+        "mean_time_stderr": units.given(stderr * period, TIME),
+        "persistent": int(persistent),
+        "transient_chaos": int(chaotic),
+        "from_period": fitted.begin if fitted else -1,
+        "tail_captured": fitted.captured if fitted else 0,
+        "tail_weibull": fitted.weibull if fitted else math.nan,
+        "tail_steady": fitted.steady if fitted else math.nan,
+        "tail_mean_periods": fitted.mean if fitted else math.nan,
+        "escape_rate": rate,
+        "exponent": units.given(exponent, RATE),
+        "exponent_stderr": units.given(exponent_error, RATE),
+        "exponent_per_period": exponent * period,
+        "exponent_trajectories": followed,
+        "entropy": growth - rate if chaotic else math.nan,
+        "saddle_dimension": dimension,
+    }
+
+
+# What a lifetime of transient chaos says of itself.
+
+
+def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
+    """Return the lines about the lifetimes ``dataset`` of the starts of the map ``found``."""
+    a, units = dataset.attrs, Units.of(dataset.attrs)
+    lines: list[str] = []
+    exponent = f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}"
+    if a["persistent"]:
+        lines.append(
+            f"Persistent: {shares(found)}; largest exponent {exponent}; nothing captured any of "
+            f"the trajectories watched within {a['chaos_bound']} periods."
+        )
+    elif found.attrs["plane"] == "conservative":
+        lines.append("Without damping (gamma = 0) nothing is ever captured: no lifetime.")
+    elif a["transient_chaos"]:
+        lines += _of_tail(dataset, exponent)
+    else:
+        lines.append(_why_not(dataset, exponent))
+    if a["chaotic_share"] and not a["persistent"]:
+        names = [
+            str(name)
+            for name, kind in zip(found["attractor"].values, found["kind"].values, strict=True)
+            if str(kind).endswith("chaos")
+        ]
+        lines.append(
+            f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
+            f"left out: nothing captured chaos there within {a['chaos_bound']} periods."
+        )
+    if a["censored"] and found.attrs["plane"] == "basins":
+        lines.append(
+            f"{counted(a['censored'], 'start')} of {a['starts']} were alive at the bound of "
+            f"{counted(a['max_periods'], 'period')}."
+        )
+    if a["captured"]:
+        lines.append(f"Ended on {shares(found)}.")
+    lines.append(
+        f"{counted(a['starts'], 'start')}, {counted(a['steps_per_period'], 'step')} a period, "
+        f"error reached {a['reached_error']:.1e}, {a['seconds']:.2f} s on "
+        f"{counted(a['threads'], 'thread')} ({a['simd']})."
+    )
+    return lines
+
+
+def shares(found: xr.Dataset) -> str:
+    """Return the attractors with the share of the starts that each takes."""
+    rows = zip(found["attractor"].values, found["fraction"].values, strict=True)
+    return ", ".join(f"{name} {100 * float(share):.2f} %" for name, share in rows)
+
+
+def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
+    a, units = dataset.attrs, Units.of(dataset.attrs)
+    clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
+    mean = with_error(a["mean_periods"], a["stderr"])
+    said = (
+        f"Transient chaos lives for {mean} periods on average ({clock}): the tail of "
+        f"{counted(a['tail_captured'], 'capture')} after period "
+        f"{a['from_period']}."
+    )
+    lines = [said]
+    tests = min(a["tail_weibull"], a["tail_steady"])
+    if tests < survival.LEVEL:
+        lines.append(
+            f"THE TAIL FROM PERIOD {a['from_period']} IS NOT EXPONENTIAL (chance {tests:.1g}): "
+            "its mean depends on where it begins."
+        )
+    line = (
+        f"On the chaotic saddle: exponent {exponent}, {a['exponent_per_period']:.4g} per period; "
+        f"rate of escape {a['escape_rate']:.4g}, entropy {a['entropy']:.4g} per period"
+    )
+    if math.isfinite(a["saddle_dimension"]):
+        line += f"; dimension {a['saddle_dimension']:.3f}"
+    return [*lines, line + "."]
+
+
+def _why_not(dataset: xr.Dataset, exponent: str) -> str:
+    a = dataset.attrs
+    if not a["captured"] and a["chaotic_share"]:
+        return "No start ends on anything that repeats: no lifetime."
+    if not a["captured"]:
+        return (
+            "No start was captured, and nothing says that chaos persists: undecided within "
+            f"{counted(a['max_periods'], 'period')}; --max-periods raises this bound."
+        )
+    longest = int(dataset["capture_period"].max())
+    head = f"No transient chaos: all settling ends within {counted(longest, 'period')}"
+    if not math.isfinite(a["tail_mean_periods"]):
+        return f"{head}, without an exponential tail."
+    head += f", with a tail of {a['tail_mean_periods']:.3g} periods"
+    if not math.isfinite(a["exponent_per_period"]):
+        return f"{head}, in which no start lives on to wander."
+    return (
+        f"{head}, in which deviations grow no faster than starts leave (exponent {exponent}, "
+        f"{a['exponent_per_period']:.3g} per period; rate {a['escape_rate']:.3g}): those at the "
+        "edge of a basin."
+    )

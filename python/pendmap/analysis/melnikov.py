@@ -1,0 +1,395 @@
+"""Melnikov's criterion: where stable and unstable manifolds of the upright rest first touch."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from numpy.polynomial import legendre
+
+from pendmap import _core
+from pendmap.analysis import grid
+from pendmap.analysis.summary import of_model
+from pendmap.errors import InputError, core_errors, instruction_set
+from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.model import without_dimensions
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.model import Pendulum, Rig
+
+    Floats = NDArray[np.float64]
+    from numpy.typing import NDArray
+
+
+_PHASES, _FINE = (8, 16, 32, 64), 4096
+"""Phases of the drive at which its work is computed, until its Fourier series ends in rounding, and
+to which that series goes on."""
+
+_FASTEST = 14.0
+"""A drive that is faster than this many times the orbit's rate at upright rest does less work than
+``exp(-pi/2 14)`` of its power: that is rounding."""
+
+_RANGE = (0.2, 4.0, 191)
+"""Frequencies of the curve in the figure, where none are given."""
+
+_ROUNDING = 1e-13
+"""A threshold below this is that of a motion that loses nothing, a torque below this is none."""
+_LINEAR = 1e-9
+_RESOLVED = 1e-9
+"""The drive's work is told from rounding where it is more than this part of its absolute power."""
+
+
+def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dataset:
+    """Return the amplitude of the drive at which homoclinic tangles begin, to first order.
+
+    Along an orbit of the pendulum without losses that leaves upright rest and comes back to it, all
+    that the model has besides does the work
+
+    ``M(t0) = W + p D(t0)``,
+
+    ``W`` that of damping, friction and effects, ``p D`` that of a drive with phase ``t0``.
+    Manifolds of upright rest cross where ``M`` has simple zeros: for ``p`` above ``|W| / max D``.
+
+    *Without a torque* the orbits are the separatrix ``th = 2 atan(sinh t)``, ``th' = 2/cosh t`` of
+    ``th'' + sin th = 0`` and its mirror image, forward (+) and backward (-). A torque weaker than
+    the losses is a perturbation like them. With viscous damping and Coulomb friction
+
+    ``p = |4 gamma + pi theta_r -/+ pi torque| sinh(pi omega/2) / (pi omega^2)``.
+
+    *A torque that keeps up a rotation*, as it gives more in a turn than the losses take, belongs to
+    the pendulum without losses: in the tilted potential the orbit is the loop from upright rest
+    ``pi - asin(torque)`` into the well and back (:func:`pendmap.analysis.melnikov.loop`). The formula
+    above stands beside it: there manifolds of neighbouring upright rests cross (heteroclinic), to
+    first order in the torque too. Under damping the limit of a small torque is that formula. The
+    loop has no limit: its two ways interfere with a phase that grows as ``omega ln(1/torque)``.
+
+    All integrals are computed from the model's own acceleration, so that effects count too. The
+    true tangency differs at the second order in damping.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; its ``omega`` is where the threshold is asked for.
+    omega : array_like, optional
+        Frequencies ``Omega/w0`` of the curve, by default 191 from 0.2 to 4.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``p_melnikov`` over ``omega`` and ``branch`` (forward, backward, before them loop where the
+        torque keeps up a rotation); nan where the drive's work cannot be told from rounding. The
+        attributes hold the values at the model's own frequency: ``p_forward``, ``p_backward``,
+        ``p_loop`` (nan without a torque) and ``p_melnikov``, that of the loop where the torque
+        keeps up a rotation, else the lower of the others. ``p_tangency`` is nan: to be computed by
+        following manifolds.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range, an effect cannot be in a map, the work of the drive is not
+        proportional to ``p``, or a torque of 1 or more leaves no rest.
+
+    References
+    ----------
+    Guckenheimer & Holmes (1983), Nonlinear Oscillations, section 4.5; Koch & Leven (1985), Physica
+    D 16, 1 for the parametrically excited pendulum.
+    """
+    model = pendulum
+    pendulum, _ = without_dimensions(model)
+    if pendulum.counts_turns:
+        raise InputError(
+            "effects: an effect counts turns, so that no orbit leads from one upright position to "
+            "the next at the same energy, and Melnikov's criterion has none to follow"
+        )
+    if omega is None:
+        omega = np.linspace(*_RANGE)
+    frequencies = grid.frequencies(omega)
+    with core_errors():
+        orbits, sense = _orbits(pendulum)
+        at = {name: _threshold(pendulum, pendulum.omega, orbit) for name, orbit in orbits.items()}
+        if not sense:
+            orbits.pop("loop", None)
+        curve = [
+            [_threshold(pendulum, float(w), orbit) for orbit in orbits.values()]
+            for w in frequencies
+        ]
+    known = [at[name] for name in orbits if math.isfinite(at[name])]
+    first = at["loop"] if sense else min(known, default=math.nan)
+    dataset = xr.Dataset(
+        {
+            "p_melnikov": (
+                ("omega", "branch"),
+                np.array(curve),
+                {"units": "1", "long_name": "amplitude of the drive over gravity"},
+            )
+        },
+        coords={
+            "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
+            "branch": ("branch", np.array(list(orbits))),
+        },
+    )
+    dataset.attrs = {
+        "kind": "melnikov",
+        "title": model.title,
+        **model.attributes,
+        "own_p": pendulum.p,
+        "own_omega": pendulum.omega,
+        "p_melnikov": first,
+        "p_forward": at["forward"],
+        "p_backward": at["backward"],
+        "p_loop": at.get("loop", math.nan),
+        "p_tangency": math.nan,
+        "simd": instruction_set(),
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [*_summary(pendulum, at, first, sense), *of_model(model, "the threshold is")]
+    dataset.attrs["summary"] = "\n".join(lines)
+    return dataset
+
+
+def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
+    """Return the orbits by name, and the sense of the rotation that a torque keeps up, or none."""
+    still = dataclasses.replace(pendulum, p=0.0)
+    forward = separatrix()
+    orbits = {"forward": forward, "backward": forward.mirrored()}
+    won = {name: _work(still, orbit, 0.0) for name, orbit in orbits.items()}
+    # A torque gives 2 pi times itself on one branch and takes it on the other.
+    torque = (won["forward"] - won["backward"]) / (4 * math.pi)
+    if abs(torque) >= 1 - _ROUNDING:
+        raise InputError(
+            f"torque must be above -1 and below 1 for Melnikov's criterion, got {torque:.6g}: "
+            "a larger one leaves no upright rest"
+        )
+    if abs(torque) <= _ROUNDING:
+        return orbits, ""
+    sense = max(won, key=lambda name: won[name])
+    kept_up = won[sense] > _ROUNDING
+    return {"loop": loop(torque), **orbits}, sense if kept_up else ""
+
+
+def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
+    """Return the power of all that the orbit's own equation lacks: a row for each of the phases."""
+    theta, speed = (np.tile(column, at.size) for column in (orbit.theta, orbit.speed))
+    tau = (orbit.time + at[:, None]).ravel()
+    acceleration = _core.acceleration(pendulum.parameters, tau, theta, speed)
+    return (speed * (acceleration + np.sin(theta) - orbit.torque)).reshape(at.size, -1)
+
+
+def _work(pendulum: Pendulum, orbit: Orbit, at: float) -> float:
+    return float((_power(pendulum, orbit, np.array([at])) @ orbit.weight)[0])
+
+
+def _threshold(pendulum: Pendulum, omega: float, orbit: Orbit) -> float:
+    """Return the ``p`` at which ``W + p D`` first has a zero for some phase; nan if unresolved."""
+    still, driven, twice = (
+        dataclasses.replace(pendulum, p=p, omega=omega) for p in (0.0, 1.0, 2.0)
+    )
+    passive = _power(still, orbit, np.zeros(1))
+    won = float((passive @ orbit.weight)[0])
+    for count in _PHASES:
+        starts = driven.period * np.arange(count) / count
+        power = _power(driven, orbit, starts) - passive
+        work = power @ orbit.weight
+        scale = float((np.abs(power) @ orbit.weight).max())
+        terms = np.abs(np.fft.rfft(work)) / count
+        if terms[-2:].max() <= _ROUNDING * scale:
+            break
+    again = _power(twice, orbit, starts[:2]) @ orbit.weight - won
+    if np.abs(again - 2 * work[:2]).max() > _LINEAR * scale:
+        raise InputError(
+            "effects: the work of the drive along the separatrix is not proportional to p; "
+            "Melnikov's criterion to first order needs that"
+        )
+    if abs(won) <= _ROUNDING:
+        return 0.0
+    if omega > _FASTEST * orbit.rate:
+        return math.nan
+    greatest = _greatest(-math.copysign(1.0, won) * work)
+    return abs(won) / greatest if greatest > _RESOLVED * scale else math.nan
+
+
+def _greatest(work: Floats) -> float:
+    """Return the greatest value of a function given at evenly spaced phases."""
+    dense = np.fft.irfft(np.fft.rfft(work), _FINE) * (_FINE / work.size)
+    k = int(np.argmax(dense))
+    before, top, after = dense[k - 1], dense[k], dense[(k + 1) % _FINE]
+    bend = before - 2 * top + after
+    return float(top - (after - before) ** 2 / (8 * bend) if bend else top)
+
+
+def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str) -> list[str]:
+    where = f"at omega = {pendulum.omega:g}"
+    known = {name: p for name, p in own.items() if math.isfinite(p)}
+    apart = {name: p for name, p in known.items() if name != "loop"}
+    lines = []
+    if sense:
+        lines.append(f"The torque keeps up the rotation {sense}: it belongs to the potential.")
+    elif "loop" in own:
+        lines.append("The torque is not above the losses of a turn: a perturbation as they are.")
+    if sense and "loop" in known:
+        lines.append(
+            f"Homoclinic tangles on the loop of upright rest from p = {first:.9g} on, {where} "
+            "(Melnikov, first order)."
+        )
+    if sense and apart:
+        said = ", ".join(f"{name} from p = {p:.9g}" for name, p in apart.items())
+        lines.append(
+            f"Manifolds of neighbouring upright rests cross {said} on (heteroclinic, the torque "
+            "too to first order)."
+        )
+    elif len(apart) > 1 and np.ptp(list(apart.values())) <= _LINEAR * first:
+        lines.append(
+            f"Homoclinic tangles from p = {first:.9g} on, {where} (Melnikov, first order)."
+        )
+    else:
+        lines += [
+            f"Homoclinic tangles {name} from p = {p:.9g} on, {where} (Melnikov, first order)."
+            for name, p in apart.items()
+        ]
+    if not sense and "loop" in known:
+        lines.append(
+            "On the loop that the torque makes of upright rest they begin at p = "
+            f"{known['loop']:.9g}."
+        )
+    if hidden := [name for name in own if name not in known]:
+        names = " and ".join(hidden)
+        lines.append(f"No threshold {where} ({names}): rounding hides the drive's work.")
+    if own.get("loop", first) == 0:
+        return [*lines, "Without damping nothing attracts, and there are no basins."]
+    if first > 0 and pendulum.p:
+        ratio = abs(pendulum.p) / first
+        side = "above" if ratio > 1 else "below"
+        lines.append(f"The pendulum's own p = {pendulum.p:g} lies {side}: {ratio:.3g} of it.")
+    lines.append("Tangles make boundaries of basins fractal; chaos that lasts needs more.")
+    return lines
+
+
+# Orbits of the pendulum without losses that leave its upright rest and come back to it.
+
+
+_REACH, _SPACING = 42.0, 0.1
+"""Times along the separatrix: the trapezoidal rule on an analytic integrand without ends errs by
+``exp(-pi^2/spacing)``; friction's integrand falls as ``exp(-|t|)`` alone."""
+
+_NODES = 16
+"""Gauss's nodes on a panel of the loop."""
+
+_HALVED, _WIDTH, _END = 12, 0.5, 20.0
+"""Panels of the loop's parameter: halved so often toward the turning point, beside which a small
+torque leaves the other upright rest; then of this width; to where the angle is rounding."""
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """Places along an orbit of ``th'' + sin th = torque``, with weights that integrate over time.
+
+    Attributes
+    ----------
+    time, theta, speed, weight : ndarray
+        One value a place.
+    torque : float
+        Of the equation that the orbit solves.
+    rate : float
+        At which deviations from upright rest grow there.
+    """
+
+    time: Floats
+    theta: Floats
+    speed: Floats
+    weight: Floats
+    torque: float = 0.0
+    rate: float = 1.0
+
+    def mirrored(self) -> Orbit:
+        """Return the image under ``th -> -th``, an orbit of the opposite torque."""
+        return Orbit(self.time, -self.theta, -self.speed, self.weight, -self.torque, self.rate)
+
+
+def separatrix() -> Orbit:
+    """Return the orbit ``th = 2 atan(sinh t)`` from one upright rest forward to the next."""
+    t = np.arange(-_REACH, _REACH + _SPACING / 2, _SPACING)
+    return Orbit(t, 2 * np.arctan(np.sinh(t)), 2 / np.cosh(t), np.full_like(t, _SPACING))
+
+
+def loop(torque: float) -> Orbit:
+    """Return the orbit that leaves upright rest ``pi - asin(torque)`` and comes back to it.
+
+    At a distance ``u`` from there ``th'^2 / 2 = G(u) = c (1 - cos u) - torque (u - sin u)``,
+    ``c = sqrt(1 - torque^2)``, up to its zero ``u_t``, where the orbit turns. With ``u = u_t /
+    cosh(y)^2`` time is ``dt / dy = 2 / sqrt(2 h)``, ``h = G / (u tanh y)^2``, which is smooth and
+    positive from the turning point, ``y = 0``, on to upright rest.
+
+    Parameters
+    ----------
+    torque : float
+        Above -1 and below 1, not 0.
+
+    Returns
+    -------
+    Orbit
+        The way there, at negative times, and the way back.
+    """
+    if torque < 0:
+        return loop(-torque).mirrored()
+    c = math.sqrt((1 - torque) * (1 + torque))
+    turn = _turning_point(torque, c)
+    ends = np.concatenate(
+        [[0.0], 0.5 ** np.arange(_HALVED, 1, -1), np.arange(_WIDTH, _END + _WIDTH / 2, _WIDTH)]
+    )
+    x, weight = legendre.leggauss(_NODES)
+    half = np.diff(ends)[:, None] / 2
+    y = ends[:-1, None] + half * (1 + x)
+    u, beyond = turn / np.cosh(y) ** 2, turn * np.tanh(y) ** 2
+    # G from its zero at u = 0 on, or from that at the turning point, whichever is nearer.
+    middle = turn - beyond / 2
+    from_rest = 2 * c * np.sin(u / 2) ** 2 - torque * _less_sine(u)
+    from_turn = torque * (
+        2 * _less_sine(beyond / 2) + 4 * np.sin(beyond / 2) * np.sin(middle / 2) ** 2
+    ) - 2 * c * np.sin(beyond / 2) * np.sin(middle)
+    energy = np.where(u < beyond, from_rest, from_turn)
+    rate = 2 * u * np.tanh(y) / np.sqrt(2 * energy)
+    whole = (half * rate) @ weight
+    time = (np.cumsum(whole) - whole)[:, None] + half * rate @ _integrals(x).T
+    time, theta = time.ravel(), (math.atan2(torque, -c) - u).ravel()
+    speed, weights = np.sqrt(2 * energy).ravel(), (half * rate * weight).ravel()
+    return Orbit(
+        np.concatenate([-time, time]),
+        np.tile(theta, 2),
+        np.concatenate([-speed, speed]),
+        np.tile(weights, 2),
+        torque,
+        math.sqrt(c),
+    )
+
+
+def _turning_point(torque: float, c: float) -> float:
+    """Return the distance from upright rest at which the loop turns."""
+    from scipy.optimize import brentq  # noqa: PLC0415 (heavy; only a torque needs it)
+
+    def energy(u: float) -> float:
+        return 2 * c * math.sin(u / 2) ** 2 - torque * float(_less_sine(np.array(u)))
+
+    # Beyond the bottom of the well, where G is greatest, it falls.
+    return float(brentq(energy, 2 * math.atan2(c, torque), math.tau, xtol=1e-300))
+
+
+def _less_sine(x: Floats) -> Floats:
+    """Return ``x - sin x`` without loss of digits where ``x`` is small."""
+    square = x * x
+    series = x * square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
+    return np.where(x < 0.1, series, x - np.sin(x))  # noqa: PLR2004 (the series errs by 1e-15)
+
+
+def _integrals(x: Floats) -> Floats:
+    """Return the matrix that takes values at Gauss's nodes to integrals from -1 to each node."""
+    p = legendre.legvander(x, x.size)
+    k = np.arange(1, x.size)
+    of_each = np.concatenate([p[:, :1] + p[:, 1:2], (p[:, 2:] - p[:, :-2]) / (2 * k + 1)], axis=1)
+    return np.asarray(of_each @ np.linalg.inv(p[:, :-1]))

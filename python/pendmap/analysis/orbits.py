@@ -1,0 +1,265 @@
+"""All closed orbits of one period and winding, stable and unstable."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core
+from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.orbits import orbits_over
+from pendmap.analysis.grid import Axis, Grid
+from pendmap.analysis.orbit_table import table
+from pendmap.analysis.summary import of_model
+from pendmap.errors import (
+    MOST_CELLS,
+    MOST_THREADS,
+    check_callable,
+    check_type,
+    check_whole,
+    core_errors,
+    instruction_set,
+)
+from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.formatting import counted
+from pendmap.model import without_dimensions
+from pendmap.units import VELOCITY, Units
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pendmap.model import Pendulum, Rig
+
+
+LONGEST = 64
+"""The longest period that is looked for, in forcing periods."""
+
+_CELLS, _FINER = 200, 4
+"""Cells on each side of the box for a period, and up to how many periods they grow with it."""
+
+_SAMPLES = 128
+"""Samples a period of an orbit's path."""
+
+_TOLERANCE = 1e-9
+"""The error of a path after a period: it is a picture."""
+
+_LISTED = 12
+"""Orbits that the summary lists."""
+
+
+def window(pendulum: Pendulum | Rig, n: int, w: int) -> Grid:
+    """Return the box in which orbits are looked for where none is given.
+
+    Velocities reach from ``-v`` to ``v``, ``v = |w| omega / n + 2 sqrt(1 + |p|)``: the mean speed
+    of the turns, and that of a fall from the top under the greatest pull of the drive.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; with a rig the box is in rad/s.
+    n, w : int
+        Period and net turns.
+    """
+    bare, units = without_dimensions(pendulum)
+    fastest = abs(w) / n * 2 * math.pi / bare.period + 2 * math.sqrt(1 + abs(bare.p))
+    cells = _CELLS * min(n, _FINER)
+    reach = units.given(fastest, VELOCITY)
+    return Grid(Axis(-math.pi, math.pi, cells), Axis(-reach, reach, cells))
+
+
+def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    n: int = 1,
+    w: int = 0,
+    grid: Grid | None = None,
+    *,
+    threads: int | None = None,
+    draws: int | None = None,
+    seed: int = 0,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """All periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
+
+    An orbit is a fixed point of ``P^n(x) - (2 pi w, 0)``, ``P`` the stroboscopic map. The
+    displacement is compared with its linear part on every cell of the grid; cells in which it
+    cannot vanish are left, the others quartered, four times. Newton's method begins in those that
+    remain, first by differences, then on the precise map, and beside orbits near their birth with
+    the known ones divided out. What closes to 1e-12, or as far as rounding lets it where the
+    multipliers are large, is kept, with the Floquet multipliers, the eigenvalues of the derivative
+    of ``P^n``, also where friction stops the pendulum on its way. An orbit whose neighbours in the
+    plane lie nearer than a cell may be missed: a finer grid shows.
+
+    States that friction holds for ever are a set, and none of them is listed.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model. With a rig velocities are in rad/s, times in s and exponents in 1/s.
+    n : int
+        Smallest period, in forcing periods; 1 to 64. Without drive 1: rests (``w = 0``) and the
+        rotation that a torque keeps up (``w = 1`` or ``-1``), closed on the angle section, with a
+        ``period`` of its own and without the trivial multiplier.
+    w : int
+        Net turns over that period, forward positive.
+    grid : Grid, optional
+        The box in which an orbit must have a point, and its cells; by default :func:`window`.
+    threads : int, optional
+        Number of threads; by default one a processor. The result does not depend on it.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: how far
+        orbits move, and in how many draws they are there and stable
+        (:func:`pendmap.analysis.draws.orbits.orbits_over`).
+    seed : int
+        Draws them.
+    progress : callable, optional
+        Called now and then with what is done and in all.
+
+    Returns
+    -------
+    xarray.Dataset
+        The table of orbits over ``orbit``: ``kind``, ``n``, ``w``, ``theta_point`` and
+        ``velocity_point`` (the point with the lowest angle), ``multipliers``, ``stable``,
+        ``exponent``, ``period``, ``twin``, ``residual``; all points over ``point``; the motion,
+        piece by piece of a period, over ``sample``.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range, or the model has an effect that no map can have.
+    MemoryError
+        If there is too little memory for the grid.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    n = check_whole("n", n, 1, LONGEST)
+    w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
+    check_callable("progress", progress)
+    workers = 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS)
+    grid = window(model, n, w) if grid is None else grid
+    check_type("grid", grid, Grid, "Grid.square(200)")
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
+    began = time.perf_counter()
+    low, high, count = grid.velocity.as_tuple
+    box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
+    with core_errors():
+        raw = _core.orbits(pendulum.parameters, (n, w), grid.theta.as_tuple, box, workers, progress)
+        paths = _paths(pendulum, raw["orbits"], units)
+    found = raw["orbits"]
+    dataset = xr.Dataset(
+        {
+            **table(found, units, "orbit"),
+            "stable": ("orbit", np.array([o["stable"] for o in found], dtype=np.int8)),
+            "residual": ("orbit", np.array([o["residual"] for o in found], dtype=float)),
+            **paths,
+        },
+        coords={"orbit": ("orbit", np.array([o["name"] for o in found], dtype=str))},
+    )
+    dataset.attrs = {
+        "kind": "orbits",
+        "title": model.title,
+        **model.attributes,
+        "section": model.units.section,
+        "n": n,
+        "w": w,
+        "low_theta": grid.theta.low,
+        "high_theta": grid.theta.high,
+        "low_velocity": low,
+        "high_velocity": high,
+        "cells": grid.cells,
+        "begun": raw["begun"],
+        "seconds": time.perf_counter() - began,
+        "simd": instruction_set(),
+        "threads": workers or _core.default_threads(),
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [*_summary(dataset, pendulum, friction=raw["friction"])]
+    lines += of_model(model, "orbits are")
+    dataset.attrs["summary"] = "\n".join(lines)
+    if several is None:
+        return dataset
+    return orbits_over(
+        dataset,
+        several,
+        lambda one, report: orbit(one, n, w, grid, threads=threads, progress=report),
+        whole,
+    )
+
+
+def _paths(pendulum: Pendulum, found: list[dict[str, Any]], units: Units) -> dict[str, Any]:
+    """The motion along each orbit, a piece from each of its points on: errors do not grow."""
+    pieces = []
+    for number, orbit in enumerate(found, start=1):
+        period = orbit["period"] or pendulum.period
+        length = period / len(orbit["points"])
+        samples = max(1, round(_SAMPLES * pendulum.period / length))
+        if orbit["kind"] in {"rest", "inverted_rest"}:
+            continue
+        for k, point in enumerate(orbit["points"]):
+            run = _core.simulate(
+                pendulum.parameters, tuple(point), length, _TOLERANCE, samples, lyapunov=False
+            )
+            own = (np.full(run["time"].size, x, dtype=np.int32) for x in (number, k))
+            pieces.append((*own, run["theta"], units.given(run["velocity"], VELOCITY)))
+    empty = tuple(np.empty(0, dtype=t) for t in (np.int32, np.int32, float, float))
+    columns = [np.concatenate(c) for c in zip(*(pieces or [empty]), strict=True)]
+    return {
+        "path_orbit": ("sample", columns[0]),
+        "path_piece": ("sample", columns[1], {"comment": "from which of its points on"}),
+        "path_theta": ("sample", columns[2], {"units": "rad", "long_name": "angle, not wrapped"}),
+        "path_velocity": ("sample", columns[3], {"units": units.of_velocity}),
+    }
+
+
+def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list[str]:
+    a, units = dataset.attrs, Units.of(dataset.attrs)
+    stable = int(dataset["stable"].sum())
+    count = dataset.sizes["orbit"]
+    own = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
+    own += f" {'forward' if a['w'] > 0 else 'backward'}" if a["w"] else ""
+    lines = [f"{counted(count, 'orbit') if count else 'No orbit'} of {own}, {stable} stable."]
+    for k in range(min(count, _LISTED)):
+        row = dataset.isel(orbit=k)
+        pairs = [complex(*pair) for pair in row["multipliers"].values if pair[0] == pair[0]]
+        said = ", ".join(_written(value) for value in pairs)
+        speed = units.spoken(format(float(row["velocity_point"]), ".9g"))
+        period = ""
+        if pendulum.p == 0 and a["w"]:
+            period = f", period {units.seconds(format(float(row['period']), '.9g'))}"
+        lines.append(
+            f"{row['orbit'].values}: {'stable' if int(row['stable']) else 'unstable'}, "
+            f"theta = {float(row['theta_point']):.9g} rad, velocity = {speed}, "
+            f"{'multipliers' if len(pairs) > 1 else 'multiplier'} {said}{period}."
+        )
+    if count > _LISTED:
+        lines.append(f"{count - _LISTED} more are in the result.")
+    if pendulum.p == 0 and a["n"] > 1:
+        lines.append("Without drive nothing closes after more than one period: n must be 1.")
+    if pendulum.p == 0 and pendulum.gamma == 0 and a["w"]:
+        lines.append(
+            "Without drive and damping rotations are there in curves, of any period: Newton's "
+            "method finds what stands alone."
+        )
+    if friction:
+        lines.append("States that friction holds for ever are a set, and not listed.")
+    reach = units.spoken(f"{a['low_velocity']:.4g} to {a['high_velocity']:.4g}")
+    lines.append(
+        f"Looked for with a point in theta = {a['low_theta']:.4g} to {a['high_theta']:.4g} rad, "
+        f"velocity = {reach}: {counted(a['cells'], 'cell')}, Newton's method from "
+        f"{counted(a['begun'], 'place')}, {a['seconds']:.2f} s on "
+        f"{counted(a['threads'], 'thread')}."
+    )
+    return lines
+
+
+def _written(value: complex) -> str:
+    if value.imag == 0:
+        return f"{value.real:.6g}"
+    return f"{value.real:.6g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.6g} i"

@@ -1,0 +1,422 @@
+"""Maps over two parameters: which attractors exist where."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from scipy.ndimage import find_objects, label
+
+from pendmap import _core
+from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.parameter_map import regimes_over
+from pendmap.analysis.regimes import kind_of, regimes
+from pendmap.analysis.summary import box_said, of_model
+from pendmap.analysis.sweep import STARTS, CellSearch, title, varied, without_damping
+from pendmap.analysis.tongues import MOST_P, tongues
+from pendmap.errors import InputError, check_callable, check_flag, core_errors
+from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.formatting import counted
+from pendmap.model import without_dimensions
+from pendmap.units import RATE, VELOCITY
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from pendmap.analysis.grid import Grid
+    from pendmap.analysis.sweep import Varied
+    from pendmap.model import Pendulum, Rig
+    from pendmap.units import Units
+
+    Progress = Callable[[int, int], object]
+
+
+CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
+"""Comment of the variable ``chaos_periods``."""
+_LISTED = 10
+_PLACES = 3
+"""Groups of cells with undecided starts that a summary names."""
+
+_FREQUENCIES = 81
+_STEPS = 10_000
+"""Parts of a computation that are told apart where two parts are one."""
+
+
+def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    ranges: Mapping[str, tuple[float, float, int]],
+    *,
+    starts: int = STARTS,
+    box: Grid | None = None,
+    tol: float = 1e-6,
+    max_periods: int | None = None,
+    threads: int | None = None,
+    seed: int = 0,
+    curves: bool = False,
+    draws: int | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The set of attractors over a plane of two parameters.
+
+    Every cell is searched from a few initial conditions, other ones than its neighbours', and from
+    points of its neighbours' attractors: grids become finer from every eighth cell to all, each
+    cell beginning also from what its neighbours on the coarser grid have; then, in six passes, from
+    what cells at distances from eight to one have and it lacks. So branches that coexist are
+    followed, and nothing depends on the order of the work. Trajectories run until a stable orbit,
+    found by Newton's method, has captured them. Those that nothing captures are watched four times
+    as long again, in four windows. Windows that turn alike in regions that meet form a group; a
+    set of groups that no trajectory leaves, with an exponent that is positive by four standard
+    errors, is chaos of its kind, unless it holds a stable orbit of period 1 to 4 (Newton's method
+    from the least gaps of 64 by 64 starts) that captures it. A run goes on where nothing tells what
+    its last group leads to, and a set of fewer than 16 runs gets 16 more from its own points.
+    Beside another attractor, which could end chaos, none of 16 may end within 5000 periods. What is
+    left is undecided.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; parameters that vary replace its own.
+    ranges : mapping of str to (float, float, int)
+        Two parameters with first value, last value (both included) and how many: columns, then
+        rows. Any of ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without
+        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI,
+        ``frequency_hz`` (``p`` is kept) and ``stroke_mm`` (``Omega`` is kept); or
+        ``EFFECT.PARAMETER`` of an effect that the model has.
+    starts : int
+        Initial conditions of each cell.
+    box : Grid, optional
+        Where they lie; by default that of :func:`pendmap.basins`.
+    tol : float
+        As of :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
+        with the period and the drive's pull.
+    max_periods : int, optional
+        Periods after which trajectories begin to be watched; by default until damping would have
+        shrunk a free motion by exp(-40), 64 at least.
+    threads : int, optional
+        Number of threads; by default one a processor. The result does not depend on it.
+    seed : int
+        Shifts the initial conditions.
+    curves : bool
+        Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
+        ``omega`` (or ``Omega``): figures draw them over the map.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: how
+        probable each regime is in each cell (:func:`pendmap.analysis.draws.parameter_map.regimes_over`). ``seed``
+        draws them.
+    progress : callable, optional
+        Called now and then with the number of cells done and in all.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (row, column): ``regime`` (index into ``regime_kinds`` and ``regime_share``),
+        ``attractors`` (how many coexist, mirror images counted), ``period`` and ``winding`` of the
+        kind that most starts end on (0 for chaos), ``exponent`` (the largest of all attractors),
+        ``undecided`` and ``failed`` (shares of the starts), ``chaos_periods`` (periods within which
+        nothing captured the chaos of a cell, 0 without), ``share`` over ``kind`` too. All
+        attractors over ``entry``: ``entry_cell``, ``entry_kind``, ``entry_n``, ``entry_w``,
+        ``entry_theta``, ``entry_velocity``, ``entry_exponent``, ``entry_exponent_stderr``,
+        ``entry_share``. An attractor that only a neighbour led to has the share 0.
+
+    Raises
+    ------
+    InputError
+        If a parameter or value is not allowed, the model has an effect that no map can have, or no
+        step reaches ``tol``.
+    MemoryError
+        If there is too little memory for the cells.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+
+    References
+    ----------
+    Xu, Wiercigroch & Cartmell (2005), Chaos, Solitons & Fractals 23, 1537.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    columns, rows = varied(model, ranges, 2)
+    check_callable("progress", progress)
+    search = CellSearch(starts, box, tol, max_periods, threads, seed)
+    theta, velocity = search.initial(units)
+    several = None if draws is None else drawn(model, draws, search.seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
+    over = None
+    if check_flag("curves", curves):
+        first, progress = _halves(progress)
+        over = _curves(model, columns, rows, first)
+    began = time.perf_counter()
+    with core_errors():
+        raw = _core.parameter_map(
+            pendulum.parameters,
+            (columns.kernel, rows.kernel),
+            theta,
+            velocity,
+            starts,
+            tol,
+            max_periods,
+            search.workers,
+            progress,
+        )
+    dataset = _dataset(raw, (columns, rows), units)
+    if over is not None:
+        dataset = dataset.assign(over)
+    dataset.attrs = {
+        "kind": "parameter_map",
+        "title": title(model, columns, rows),
+        **model.attributes,
+        "section": model.units.section,
+        "columns": columns.name,
+        "rows": rows.name,
+        "cells": columns.values.size * rows.values.size,
+        **search.attributes(raw, units),
+        "seconds": time.perf_counter() - began,
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [
+        *_summary(dataset),
+        *without_damping(model, columns, rows),
+        *of_model(model, "attractors are"),
+    ]
+    dataset.attrs["summary"] = "\n".join(lines)
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Progress | None) -> xr.Dataset:
+        return parameter_map(
+            one,
+            ranges,
+            starts=starts,
+            box=search.within(units),
+            tol=tol,
+            max_periods=max_periods,
+            threads=threads,
+            seed=seed,
+            progress=report,
+        )
+
+    return regimes_over(dataset, several, again, whole)
+
+
+def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
+    columns, rows = axes
+    shape = (rows.values.size, columns.values.size)
+    dims = (rows.name, columns.name)
+    cells = shape[0] * shape[1]
+    cell, n, w, own = raw["cell"], raw["n"], raw["w"], raw["share"]
+    names = [
+        kind_of(kind, int(period), int(turns))
+        for kind, period, turns in zip(raw["kind"], n, w, strict=True)
+    ]
+    sets, regime, frequency = regimes(names, cell, cells)
+    kinds = sorted({name for one in sets for name in one if name in set(names)})
+    share = np.zeros((len(kinds), cells))
+    place = {name: k for k, name in enumerate(kinds)}
+    which = np.array([place[name] for name in names], dtype=np.intp)
+    np.add.at(share, (which, cell), own)
+    exponent = np.full(cells, np.nan)
+    np.fmax.at(exponent, cell, raw["exponent"])
+    period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
+    # The kind that most starts end on; of equals the one that comes first.
+    leading = share[which, cell]
+    for k in np.lexsort((-np.arange(cell.size), leading)):
+        period[cell[k]], winding[cell[k]] = n[k], abs(w[k]) if n[k] else 0
+    data: dict[str, Any] = {
+        "regime": (dims, regime.reshape(shape)),
+        "regime_share": ("set", frequency),
+        "regime_kinds": ("set", np.array([json.dumps(one) for one in sets], dtype=str)),
+        "attractors": (dims, np.bincount(cell, minlength=cells).astype(np.int16).reshape(shape)),
+        "period": (dims, period.reshape(shape), {"units": "forcing periods"}),
+        "winding": (dims, winding.reshape(shape), {"units": "turns"}),
+        "exponent": (
+            dims,
+            units.given(exponent, RATE).reshape(shape),
+            {"units": units.of_rate},
+        ),
+        "undecided": (dims, raw["undecided"].reshape(shape)),
+        "failed": (dims, raw["failed"].reshape(shape)),
+        "chaos_periods": (
+            dims,
+            raw["chaos_periods"].reshape(shape),
+            {"comment": CHAOS_PERIODS},
+        ),
+        "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
+        **entries(raw, which, units),
+    }
+    coordinates = {
+        **columns.coordinates,
+        **rows.coordinates,
+        "kind": ("kind", np.array(kinds, dtype=str)),
+        "set": ("set", np.arange(len(sets))),
+    }
+    return xr.Dataset(data, coords=coordinates)
+
+
+def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
+    """Return what two parts of a computation report to; the first may begin again, and waits then.
+
+    Each part counts as half of all.
+    """
+    if progress is None:
+        return None, None
+    furthest = 0.0
+
+    def half(number: int) -> Progress:
+        def report(done: int, total: int) -> None:
+            nonlocal furthest
+            furthest = max(furthest, (number + done / max(total, 1)) / 2)
+            progress(round(_STEPS * furthest), _STEPS)
+
+        return report
+
+    return half(0), half(1)
+
+
+def _curves(
+    model: Pendulum | Rig, columns: Varied, rows: Varied, progress: Progress | None
+) -> dict[str, Any]:
+    """Return the critical curves between the ends of the axes, before anything else is computed."""
+    axes = (columns, rows)
+    by_name = {axis.name.lower(): axis for axis in axes}
+    if set(by_name) != {"p", "omega"}:
+        given = " and ".join(axis.name for axis in axes)
+        raise InputError(f"curves must be over p and omega, got {given}")
+    omega, p = by_name["omega"], by_name["p"]
+    if omega.values.size == 1 or p.bare[-1] <= 0:
+        raise InputError("curves must have ranges of omega and of p above 0")
+    # A cell reaches half a spacing beyond its middle: the curves go to the edges of the picture.
+    half = np.diff(omega.bare)[0] / 2
+    low, high = omega.bare[0] - half, omega.bare[-1] + half
+    above = p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0)
+    p_max = max(float(p.bare[-1]), min(float(above), MOST_P))
+    frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
+    found = tongues(model, frequency, p_max, inverted=False, refine=True, progress=progress)
+    scale = omega.values[-1] / omega.bare[-1]
+    return {
+        "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
+        "curve_fold": ("curve_frequency", found["fold"].values, p.attributes),
+        "curve_fold_sought": ("curve_frequency", found["fold_sought"].values),
+        "curve_index": ("curve_point", found["index"].values),
+        "curve_p": ("curve_point", found["p"].values, p.attributes),
+        "curve_multiplier": ("curve_point", found["multiplier"].values),
+    }
+
+
+def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[str, Any]:
+    """Return all attractors of all cells as variables over ``entry``.
+
+    Parameters
+    ----------
+    raw : dict
+        As the core gives them.
+    kind : ndarray
+        Place of each one's kind in the dataset's list.
+    units : Units
+        What the numbers are to be counted in.
+    """
+    rate = {"units": units.of_rate}
+    speed = {"units": units.of_velocity}
+    return {
+        "entry_cell": ("entry", raw["cell"], {"comment": "of the whole result, row by row"}),
+        "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
+        "entry_n": ("entry", raw["n"], {"comment": "0: no meaning"}),
+        "entry_w": ("entry", raw["w"]),
+        "entry_theta": ("entry", raw["theta"], {"units": "rad"}),
+        "entry_velocity": ("entry", units.given(raw["velocity"], VELOCITY), speed),
+        "entry_exponent": ("entry", units.given(raw["exponent"], RATE), rate),
+        "entry_exponent_stderr": ("entry", units.given(raw["exponent_stderr"], RATE), rate),
+        "entry_share": ("entry", raw["share"]),
+    }
+
+
+def chaos(attributes: Mapping[str, Any]) -> list[str]:
+    """Return for how long chaos was watched, where there is any."""
+    periods = attributes["chaos_periods"]
+    if not periods:
+        return []
+    line = (
+        f"Chaos: nothing captured it within {counted(periods, 'period')} (the least of all; "
+        "chaos_periods holds each); a longer transient looks the same."
+    )
+    return [line]
+
+
+def undecided(attributes: Mapping[str, Any]) -> list[str]:
+    """Return what a summary says of starts that end nowhere."""
+    return [
+        f"{100 * attributes[key]:.3g} % of the starts {word}."
+        for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
+        if attributes[key] > 0
+    ]
+
+
+def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return where a result has undecided starts: groups of cells that touch, the largest first.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A map over two parameters, or a bifurcation diagram.
+
+    Returns
+    -------
+    list of dict
+        ``ranges``, the first and the last value of each parameter, by its name; ``cells``, how
+        many have undecided starts; ``undecided``, their share of the starts of these.
+    """
+    share = dataset["undecided"]
+    groups, _ = label(share.values > 0, structure=np.ones((3,) * share.ndim))
+    found = []
+    for number, box in enumerate(find_objects(groups), 1):
+        mine = groups == number
+        ranges = {
+            str(name): (float(dataset[name].values[at][0]), float(dataset[name].values[at][-1]))
+            for name, at in zip(reversed(share.dims), reversed(box), strict=True)
+        }
+        mean = float(share.values[mine].mean())
+        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
+    return sorted(found, key=lambda one: -one["cells"])
+
+
+def _said(place: dict[str, Any]) -> str:
+    """Say where a group of cells is, and of how many."""
+    spans = [
+        f"{name} = {low:.4g}" + (f" to {high:.4g}" if high > low else "")
+        for name, (low, high) in place["ranges"].items()
+    ]
+    return f"{', '.join(spans)} ({counted(place['cells'], 'cell')})"
+
+
+def _summary(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    count = dataset.sizes["set"]
+    spans = [
+        f"{name} = {dataset[name].values[0]:g} to {dataset[name].values[-1]:g}"
+        for name in (a["columns"], a["rows"])
+    ]
+    said = f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."
+    lines = [f"{', '.join(spans)}: {said}"]
+    for k in range(min(count, _LISTED)):
+        kinds = json.loads(str(dataset["regime_kinds"].values[k]))
+        lines.append(f"{100 * float(dataset['regime_share'][k]):.3g} %: {', '.join(kinds)}.")
+    if count > _LISTED:
+        rest = float(dataset["regime_share"][_LISTED:].sum())
+        lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
+    lines += [*chaos(a), *undecided(a)]
+    places = undecided_cells(dataset)
+    if places:
+        listed = "; ".join(_said(place) for place in places[:_PLACES])
+        more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
+        lines.append(f"Cells with undecided starts: {listed}{more}.")
+    lines.append(
+        f"{counted(a['starts'], 'start')} a cell, {box_said(a)}; "
+        f"{counted(a['searched_again'], 'cell')} searched again for what a neighbour has; error "
+        f"after 5 periods {a['reached_error']:.2g}; "
+        f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
+    )
+    return lines

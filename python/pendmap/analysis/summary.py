@@ -1,0 +1,320 @@
+"""What a basin map says, in a few lines of text."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap.analysis.grid import FASTEST
+from pendmap.formatting import counted, with_error, written
+from pendmap.model.covariance import misses
+from pendmap.model.pendulum import effects_of, is_driven
+from pendmap.units import TIME, VELOCITY, Units
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import xarray as xr
+
+    from pendmap.model import Pendulum, Rig
+
+
+_NEARLY_CHANCE = 0.15
+_STILL = 1e-12
+
+
+def of_model(model: Pendulum | Rig, what: str) -> list[str]:
+    """Say what a model is worth: that it misses its record, and what acts on its reading alone.
+
+    Where effects change the sensor's reading ``what`` is shown is the motion.
+    """
+    ratio = misses(model.notes)
+    lines = []
+    if math.isfinite(ratio):
+        lines.append(f"This model misses its record by {ratio:.3g} times the noise.")
+    names = [effect.name for effect in model.effects if effect.reads]
+    if names:
+        verb = "acts" if len(names) == 1 else "act"
+        lines.append(
+            f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
+        )
+    return lines
+
+
+def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
+    """Return the findings of a basin map, a sentence a line.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
+    pendulum : Pendulum
+        The model without dimensions.
+    bound_was_chosen : bool
+        Whether the bound on periods is pendmap's own choice, not the caller's.
+    """
+    plane = dataset.attrs["plane"]
+    unlimited = unlimited_rotation(pendulum)
+    if plane == "conservative":
+        lines = [_conservative(dataset)]
+    elif plane == "only_chaos":
+        lines = [_only_chaos(dataset)]
+    else:
+        lines = [*_attractors(dataset), *_settling(dataset), *_texture(dataset)]
+    for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
+        share = dataset.attrs[key]
+        if share > 0 and plane != "conservative":
+            bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
+            bound = bound.split(";")[0] if unlimited else bound  # no bound helps
+            lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
+    a = dataset.attrs
+    if "theta" in dataset.dims:
+        lines.insert(0, _window(dataset))
+    if plane != "conservative":
+        lines += unlimited
+        if not unlimited and a["undecided"] > 0:
+            lines += _sustained_rotation(pendulum)
+    lines += of_model(pendulum, "this map is")
+    lines.append(
+        f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
+        f"{counted(a['steps_per_period'], 'step')} a period, "
+        f"error reached {a['reached_error']:.1e}, "
+        f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')} ({a['simd']})."
+    )
+    return "\n".join(lines)
+
+
+def unlimited_rotation(pendulum: Pendulum) -> list[str]:
+    """Say so where nothing limits the speed of a rotation, so that it settles on nothing.
+
+    Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
+    grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
+    """
+    dry = _dry(pendulum)
+    if dry is None:
+        return []
+    friction, torque = dry
+    if torque == 0 or friction == 0 or abs(torque) < friction:
+        return []
+    way = "forward" if torque > 0 else "backward"
+    lines = [
+        f"Without viscous damping (gamma = 0) nothing limits a rotation {way}: a turn gains "
+        f"2 pi ({abs(torque):g} - {friction:g}) m l^2 w0^2 by torque less friction, so that it "
+        + ("speeds up for ever" if abs(torque) > friction else "keeps its energy")
+        + " and settles on nothing, whatever it looks like. A smaller --max-periods shows as much."
+    ]
+    if abs(torque) > friction + 1 + abs(pendulum.p):
+        lines.append("Friction can hold it nowhere (torque above theta_r + 1 + p): no start rests.")
+    return lines
+
+
+def _sustained_rotation(pendulum: Pendulum) -> list[str]:
+    """Say what keeps starts undecided where dry friction alone damps a driven pendulum.
+
+    Friction of one sense is a constant torque, which keeps phase area: only where the motion turns
+    back does the area shrink.
+    """
+    dry = _dry(pendulum)
+    if dry is None or dry[0] == 0 or pendulum.p == 0:
+        return []
+    line = (
+        "With dry friction alone (gamma = 0) phase area shrinks only where the motion turns back: "
+    )
+    return [line + "a rotation that the drive keeps up settles on nothing."]
+
+
+def _dry(pendulum: Pendulum) -> tuple[float, float] | None:
+    """Return dry friction and torque where nothing grows with the speed; else None."""
+    kinds = {effect.name for effect in pendulum.effects if effect.brakes}
+    own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
+    added = dict.fromkeys(own.values(), 0.0)
+    for effect in pendulum.effects:
+        if effect.name in own:
+            added[own[effect.name]] = next(iter(effect.parameters.values()))
+    gamma, friction, torque = (
+        getattr(pendulum, name) + added[name] for name in ("gamma", "theta_r", "torque")
+    )
+    # Stribeck's part of friction is none at speed; all others may brake a rotation.
+    if gamma > 0 or kinds - {"coulomb_friction", "stribeck_friction", "viscous_damping"}:
+        return None
+    return friction, torque
+
+
+def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
+    """Say after how many periods a start is undecided, and what can be done about it."""
+    undecided = dataset["label"] == 0
+    if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
+        return ": they stand exactly on an unstable rest, where nothing moves them"
+    text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
+    if chosen and any(str(kind).endswith("chaos") for kind in dataset["kind"].values):
+        text += " (beside chaos ten times the longest settling seen, at least 200)"
+    return f"{text}; --max-periods raises this bound"
+
+
+def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
+    """Return which starts hang, or stand upside down, without moving: rest whatever the drive."""
+    of = "start_" if "start_theta" in dataset else ""
+    hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
+    alone = dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]"
+    still: xr.DataArray = hangs & (dataset[f"{of}velocity"] == 0) & alone
+    return still
+
+
+def _window(dataset: xr.Dataset) -> str:
+    """Say which starts the numbers are of: a selection of the map keeps them."""
+    theta, velocity = (
+        tuple(dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]) for name in ("theta", "velocity")
+    )
+    said = window_said(theta, velocity, Units.of(dataset.attrs))
+    return f"{said}: {counted(dataset.attrs['cells'], 'start')}."
+
+
+def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Units) -> str:
+    """Return a window of starts in words, and whether it is the default one.
+
+    ``[-pi, pi] x [-3, 3]``, in SI ``[-pi, pi] x [-3 w0, 3 w0]``: the same motions either way.
+    """
+    usual = (math.pi, units.given(FASTEST, VELOCITY))
+    default = all(
+        np.allclose(span, (-reach, reach), rtol=1e-12)
+        for span, reach in zip((theta, velocity), usual, strict=True)
+    )
+    (low, high), (slow, fast) = theta, velocity
+    speeds = units.spoken(f"{slow:.6g} to {fast:.6g}")
+    said = f" (the default window{', to 3 w0' if units.si else ''})" if default else ""
+    return f"theta = {low:.6g} to {high:.6g} rad, velocity = {speeds}{said}"
+
+
+def box_said(attrs: Mapping[Any, Any]) -> str:
+    """Return in words where the starts of a search over many pendulums lie."""
+    theta, velocity = (
+        (float(attrs[f"low_{name}"]), float(attrs[f"high_{name}"]))
+        for name in ("theta", "velocity")
+    )
+    return f"in {window_said(theta, velocity, Units.of(attrs))}"
+
+
+def _conservative(dataset: xr.Dataset) -> str:
+    return (
+        "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
+        "and the finite-time exponent after "
+        f"{counted(dataset.attrs['layer_periods'], 'period')} are shown instead."
+    )
+
+
+def most_missed(starts: int) -> float:
+    """Return the largest share of starts that ``starts`` drawn at random all miss, at 95 %.
+
+    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none out of
+    ``starts`` (Clopper & Pearson 1934, Biometrika 26, 404; one-sided).
+    """
+    return 1 - math.pow(0.05, 1 / starts)
+
+
+def _only_chaos(dataset: xr.Dataset) -> str:
+    a = dataset.attrs
+    name = str(dataset["attractor"].values[0])
+    exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
+    return (
+        f"One chaotic attractor takes everything: {name}, exponent {with_error(exponent, error)} "
+        f"{Units.of(a).per_time}; nothing captured a sampled trajectory within "
+        f"{a['chaos_bound']} periods. All {a['searched_starts']} sampled starts end there: another "
+        f"attractor takes at most {100 * most_missed(a['searched_starts']):.2g} % of them (95 %).\n"
+        "Labels tell nothing here: net turns and the finite-time exponent after "
+        f"{counted(a['layer_periods'], 'period')} are shown instead."
+    )
+
+
+def _attractors(dataset: xr.Dataset) -> list[str]:
+    lines = []
+    names = [str(name) for name in dataset["attractor"].values]
+    units = Units.of(dataset.attrs)
+    unit = f" {units.of_rate}" if units.si else ""
+    for k, name in enumerate(names):
+        keys = ("fraction", "stderr", "twin", "exponent", "exponent_stderr")
+        row = {key: dataset[key].values[k] for key in keys}
+        twin = int(row["twin"])
+        mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
+        held = not math.isfinite(row["exponent"])
+        value = with_error(row["exponent"], row["exponent_stderr"])
+        rate = "held by friction" if held else f"exponent {value}{unit}"
+        lines.append(
+            f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
+            f"{rate}{mirror}."
+        )
+    if len(lines) > 1:
+        lines.append("These shares are the basin stability in this window.")
+    if not lines:
+        lines.append("No attractor was found.")
+    return lines
+
+
+def _settling(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    if a["longest_settle"] < 0:
+        return []
+    own = (
+        "" if is_driven(a["p"], effects_of(a)) else f" (without drive a period is {_own_period(a)})"
+    )
+    times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
+    return [f"Settling takes {times}{own}."]
+
+
+def _own_period(attrs: Mapping[Any, Any]) -> str:
+    units = Units.of(attrs)
+    return f"{units.own_period} = {units.given(math.tau, TIME):.4g} s" if units.si else "2 pi"
+
+
+def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
+    """Say how fractal the boundary is, as far as there is one."""
+    lines = []
+    if "boundary_basin_entropy" in attrs:
+        value = attrs["boundary_basin_entropy"]
+        line = f"Boundary basin entropy {value:.3f}"
+        if attrs["log2_criterion"]:
+            line += " is above ln 2 = 0.693: the boundary is fractal (log 2 criterion)"
+        lines.append(f"{line}.")
+    if "uncertainty_exponent" in attrs:
+        value, error = attrs["uncertainty_exponent"], attrs["uncertainty_exponent_stderr"]
+        low, high = (attrs[f"uncertainty_exponent_{end}"] for end in ("low", "high"))
+        value, low, high, dimension = (
+            written(number, error) for number in (value, low, high, 2 - value)
+        )
+        near, far = attrs["uncertainty_eps_low"], attrs["uncertainty_eps_high"]
+        lines.append(
+            f"Uncertainty exponent {value} [{low}, {high}], boundary dimension {dimension}, from "
+            f"distances of {near:.1e} to {far:.1e} of the window."
+        )
+    return lines
+
+
+def _texture(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    if not (dataset["label"] > 0).any():
+        return []  # nothing is decided: agreement of the undecided says nothing
+    lines = []
+    if "theta" in dataset.dims and a["cells"] > 1:
+        agree, chance = a["neighbours_agree"], a["neighbours_chance"]
+        above = (agree - chance) / max(1 - chance, 1e-12)
+        verdict = " (hardly better than chance)" if chance < 1 and above < _NEARLY_CHANCE else ""
+        lines.append(
+            f"Basin entropy {a['basin_entropy']:.3f}; neighbouring cells agree in "
+            f"{100 * agree:.1f} %, chance alone gives {100 * chance:.1f} %{verdict}."
+        )
+        lines += _boundary(a)
+    if a["labels_sampled"]:
+        halved = f"half the step changes {100 * a['unreliable_half_step']:.1f} %"
+        mirror = a.get("unreliable_mirror")
+        mirrored = "" if mirror is None else f", mirroring {100 * mirror:.1f} %"
+        lines.append(f"Of {a['labels_sampled']} sampled labels {halved}{mirrored}.")
+    if not a["labels_reliable"]:
+        lines.append(
+            f"LABELS OF SINGLE CELLS ARE NOT RELIABLE HERE ({100 * a['unreliable']:.1f} % change): "
+            "read the shares, the settling time and the net turns."
+        )
+        twins = dataset["twin"].values
+        if any(t not in {0, k + 1} for k, t in enumerate(twins)):
+            lines.append("Mirror images have equal shares by symmetry.")
+    return lines

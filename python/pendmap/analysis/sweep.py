@@ -1,0 +1,361 @@
+"""A parameter that varies: which of the model's it is, and its values."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap import _core
+from pendmap.analysis.grid import FASTEST, Axis, Grid, coordinate
+from pendmap.errors import (
+    MOST_CELLS,
+    MOST_PERIODS,
+    MOST_SEED,
+    MOST_THREADS,
+    InputError,
+    check_number,
+    check_type,
+    check_whole,
+    short_repr,
+)
+from pendmap.model import without_dimensions
+from pendmap.model.quantities import check
+from pendmap.model.rig import COUNTERPARTS, Rig
+from pendmap.units import VELOCITY
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.model import Effect, Pendulum
+    from pendmap.units import Units
+
+
+_UNITS = {"c_over_m": "1/s", "Omega": "rad/s", "Tr": "rad/s2", "phi": "rad", "phase": "rad"}
+_UNITS |= {"stroke_mm": "mm", "frequency_hz": "Hz"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Varied:
+    """A parameter and the values that it takes.
+
+    Attributes
+    ----------
+    name : str
+        ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque`` or ``phase``, without dimensions; of a
+        :class:`pendmap.Rig` also ``Omega``, ``c_over_m``, ``Tr`` and ``phi`` in SI,
+        ``frequency_hz = Omega / 2 pi`` with ``p`` kept, and ``stroke_mm``, the amplitude ``Y`` of
+        ``p = Y Omega^2 / g`` with ``Omega`` kept; or ``EFFECT.PARAMETER``, in the model's own
+        units.
+    values : ndarray, shape (N,)
+        Ascending, evenly spaced, in those units.
+    index : int
+        Its place in the core's list of parameters.
+    bare : ndarray, shape (N,)
+        The values without dimensions.
+    unit : str
+        The unit of ``values``; empty where they have none.
+    """
+
+    name: str
+    values: NDArray[np.float64]
+    index: int
+    bare: NDArray[np.float64]
+    unit: str
+
+    @property
+    def kernel(self) -> tuple[int, list[float]]:
+        """It as the core takes it."""
+        return self.index, self.bare.tolist()
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a quantity that takes its values."""
+        return {"units": self.unit or "1", "long_name": self.name}
+
+    @property
+    def coordinates(self) -> dict[str, Any]:
+        """It as the coordinate of a dataset; with more values than one, with their bounds."""
+        x = self.values
+        if x.size == 1:
+            return {self.name: (self.name, x, self.attributes)}
+        half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
+        edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
+        return coordinate(self.name, x, edges, self.attributes)
+
+
+_SYMBOLS = {
+    "gamma": ("\N{GREEK SMALL LETTER GAMMA}", "c/m"),
+    "p": ("p",),
+    "omega": ("\N{GREEK SMALL LETTER OMEGA}", "\N{GREEK CAPITAL LETTER OMEGA}"),
+    "phase": ("\N{GREEK SMALL LETTER PHI}",),
+    "torque": ("torque",),
+    "theta_r": ("\N{GREEK SMALL LETTER THETA}r", "Tr"),
+}
+"""What titles call parameters, without dimensions and in SI."""
+
+
+def varied(
+    model: Pendulum | Rig, ranges: Mapping[str, Sequence[float]], count: int
+) -> tuple[Varied, ...]:
+    """Return the parameters that vary, each with its values.
+
+    Parameters
+    ----------
+    model : Pendulum or Rig
+        Whose they are.
+    ranges : mapping of str to (float, float, int)
+        First and last value, both included, and how many values.
+    count : int
+        How many parameters there must be.
+
+    Raises
+    ------
+    InputError
+        If there are more or fewer, the model has none of that name, or a value is outside its
+        range.
+    """
+    if not isinstance(ranges, dict) or len(ranges) != count:
+        given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
+        example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
+        few = dict(list(example.items())[:count])
+        raise InputError(f"what varies must be a mapping like {few}, got {given or 'nothing'}")
+    found = tuple(_one(model, name, given) for name, given in ranges.items())
+    places = [one.index for one in found]
+    if len(set(places)) < len(places):
+        raise InputError(
+            f"{found[0].name} and {found[1].name} must be two parameters, they are one"
+        )
+    if "stroke_mm" in ranges and {"omega", "Omega", "frequency_hz"} & set(ranges):
+        raise InputError(
+            "stroke_mm beside a frequency that varies: p = Y Omega^2 / g must vary in their place"
+        )
+    return found
+
+
+def title(model: Pendulum | Rig, *axes: Varied) -> str:
+    """Return the model in one line, and what varies in it."""
+    spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
+    known = _core.parameter_names(without_dimensions(model)[0].parameters)
+    rest = title_without(model, *(known[a.index] for a in axes))
+    return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
+
+
+def title_without(model: Pendulum | Rig, *names: str) -> str:
+    """Return the model in one line without some of its parameters, by the core's names."""
+    whole = [effect.title(model.units) for effect in model.effects]
+    own = model.title.removesuffix(", ".join(whole)).removesuffix(", ")
+    symbols = {symbol for name in names for symbol in _SYMBOLS.get(name, ())}
+    kept = [part for part in own.split(", ") if part.partition(" = ")[0] not in symbols]
+    return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
+
+
+def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
+    """Return a line where some of these pendulums have no damping at all, and nothing attracts."""
+    pendulum, _ = without_dimensions(model)
+    known = _core.parameter_names(pendulum.parameters)
+    least = {known[axis.index]: float(axis.bare[0]) for axis in axes}
+    if any(effect.brakes for effect in model.effects):
+        return []
+    if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
+        return []
+    return ["Without damping (gamma = 0) nothing attracts: such starts stay undecided."]
+
+
+def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
+    pendulum, units = without_dimensions(model)
+    known = _core.parameter_names(pendulum.parameters)
+    powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
+    laboratory = _laboratory(model) if isinstance(model, Rig) else {}
+    if units.si:
+        own = {si: (bare, power) for bare, (si, power) in COUNTERPARTS.items()}
+        powers |= {si: own[si] for si in ("c_over_m", "Omega", "phi", "Tr")}
+        powers |= {name: own[si] for name, (si, _) in laboratory.items()}
+    effects = {e.name: e for e in model.effects}
+    shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
+    if name not in powers and name not in shared:
+        there = ", ".join([*powers, *shared])
+        raise InputError(
+            f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
+        )
+    values = _values(name, given)
+    if name in powers:
+        bare, power = powers[name]
+        factor = 1.0
+        if name in laboratory:
+            check(name, values[0])
+            factor = laboratory[name][1]
+        plain, unit = units.bare(factor * values, power), _UNITS.get(name, "")
+    else:
+        bare, unit = name, ""
+        which, parameter = name.split(".", 1)
+        entries = effects[which].definition["parameters"]
+        if units.si and any(entry["power_of_w0_less"] == parameter for entry in entries):
+            raise InputError(
+                f"{name} changes the units of others: the model must be one without dimensions"
+            )
+        bared = [_set(effects[which], parameter, float(x)).bare(units) for x in values]
+        plain = np.array([effect.parameters[parameter] for effect in bared])
+        if units.si:
+            unit = next(entry["unit"] for entry in entries if entry["name"] == parameter)
+    if known.count(bare) > 1:
+        raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
+    for value in (plain[0], plain[-1]):
+        _check(pendulum, bare, float(value), name)
+    return Varied(name, values, known.index(bare), plain, unit)
+
+
+def _laboratory(rig: Rig) -> dict[str, tuple[str, float]]:
+    """Return which of a rig's numbers the laboratory's are, and what they are times to be it."""
+    known = {"frequency_hz": ("Omega", math.tau)}
+    if rig.Omega > 0:  # without a frequency no stroke is an acceleration
+        known["stroke_mm"] = ("p", 1e-3 * rig.Omega**2 / rig.gravity)
+    return known
+
+
+def _values(name: str, given: object) -> NDArray[np.float64]:
+    wanted = f"{name} must be (first, last, how many), like {name}=(0.5, 2.0, 100)"
+    if not isinstance(given, tuple | list) or len(given) != 3:  # noqa: PLR2004
+        raise InputError(f"{wanted}, got {short_repr(given)}")
+    low, high = (check_number(name, end) for end in given[:2])
+    count = check_whole(f"{name}: how many", given[2], 1, MOST_CELLS)
+    if not (low < high and math.isfinite(high - low)) and not (count == 1 and low == high):
+        raise InputError(f"{wanted}, the lower one first, got {low:g} to {high:g}")
+    if count == 1 and low < high:
+        raise InputError(f"{name} is {low:g} to {high:g}: one value has one bound")
+    return np.linspace(low, high, count)
+
+
+def _check(pendulum: Pendulum, bare: str, value: float, name: str) -> None:
+    """Refuse a value that no pendulum has."""
+    try:
+        if "." not in bare:
+            dataclasses.replace(pendulum, **{bare: value})  # type: ignore[arg-type]
+            return
+        which, parameter = bare.split(".", 1)
+        effects = [_set(e, parameter, value) if e.name == which else e for e in pendulum.effects]
+        dataclasses.replace(pendulum, effects=tuple(effects))
+    except InputError as error:
+        raise InputError(f"{name} = {value:g}: {error}") from None
+
+
+def _set(effect: Effect, parameter: str, value: float) -> Effect:
+    """Return an effect with another value for one of its parameters."""
+    return dataclasses.replace(effect, parameters={**effect.parameters, parameter: value}, ci95={})
+
+
+# How each of many pendulums is searched for attractors: from which starts, how long, how well.
+
+
+STARTS = 9
+"""Initial conditions of a cell where nothing is said."""
+_SPREAD = 1000
+_PLASTIC = 1.324717957244746
+_CELLS = 61
+"""After so many cells initial conditions come again: a prime, so that columns differ too."""
+
+
+def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
+    """Return initial conditions that cover a box evenly: an additive recurrence.
+
+    No two of them are mirror images of one another, so that none is wasted on a symmetric pendulum.
+
+    Parameters
+    ----------
+    grid : Grid
+        The box; its cells do not matter.
+    count : int
+        How many.
+    seed : int
+        Shifts them.
+
+    Returns
+    -------
+    theta, velocity : ndarray, shape (count,)
+    """
+    shift = 0.5 + (seed * 0.6180339887498949) % 1.0
+    # Not the box's centre, where a pendulum hangs at rest and stays however unstable that is.
+    k = 1 + np.arange(count)
+    parts = [(shift + k / _PLASTIC**power) % 1.0 for power in (1, 2)]
+    ends = [(axis.low, axis.high - axis.low) for axis in (grid.theta, grid.velocity)]
+    theta, velocity = (low + width * part for (low, width), part in zip(ends, parts, strict=True))
+    return theta, velocity
+
+
+@dataclasses.dataclass(frozen=True)
+class CellSearch:
+    """What a user chose, checked.
+
+    Parameters
+    ----------
+    starts : int
+        Initial conditions of each pendulum.
+    box : Grid or None
+        Where they lie; None: the box of :func:`pendmap.basins`.
+    tol, max_periods, threads, seed
+        As of :func:`pendmap.parameter_map`.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range.
+    """
+
+    starts: int
+    box: Grid | None
+    tol: float
+    max_periods: int | None
+    threads: int | None
+    seed: int
+
+    def __post_init__(self) -> None:
+        check_whole("starts", self.starts, 1, MOST_CELLS)
+        check_whole("seed", self.seed, 0, MOST_SEED)
+        check_number("tol", self.tol)
+        if self.threads is not None:
+            check_whole("threads", self.threads, 1, MOST_THREADS)
+        if self.max_periods is not None:
+            check_whole("max_periods", self.max_periods, 1, MOST_PERIODS)
+        if self.box is not None:
+            check_type("box", self.box, Grid, "Grid.square(100)")
+
+    def within(self, units: Units) -> Grid:
+        """Return the box, in these units."""
+        if self.box is not None:
+            return self.box
+        reach = units.given(FASTEST, VELOCITY)
+        return Grid(Axis(-math.pi, math.pi, _SPREAD), Axis(-reach, reach, _SPREAD))
+
+    def initial(self, units: Units) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return initial conditions without dimensions; each cell takes those after the last's."""
+        theta, velocity = spread(self.within(units), _CELLS * self.starts, self.seed)
+        return theta, units.bare(velocity, VELOCITY)
+
+    @property
+    def workers(self) -> int:
+        """Number of threads as the core takes it."""
+        return self.threads or 0
+
+    def attributes(self, raw: dict[str, Any], units: Units) -> dict[str, Any]:
+        """Return what a dataset says of the search whose result is ``raw``."""
+        box = self.within(units)
+        return {
+            "starts": self.starts,
+            "low_theta": box.theta.low,
+            "high_theta": box.theta.high,
+            "low_velocity": box.velocity.low,
+            "high_velocity": box.velocity.high,
+            "tol": self.tol,
+            "reached_error": raw["reached_error"],
+            "searched_again": raw["searched_again"],
+            "undecided": float(raw["undecided"].mean()),
+            "chaos_periods": min((int(n) for n in raw["chaos_periods"] if n), default=0),
+            "failed": float(raw["failed"].mean()),
+            "seed": self.seed,
+            "threads": self.workers or _core.default_threads(),
+            "simd": raw["simd"],
+        }

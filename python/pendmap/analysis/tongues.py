@@ -1,0 +1,429 @@
+"""Critical curves: where rest, hanging and inverted, is stable under a drive of the pivot."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core
+from pendmap.analysis import critical_curves
+from pendmap.analysis import grid as grids
+from pendmap.analysis.critical_curves import PLANES, in_picture
+from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.tongues import tongues_over
+from pendmap.analysis.summary import of_model
+from pendmap.analysis.sweep import title_without
+from pendmap.errors import (
+    MOST_THREADS,
+    InputError,
+    check_callable,
+    check_flag,
+    check_number,
+    check_whole,
+    core_errors,
+    instruction_set,
+    short_repr,
+)
+from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.formatting import counted
+from pendmap.model import without_dimensions
+from pendmap.units import RATE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.model import Pendulum, Rig
+
+    Floats = NDArray[np.float64]
+
+
+_Row: TypeAlias = "dict[str, Any]"
+"""What was found at one frequency."""
+
+OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
+"""Frequencies and largest amplitude where none are given."""
+
+MOST_P = 100.0
+"""Largest amplitude that may be asked for."""
+
+_OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
+
+_NO_REST: _Row = {"p": [], "multiplier": [], "stable": [False]}
+"""What is found of a rest that is no solution."""
+
+_TIPS = 8
+"""Without damping tongues have their tips at omega = 2/k, k = 1, 2, ...: so many are told."""
+
+_STRIP = 1e-6
+"""Strips of stability narrower than this are not told."""
+
+NEAR = 0.05
+"""An asymptotic curve that is off by less than this part is near the exact one."""
+
+
+def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    omega: ArrayLike | None = None,
+    p_max: float = P_MAX,
+    *,
+    plane: str = "omega-p",
+    inverted: bool = True,
+    refine: bool = False,
+    threads: int | None = None,
+    draws: int | None = None,
+    seed: int = 0,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """Return the critical curves of rest, exact, with folds and asymptotic curves.
+
+    Hanging rest obeys ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` (eq. 1.3 with damping);
+    inverted rest the same with ``-(1 + p cos(omega tau))``. The derivative of the stroboscopic map
+    there is its monodromy matrix ``M``, and rest changes its stability where a multiplier passes
+    +1, ``1 - tr M + det M = 0``, or -1, ``1 + tr M + det M = 0``. As ``p`` enters linearly, ``M``
+    is an entire function of ``p``: from its Chebyshev series all such amplitudes up to ``p_max``
+    are found, and moved onto the map itself. In the plane of eq. 1.4 a point is ``(e, alpha^2) =
+    (p/omega^2, 1/omega^2)``.
+
+    A constant torque makes of rest an orbit of the drive's period. Where rest is stable without the
+    torque, the orbit that it becomes as the torque grows from 0 is followed along ``p``, both ways,
+    by Newton's method. It is stable between critical amplitudes as rest is; it ceases at a fold,
+    which is the one with multiplier +1. Where rest sheds two oscillations of period 1, a torque
+    makes one of them the continuation of rest, without a critical amplitude.
+
+    Without a torque, where hanging rest first loses its stability an oscillation is born, with
+    period 1 (multiplier +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its
+    fold: between fold and critical curve it is there beside a rest that is stable.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; its own ``p``, ``omega`` and phase do not matter. With gamma = 0 the curves are
+        those of Mathieu's equation. Effects count; rest must stay a solution.
+    omega : array_like, optional
+        Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3,
+        evenly in omega or, for the plane of eq. 1.4, in 1/omega^2.
+    p_max : float
+        Largest amplitude, up to 100.
+    plane : str
+        In which plane a figure shows them: ``omega-p``, or ``e-alpha2``, that of eq. 1.4.
+    inverted : bool
+        Whether to find where inverted rest is stable too.
+    refine : bool
+        Whether to add frequencies where curves begin, end, turn or bend between two of those asked
+        for, so that a figure shows them as they are.
+    threads : int, optional
+        Number of threads; by default one a processor. The result does not depend on it.
+    draws : int, optional
+        How many models are drawn from the model's ``[covariance]``, each computed too: the band in
+        which each critical amplitude lies (:func:`pendmap.analysis.draws.tongues.tongues_over`).
+    seed : int
+        Draws them.
+    progress : callable, optional
+        Called now and then with what is done and in all.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``critical``, a critical amplitude each: ``index`` of its frequency, ``p``,
+        ``multiplier`` (1 or -1), ``stable_above`` (whether rest is stable right above) and
+        ``critical_omega``, its frequency. Over
+        ``omega``: ``asked`` (0 where the frequency was added), ``stable_at_first`` (below the
+        first), ``fold`` (nan where none) and the point ``fold_theta``, ``fold_velocity`` of the
+        oscillation there, ``fold_sought`` (0 where the frequency was added and no fold ends). The
+        same without damping: ``undamped_index``, ``undamped_p``, ``undamped_multiplier`` over
+        ``undamped``. Of inverted rest, which is unstable without drive: ``inverted_index``,
+        ``inverted_p``, ``inverted_multiplier``, ``inverted_stable_above`` over ``inverted``; none,
+        and the attribute ``inverted`` 0, where upright is no rest. Under a torque, when the
+        attribute ``moved`` is 1, there are no folds and none without damping. Over ``curve`` and
+        ``omega``: ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by
+        (:mod:`pendmap.analysis.critical_curves`).
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range; if the model has friction, which holds rest whatever the
+        drive, or a load that is no constant torque, which moves it.
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    frequencies = grids.frequencies(_usual(plane) if omega is None else omega)
+    p_max = check_number("p_max", p_max)
+    check_callable("progress", progress)
+    if plane not in PLANES:
+        raise InputError(f"plane must be one of {', '.join(PLANES)}, got {short_repr(plane)}")
+    workers = 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS)
+    refine, inverted = check_flag("refine", refine), check_flag("inverted", inverted)
+    _check_free(pendulum)
+    several = None if draws is None else drawn(model, draws, seed)
+    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
+    began = time.perf_counter()
+
+    solved = _solved(
+        pendulum, frequencies, p_max, workers, progress, inverted=inverted, refine=refine
+    )
+    asked, frequencies, looked, (found, undamped, upright) = frequencies, *solved
+    moved = bool(found[0]["moved"])
+    if moved:
+        undamped = [_NO_REST] * len(found)
+    of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
+    variables = {
+        **_variables(found, undamped, upright),
+        **{
+            f"{table}_omega": (table, np.repeat(frequencies, [len(row["p"]) for row in rows]))
+            for table, rows in (("critical", found), ("undamped", undamped), ("inverted", upright))
+        },
+        **{name: ("omega", values.astype(np.int8)) for name, values in of_omega.items()},
+        **_asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max),
+    }
+    coords: dict[str, Any] = {
+        "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
+        "curve": ("curve", np.array(list(critical_curves.CURVES))),
+    }
+    if units.si:
+        given = units.given(frequencies, RATE)
+        coords["Omega"] = ("omega", given, {"units": "rad/s"})
+    dataset = xr.Dataset(variables, coords=coords)
+    dataset.attrs = {
+        "kind": "tongues",
+        "title": title_without(model, "p", "omega", "phase"),
+        **model.attributes,
+        "plane": plane,
+        "p_max": p_max,
+        "moved": int(moved),
+        "inverted": int(upright[0] is not _NO_REST),
+        "own_p": pendulum.p,
+        "own_omega": pendulum.omega,
+        "seconds": time.perf_counter() - began,
+        "simd": instruction_set(),
+        "threads": workers or _core.default_threads(),
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    lines = [*_summary(dataset), *of_model(model, "curves are")]
+    dataset.attrs["summary"] = "\n".join(lines)
+    if several is None:
+        return dataset
+
+    def again(one: Pendulum | Rig, report: Callable[[int, int], object] | None) -> xr.Dataset:
+        return tongues(one, frequencies, p_max, inverted=inverted, threads=threads, progress=report)
+
+    return tongues_over(dataset, several, again, whole)
+
+
+def _solved(  # noqa: PLR0913 (as for tongues)
+    pendulum: Pendulum,
+    asked: Floats,
+    p_max: float,
+    workers: int,
+    progress: Callable[[int, int], object] | None,
+    *,
+    inverted: bool,
+    refine: bool,
+) -> tuple[Floats, NDArray[np.bool_], tuple[list[_Row], list[_Row], list[_Row]]]:
+    """Return frequencies, at which of them folds were looked for, and what was found there.
+
+    That is of hanging rest, of it without damping, and of inverted rest.
+    """
+    free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
+
+    def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
+        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, workers, progress)
+        return [_NO_REST] * at.size if found is None else found
+
+    def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
+        found = solve(at, pendulum, upright=False, folds=folds)
+        undamped = solve(at, free, upright=False) if free and not found[0]["moved"] else found
+        above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
+        return list(zip(found, undamped, above, strict=True))
+
+    def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
+        # The end of what is looked for bounds the last strip.
+        return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in rows]
+
+    looked = np.ones(asked.size, dtype=bool)
+    with core_errors():
+        frequencies, rows = asked, all_at(asked, folds=True)
+        if refine and asked.size > 1:
+            views = [in_picture(asked, p_max, one) for one in PLANES]
+            frequencies, rows = critical_curves.denser(asked, rows, all_at, curves, views)
+        found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
+        if refine and asked.size > 1:
+            again = partial(solve, one=pendulum, upright=False, folds=True)
+            known = np.isin(frequencies, asked)
+            looked = _folds_to_their_ends(frequencies, found, known, again)
+    return frequencies, looked, (found, undamped, upright)
+
+
+def _check_free(pendulum: Pendulum) -> None:
+    """Refuse friction, under which no stability is lost."""
+    if pendulum.theta_r > 0:
+        raise InputError(
+            f"theta_r must be 0, got {pendulum.theta_r:g}: friction holds hanging rest whatever "
+            "the drive, and it never loses its stability"
+        )
+
+
+def _folds_to_their_ends(
+    omega: Floats,
+    found: list[_Row],
+    looked: NDArray[np.bool_],
+    solve: Callable[[Floats], list[_Row]],
+) -> NDArray[np.bool_]:
+    """Find where folds begin and end among frequencies that were added; tell where was looked.
+
+    Between two frequencies looked at, of which one alone has a fold, the middle one is looked at
+    until the two are neighbours.
+    """
+    looked = looked.copy()
+    while True:
+        places = np.flatnonzero(looked)
+        folded = np.array([found[k]["fold"] is not None for k in places])
+        change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
+        middles = ((places[:-1] + places[1:]) // 2)[change]
+        if not middles.size:
+            return looked
+        for k, row in zip(middles, solve(omega[middles]), strict=True):
+            found[k] = row
+        looked[middles] = True
+
+
+def _usual(plane: str) -> Floats:
+    """Return frequencies that are evenly spread in the plane."""
+    if plane == PLANES[0]:
+        return np.linspace(*OMEGA)
+    low, high, count = OMEGA
+    return np.asarray(1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count)))
+
+
+def _variables(found: list[_Row], undamped: list[_Row], upright: list[_Row]) -> dict[str, Any]:
+    folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
+    fold, theta, velocity = np.array(folds).T
+    variables: dict[str, Any] = {
+        **_columns(found, "critical", ""),
+        **_columns(undamped, "undamped", "undamped_"),
+        **_columns(upright, "inverted", "inverted_"),
+        "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
+        "fold": ("omega", fold, _OF_P | {"comment": "of the oscillation born at the first loss"}),
+        "fold_theta": ("omega", theta, {"units": "rad"}),
+        "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
+    }
+    for prefix, one, rest in (("", "critical", found), ("inverted_", "inverted", upright)):
+        above = [stable for row in rest for stable in row["stable"][1:]]
+        variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
+    return variables
+
+
+def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, Any]:
+    count = [len(row["p"]) for row in found]
+    p = np.array([p for row in found for p in row["p"]], dtype=float)
+    multiplier = np.array([m for row in found for m in row["multiplier"]], dtype=np.int8)
+    index = np.repeat(np.arange(len(found), dtype=np.int32), count)
+    return {
+        f"{prefix}index": (one, index, {"comment": "place of its frequency in omega"}),
+        f"{prefix}p": (one, p, _OF_P),
+        f"{prefix}multiplier": (one, multiplier),
+    }
+
+
+def _asymptotic(
+    found: list[dict[str, Any]],
+    omega: Floats,
+    gamma: float,
+    p_max: float,
+) -> dict[str, Any]:
+    """Return each asymptotic curve, and how far it is from the exact one with its multiplier."""
+    curves, errors = [], []
+    for multiplier, formula in critical_curves.CURVES.values():
+        p = formula(omega, gamma)
+        p[p > p_max] = np.nan
+        error = np.full_like(p, np.nan)
+        for k, row in enumerate(found):
+            exact = [q for q, m in zip(row["p"], row["multiplier"], strict=True) if m == multiplier]
+            if exact and np.isfinite(p[k]):
+                nearest = min(exact, key=lambda q: abs(q - p[k]))
+                error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan
+        curves.append(p)
+        errors.append(error)
+    across = ("curve", "omega")
+    return {
+        "asymptotic": (across, np.array(curves), _OF_P),
+        "asymptotic_error": (across, np.array(errors), {"units": "1"}),
+    }
+
+
+def _summary(dataset: xr.Dataset) -> list[str]:
+    a = dataset.attrs
+    omega, asked = dataset["omega"].values, dataset["asked"].values.astype(bool)
+    count = dataset.sizes["critical"]
+    of_asked = int(asked[dataset["index"].values].sum())
+    where = f"{counted(int(asked.sum()), 'value')} of omega from {omega[0]:g} to {omega[-1]:g}"
+    hanging = "the orbit about hanging rest" if a["moved"] else "hanging rest"
+    lines = [f"{counted(of_asked, 'critical amplitude')} up to p = {a['p_max']:g} at {where}."]
+    if added := int((~asked).sum()):
+        lines[0] += f" {added} more values of omega where curves turn, end or bend."
+    index, p = dataset["index"].values, dataset["p"].values
+    first = [k for k in range(count) if k == 0 or index[k] != index[k - 1]]
+    never = omega[(dataset["stable_at_first"].values == 0) & asked]
+    if a["gamma"] == 0 and a["effects"] == "[]":
+        tips = [2 / k for k in range(1, _TIPS + 1)]
+        never = np.array([tip for tip in tips if omega[0] <= tip <= omega[-1]])
+    if never.size:
+        said = ", ".join(f"{value:.6g}" for value in never[:3])
+        more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
+        lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {said}{more}.")
+    elif first:
+        least = min(first, key=lambda k: p[k])
+        lines.append(
+            f"Of these frequencies {hanging} loses its stability soonest at omega = "
+            f"{omega[index[least]]:.6g}: p = {p[least]:.9g} (multiplier "
+            f"{dataset['multiplier'].values[least]})."
+        )
+    fold = dataset["fold"].values
+    if (born := np.isfinite(fold) & asked).any():
+        at = omega[born]
+        lines.append(
+            f"At {counted(at.size, 'value')} of omega from {at.min():.4g} to {at.max():.4g} the "
+            "oscillation is born toward smaller p: it exists from its fold on."
+        )
+    lines += _inverted(dataset, asked)
+    for name in dataset["curve"].values:
+        error = dataset["asymptotic_error"].sel(curve=name).values
+        near = omega[(error < NEAR) & asked]
+        if near.size:
+            lines.append(
+                f"{str(name).capitalize()}: within {100 * NEAR:g} % of the exact curve at "
+                f"omega = {near.min():.4g} to {near.max():.4g}."
+            )
+    lines.append(f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')}.")
+    return lines
+
+
+def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
+    """Say where inverted rest is stable."""
+    rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
+    if not dataset.attrs["inverted"]:
+        return []
+    omega, p_max = dataset["omega"].values, dataset.attrs["p_max"]
+    index, p = dataset["inverted_index"].values, dataset["inverted_p"].values
+    wide = []
+    for k in np.flatnonzero(dataset["inverted_stable_above"].values):
+        last = k + 1 == p.size or index[k + 1] != index[k]
+        high = p_max if last else p[k + 1]
+        if asked[index[k]] and high - p[k] > _STRIP:
+            wide.append((p[k], high, omega[index[k]]))
+    if not wide:
+        return [f"{rest} is stable nowhere there."]
+    low, high, where = max(wide, key=lambda strip: strip[1] - strip[0])
+    count = counted(len({w for *_, w in wide}), "value")
+    on = " and on" if high == p_max else ""
+    widest = f"in the widest strip from p = {low:.9g} to {high:.9g}{on}, at omega = {where:.6g}"
+    return [f"{rest} is stable at {count} of omega, {widest}."]

@@ -1,0 +1,387 @@
+"""Single trajectories, and many of them advanced at once."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core
+from pendmap.analysis.grid import starts
+from pendmap.analysis.summary import of_model
+from pendmap.errors import (
+    MOST_PERIODS,
+    MOST_SAMPLES,
+    MOST_THREADS,
+    InputError,
+    check_callable,
+    check_flag,
+    check_number,
+    check_whole,
+    core_errors,
+    instruction_set,
+)
+from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.formatting import counted, with_error
+from pendmap.model import without_dimensions
+from pendmap.units import RATE, TIME, VELOCITY, Units
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.model import Pendulum, Rig
+
+    Floats = NDArray[np.float64]
+    Live = Callable[[Floats, Floats, Floats], object]
+
+
+_SAMPLES = 64
+"""Samples a period, where nothing asks for more."""
+_APART = 0.1
+"""Angle between two samples, rad, that looks smooth in the phase plane."""
+_SMOOTH_SAMPLES = 200_000
+"""Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
+_MOST_SAMPLES = 2_000_000
+_STRONGEST = 1e6
+"""Acceleration of the pivot over gravity up to which a trajectory takes seconds."""
+_ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
+
+
+def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
+    pendulum: Pendulum | Rig,
+    theta: float,
+    velocity: float,
+    until: float,
+    *,
+    tol: float = 1e-9,
+    samples: int | None = None,
+    lyapunov: bool = False,
+    live: Live | None = None,
+) -> xr.Dataset:
+    """One trajectory: time history, stroboscopic (Poincare) section and energy.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model. With a rig everything is in SI: times in s, velocities in rad/s, exponents in
+        1/s; only ``tol`` and the errors are of numbers without dimensions. Effects of the group
+        ``reading`` change nothing here: angle and velocity are those of the motion, not what a
+        sensor shows of it.
+    theta, velocity : float
+        State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
+    until : float
+        Last time, in units of ``1 / w0``; above 0.
+    tol : float
+        The error of each step is tightened until a 16 times smaller one changes the state after 5
+        periods (or at the end, if that is sooner) by no more than this, or until rounding forbids
+        more; then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
+        ``reached_error``, the difference at the end in ``end_error``.
+    samples : int, optional
+        Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
+        picture needs, up to 200,000 in all; fewer than 64 where that would be more than two
+        million. The motion does not depend on them, the batches of an exponent do.
+    lyapunov : bool
+        Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
+        standard error from the spread of 20 batches, the first tenth left out (``exponent_from``
+        and ``exponent_to`` say from which tau to which). It is the exponent of an attractor only if
+        the trajectory was on it all that time: a chaotic transient has a positive one, wherever it
+        ends. :func:`pendmap.basins` gives those of the attractors. Sticking may leave none.
+    live : callable, optional
+        Called with times, angles and velocities, three arrays of one length in the units of the
+        result, of the samples that are new since the last call: about every 50 ms while it
+        integrates, and at the end. Their values are those of the result. With it Ctrl-C ends the
+        trajectory with the last sample instead of raising; the attribute ``interrupted`` is 1 then.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``theta`` (not wrapped), ``velocity`` and ``energy`` (over m g l, ``v^2 / 2 + 1 - cos
+        theta``, 0 at rest) over ``time``; ``section_theta`` (wrapped to (-pi, pi]) and
+        ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn,
+        stick, release, stuck for ever) and ``event_theta`` over ``event``, located to rounding. The
+        attribute ``stuck`` is 1 if friction holds the pendulum at the end.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or outside its range.
+    MemoryError
+        If there is too little memory for the samples.
+    KeyboardInterrupt
+        After Ctrl-C, without ``live`` or before the first sample.
+    """
+    model = pendulum
+    pendulum, units = without_dimensions(model)
+    check_callable("live", live, "three arrays, times, angles and velocities")
+    theta, velocity = check_number("theta", theta), check_number("velocity", velocity)
+    until, tol = check_number("until", until), check_number("tol", tol)
+    lyapunov = check_flag("lyapunov", lyapunov)
+    if abs(pendulum.p) > _STRONGEST:
+        raise InputError(
+            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number "
+            "of steps grows with its root"
+        )
+    if until <= 0:
+        raise InputError(f"until must be a time above 0, got {until:g}")
+    periods = until / model.period
+    if samples is None:
+        samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
+        if not lyapunov:  # its batches are counted in samples: they stay what they are
+            speed, end = units.bare(velocity, VELOCITY), units.bare(until, TIME)
+            samples = max(samples, _smooth(pendulum, speed, end))
+    samples = check_whole("samples", samples, 1, MOST_SAMPLES)
+    if periods * samples > 100 * _MOST_SAMPLES:
+        most = 100 * _MOST_SAMPLES // samples * model.period
+        raise InputError(
+            f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
+            "fit into memory"
+        )
+    with core_errors():
+        start = (theta, units.bare(velocity, VELOCITY))
+        end = units.bare(until, TIME)
+        shown = None if live is None else _in_units(live, units)
+        raw = _core.simulate(pendulum.parameters, start, end, tol, samples, lyapunov, shown)
+    time, speed = units.given(raw["time"], TIME), units.given(raw["velocity"], VELOCITY)
+    event_time = units.given(raw["event_time"], TIME)
+    once = np.arange(0, time.size, samples)
+    if raw["time"][once[-1]] < (1 - 1e-9) * once[-1] / samples * pendulum.period:
+        once = once[:-1]  # the end, between two samples
+    angle = raw["theta"][once]
+    wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
+    dataset = xr.Dataset(
+        {
+            "theta": ("time", raw["theta"], {"units": "rad", "long_name": "angle, not wrapped"}),
+            "velocity": (
+                "time",
+                speed,
+                {"units": units.of_velocity, "long_name": units.derivative},
+            ),
+            "energy": (
+                "time",
+                energy(raw["theta"], speed, model.attributes),
+                {"units": "1", "long_name": "energy over m g l", "formula": FORMULA},
+            ),
+            "section_theta": ("period", wrapped, {"units": "rad"}),
+            "section_velocity": ("period", speed[once], {"units": units.of_velocity}),
+            "section_time": ("period", time[once], {"units": units.of_time}),
+            "event_time": ("event", event_time, {"units": units.of_time}),
+            "event_kind": ("event", np.array(raw["event_kind"], dtype="U14")),
+            "event_theta": ("event", raw["event_theta"], {"units": "rad"}),
+        },
+        coords={
+            "time": ("time", time, {"units": units.of_time, "long_name": units.clock}),
+            "period": ("period", np.arange(wrapped.size)),
+        },
+    )
+    turns = math.trunc((float(raw["theta"][-1]) - theta) / math.tau)
+    asked = {}
+    if raw["interrupted"]:
+        asked = {"interrupted": 1, "until_asked": until}
+        until = float(time[-1])
+    dataset.attrs = {
+        "kind": "trajectory",
+        "title": model.title,
+        **model.attributes,
+        "theta0": theta,
+        "velocity0": velocity,
+        "until": until,
+        **asked,
+        "tol": tol,
+        "reached_error": raw["reached_error"],
+        "end_error": raw["end_error"],
+        "steps_per_period": raw["steps_per_period"],
+        "turns": turns,
+        "stuck": int(raw["stuck"]),
+        "lyapunov": int(lyapunov),
+        **_exponent(raw, time, units),
+        "simd": instruction_set(),
+        "pendmap_version": _core.__version__,
+        "format_version": FORMAT_VERSION,
+    }
+    dataset.attrs["summary"] = "\n".join(
+        [_summary(dataset, units), *of_model(model, "angle and velocity here are")]
+    )
+    return dataset
+
+
+def _in_units(live: Live, units: Units) -> Live:
+    """Return what hands samples over in these units."""
+
+    def shown(times: Floats, theta: Floats, velocity: Floats) -> None:
+        live(units.given(times, TIME), theta, units.given(velocity, VELOCITY))
+
+    return shown
+
+
+def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
+    """Samples a period that show the motion as a curve, from a guess of its greatest speed."""
+    periods = max(until / pendulum.period, 1.0)
+    pulled = abs(velocity) + abs(pendulum.torque) * until
+    if pendulum.gamma > 0:
+        pulled = min(pulled, abs(pendulum.torque) / pendulum.gamma)
+    speed = max(abs(velocity), 2 * math.sqrt(1 + abs(pendulum.p)), pulled)
+    wanted = min(pendulum.period * speed / _APART, MOST_SAMPLES)
+    return int(min(math.ceil(wanted), _SMOOTH_SAMPLES // periods))
+
+
+def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> dict[str, float]:
+    """The exponent with its standard error, and from when to when it was measured."""
+    if raw["exponent"] is None:
+        return {}
+    first = int(_ALIGNMENT * time.size)
+    size = max(1, (time.size - first) // _BATCHES)
+    last = first + (time.size - first) // size * size - 1
+    return {
+        "exponent": units.given(raw["exponent"][0], RATE),
+        "exponent_stderr": units.given(raw["exponent"][1], RATE),
+        "exponent_from": float(time[max(first - 1, 0)]),
+        "exponent_to": float(time[last]),
+    }
+
+
+def _since_start(turns: int) -> str:
+    """Say how many full turns lie between start and end; nothing where there are none."""
+    if turns == 0:
+        return ""
+    return f" ({counted(abs(turns), 'full turn')} {'forward' if turns > 0 else 'backward'})"
+
+
+def _summary(dataset: xr.Dataset, units: Units) -> str:
+    a = dataset.attrs
+    theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
+    lines = []
+    if a.get("interrupted"):
+        asked = units.at(format(a["until_asked"], "g"))
+        lines.append(f"INTERRUPTED before {asked}: this is what was computed until then.")
+    error = a["end_error"]
+    at_end = f" and by {error:.1e} at the end" if math.isfinite(error) else ""
+    lines += [
+        (
+            f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad"
+            f"{_since_start(a['turns'])}, velocity = {units.spoken(format(velocity, '.9g'))}."
+        ),
+        (
+            f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
+            f"after 5 periods{at_end} "
+            f"({a['steps_per_period']} steps a period)."
+        ),
+    ]
+    if not a["reached_error"] <= a["tol"]:
+        lines.append(
+            f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding, or the smallest step allowed, "
+            f"leaves {a['reached_error']:.1e}."
+        )
+    rounding = float(np.spacing(np.abs(dataset["theta"].values).max()))
+    if rounding > a["tol"]:
+        lines.append(
+            f"ANGLES ARE ROUNDED TO {rounding:.1e} rad, so large are they: begin nearer to 0."
+        )
+    if a["stuck"]:
+        kinds, times = dataset["event_kind"].values, dataset["event_time"].values
+        ever = " for ever" if kinds[-1] == "stuck for ever" else ""
+        lines.append(f"Friction holds it since {units.at(format(times[-1], '.9g'))}{ever}.")
+    if a["end_error"] > max(1e-3, a["tol"]):
+        lines.append(
+            "The end is not predictable at this length: read the motion, not its last state."
+        )
+    if "exponent" in a:
+        value, error = a["exponent"], a["exponent_stderr"]
+        lines.append(
+            f"Largest Lyapunov exponent of this stretch, {units.clock} = "
+            f"{a['exponent_from']:.6g} to {units.seconds(format(a['exponent_to'], '.6g'))}: "
+            f"{with_error(value, error)} {units.per_time}. Transients are included; basins gives "
+            "the exponents of the attractors."
+        )
+    return "\n".join(lines)
+
+
+def advance(  # noqa: PLR0913
+    pendulum: Pendulum | Rig,
+    theta: ArrayLike,
+    velocity: ArrayLike,
+    periods: int,
+    *,
+    tol: float = 1e-6,
+    steps_per_period: int | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Advance many starts by the same number of periods, and nothing else.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; with a rig velocities are in rad/s.
+    theta, velocity : array_like, shape (N,)
+        Angles in rad and velocities at ``tau = 0``.
+    periods : int
+        Forcing periods (of ``2 pi`` where p = 0); 0 or more.
+    tol : float
+        As for :func:`pendmap.basins`; chooses the steps where ``steps_per_period`` is not given.
+    steps_per_period : int, optional
+        Steps a period.
+    threads : int, optional
+        Number of threads; by default one a processor.
+    progress : callable, optional
+        Called now and then with the number of starts done and in all.
+
+    Returns
+    -------
+    theta, velocity : ndarray, shape (N,)
+        Angles wrapped to [-pi, pi] and velocities.
+    turns : ndarray of int, shape (N,)
+        Net full turns.
+
+    Raises
+    ------
+    InputError
+        If the lengths differ, a start is not finite, or a value is outside its range.
+    """
+    pendulum, units = without_dimensions(pendulum)
+    check_callable("progress", progress)
+    angles, speeds = starts(theta, velocity)
+    speeds = units.bare(speeds, VELOCITY)
+    periods = check_whole("periods", periods, 0, MOST_PERIODS)
+    workers = 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS)
+    tol = check_number("tol", tol)
+    if steps_per_period is not None:
+        steps_per_period = check_whole("steps_per_period", steps_per_period, 1, _MOST_SAMPLES)
+    with core_errors():
+        if steps_per_period is None:
+            step = max(1, angles.size // 400)
+            sample = angles[::step].copy(), speeds[::step].copy()
+            steps_per_period, _ = _core.choose_steps(pendulum.parameters, *sample, tol)
+        end, speed, turns = _core.advance(
+            pendulum.parameters, angles, speeds, periods, steps_per_period, workers, progress
+        )
+    return end, units.given(speed, VELOCITY), turns
+
+
+# The mechanical energy of the pendulum.
+
+
+FORMULA = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"
+"""As attributes of datasets say it."""
+
+
+def energy(theta: Floats, velocity: Floats, attributes: Any) -> Floats:  # noqa: ANN401 (a mapping)
+    """Return ``E / (m g l) = v^2 / 2 + 1 - cos theta``, ``v = d theta / d tau``.
+
+    Kinetic energy about the pivot, seen from it, and potential energy at rest gravity: 0 hanging at
+    rest, 2 at rest upside down. Without drive, damping and torque it stays what it is; drive and
+    effects change it. ``m g l = m l^2 w0^2`` is its unit in all units.
+
+    Parameters
+    ----------
+    theta, velocity : ndarray, shape (N,)
+        Angle in rad, velocity in the units of the dataset.
+    attributes : mapping
+        The attributes of the dataset, which tell its units.
+    """
+    speed = Units.of(attributes).bare(velocity, VELOCITY)
+    found: Floats = 0.5 * speed**2 + 1.0 - np.cos(theta)
+    return found

@@ -1,0 +1,113 @@
+"""The legend of a basin map: who attracts, in which colour, and how large a share."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from pendmap.charts import palette
+from pendmap.charts.basins import finite_time
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """One line of a legend.
+
+    Attributes
+    ----------
+    id : int
+        1 and up: an attractor; 0: undecided; -1: failed or diverged.
+    name, kind : str
+        As in the dataset; of undecided and failed cells, ``kind`` is the name.
+    share : str
+        Share of the cells with its standard error, ``"20.92 +- 0.13 %"``.
+    twin : str
+        Name of its mirror twin; empty where there is none.
+    points : ndarray, shape (m, 2)
+        Its stroboscopic points: angle in rad, nondimensional velocity.
+    """
+
+    id: int
+    name: str
+    kind: str
+    share: str
+    twin: str
+    points: npt.NDArray[np.float64]
+
+    @property
+    def colour(self) -> str:
+        """The colour, ``"#rrggbb"``."""
+        return palette.colour(self.name, self.kind)
+
+    @property
+    def chaotic(self) -> bool:
+        """Whether the points are samples of a chaotic set rather than a periodic orbit."""
+        return self.kind.endswith("chaos")
+
+    @property
+    def text(self) -> str:
+        """The whole line as it is printed."""
+        twin = f", twin of {typeset(self.twin)}" if self.twin else ""
+        return f"{typeset(self.name)}, {self.share}{twin}"
+
+
+def entries(dataset: xr.Dataset) -> list[Entry]:
+    """Return the attractors of a map, then undecided and failed cells where there are any."""
+    names = {
+        int(i): str(name)
+        for i, name in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
+    }
+    owner = dataset["point_attractor"].values
+    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    found = []
+    for k, (i, name) in enumerate(names.items()):
+        row = dataset.isel(attractor=k)
+        twin = int(row["twin"])
+        other = names.get(twin, "") if twin != i else ""
+        share = percent(float(row["fraction"]), float(row["stderr"]))
+        found.append(Entry(i, name, str(row["kind"].item()), share, other, points[owner == i]))
+    if finite_time(dataset) and not found:
+        return found
+    for i, name in ((0, "undecided"), (-1, "failed")):
+        share_of = float(dataset.attrs.get(name, 0.0))
+        if share_of > 0:
+            found.append(Entry(i, name, name, percent(share_of), "", np.empty((0, 2))))
+    return found
+
+
+def colours(dataset: xr.Dataset) -> npt.NDArray[np.uint8]:
+    """Return the colours of the labels -1, 0, 1, ..., K.
+
+    Returns
+    -------
+    ndarray of uint8, shape (K + 2, 3)
+        Red, green, blue; row ``label + 1`` belongs to ``label``.
+    """
+    ids = dataset["id"].values.astype(int)
+    table = np.empty((int(ids.max(initial=0)) + 2, 3), dtype=np.uint8)
+    table[:] = palette.rgb("unnamed")
+    table[0], table[1] = palette.rgb("failed"), palette.rgb("undecided")
+    for i, name, kind in zip(ids, dataset["attractor"].values, dataset["kind"].values, strict=True):
+        table[i + 1] = palette.rgb(str(name), str(kind))
+    return table
+
+
+def percent(share: float, stderr: float = math.nan) -> str:
+    """Return a share in percent, with as many digits as its standard error supports."""
+    if not math.isfinite(stderr) or stderr <= 0:
+        return f"{100 * share:.3g} %"
+    digits = max(0, min(6, 1 - math.floor(math.log10(100 * stderr))))
+    return f"{100 * share:.{digits}f} \N{PLUS-MINUS SIGN} {100 * stderr:.{digits}f} %"
+
+
+def typeset(name: str) -> str:
+    """Return a name with minus signs for the hyphens before numbers, brackets and the end."""
+    return re.sub(r"-(?=\d|\)|$)", "\N{MINUS SIGN}", name)

@@ -1,0 +1,67 @@
+"""What methods of identification are called in pictures, and their colours."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+ODD: Final = "#d55e00"
+EVEN: Final = "#0072b2"
+"""Half cycles that begin at a peak of odd or even number."""
+MEASURED: Final = "#222222"
+"""What was measured."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Look:
+    """How a method is drawn.
+
+    Parameters
+    ----------
+    label : str
+        What it is called in a legend.
+    colour : str
+        ``#rrggbb``.
+    dash : str
+        Dashes of its line, as matplotlib writes them; lines that lie on one another stay visible.
+    """
+
+    label: str
+    colour: str
+    dash: str = "-"
+
+
+_LOOKS: Final = {
+    "trajectory": Look("trajectory", "#0072b2"),
+    "combined": Look("combined, as printed", "#d55e00"),
+    "combined_odd_ends": Look("combined, odd ends", "#7a2a00", "-."),
+    "combined_odd_triplets": Look("combined, odd triplets", "#f0a070", ":"),
+    "combined_repaired": Look("combined, repaired", "#009e73", "--"),
+    "log_decrement": Look("log decrement", "#e69f00"),
+    "de_paula": Look("de Paula", "#cc79a7"),
+    "energy_balance": Look("energy balance", "#56b4e9", "--"),
+    "model": Look("model", "#0072b2"),
+    "before": Look("before", "#d55e00"),
+    "baseline": Look("baseline", "#d55e00"),
+    "after": Look("after", "#0072b2"),
+}
+"""Okabe and Ito's colours, for the methods that stand beside one another."""
+_OTHER: Final = "#8a8a8a"
+_READINGS: Final = ("combined", "combined_odd_ends", "combined_odd_triplets")
+"""The printed method; where the first cannot be applied, one of the others stands for it."""
+
+
+def look(method: str) -> Look:
+    """Return how a method is drawn; one that nobody knows is grey and has its own name."""
+    return _LOOKS.get(method) or Look(method.replace("_", " "), _OTHER)
+
+
+def drawn(methods: Iterable[str]) -> list[str]:
+    """Return those of the methods that are drawn: all but further readings of the printed one."""
+    there = list(methods)
+    printed = [name for name in _READINGS if name in there][:1]
+    return [name for name in there if name not in _READINGS or name in printed]

@@ -1,0 +1,257 @@
+"""Colours that go by an attractor's name: the same attractor looks the same in every picture.
+
+The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
+distinguishable under the common colour deficiencies; the further ones differ in lightness as well
+as in hue. Every kind has a family, and the direction and the period n choose within it:
+
+======================  ==================================================================
+rest, inverted rest     dark grey; taupe
+rotation, forward       vermillion, then orange, rust, ... as n grows
+rotation, backward      blue, then sky blue, navy, ...
+oscillation             bluish green, then yellow, olive, ...; (+) lighter, (-) darker
+quasiperiodic rotation  forward peach, backward ice blue
+chaos                   tumbling purple; rotating wine and violet; libration pink
+no attractor            undecided light grey; failed black
+======================  ==================================================================
+
+Beyond a family's last colour they begin again, darker, then lighter, and so on (:func:`lap`). So
+do attractors around another turn of the line, ``"rest turn +1"``.
+Nothing here depends on which other attractors a map holds, and no drawing library is imported.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+UNDECIDED = "#e4e4e4"
+"""Cells not decided within the bound (label 0)."""
+
+FAILED = "#000000"
+"""Cells whose integration failed or diverged (label -1)."""
+
+UNNAMED = "#8a8a8a"
+"""An attractor whose name and kind say nothing that this module knows."""
+
+_DIVERGING = np.array(
+    [
+        (5, 48, 97),
+        (33, 102, 172),
+        (67, 147, 195),
+        (146, 197, 222),
+        (209, 229, 240),
+        (247, 247, 247),
+        (253, 219, 199),
+        (244, 165, 130),
+        (214, 96, 77),
+        (178, 24, 43),
+        (103, 0, 31),
+    ],
+    dtype=float,
+)  # Brewer's red and blue, as it is used for signed quantities
+
+_Shade = tuple[str, str]  # the colour, and its name in words
+
+_SINGLE: dict[str, _Shade] = {
+    "rest": ("#474747", "dark grey"),
+    "inverted_rest": ("#c4b49f", "taupe"),
+    "tumbling_chaos": ("#cc79a7", "purple"),
+    "libration_chaos": ("#ffa6d1", "pink"),
+    "undecided": (UNDECIDED, "light grey"),
+    "failed": (FAILED, "black"),
+}
+_DIRECTED: dict[str, dict[int, tuple[_Shade, ...]]] = {
+    "rotation": {
+        +1: (
+            ("#d55e00", "vermillion"),
+            ("#e69f00", "orange"),
+            ("#7a2a00", "rust"),
+            ("#f5b78a", "apricot"),
+            ("#b98300", "ochre"),
+        ),
+        -1: (
+            ("#0072b2", "blue"),
+            ("#56b4e9", "sky blue"),
+            ("#123a6b", "navy"),
+            ("#a9cdee", "pale blue"),
+            ("#2f8f9d", "teal"),
+        ),
+    },
+    "quasiperiodic_rotation": {+1: (("#f7c9a8", "peach"),), -1: (("#bfe0f5", "ice blue"),)},
+    "rotating_chaos": {+1: (("#8f1d4f", "wine"),), -1: (("#5b2a98", "violet"),)},
+}
+_OSCILLATION: dict[str, tuple[_Shade, ...]] = {
+    "": (
+        ("#009e73", "bluish green"),
+        ("#f0e442", "yellow"),
+        ("#8f9f25", "olive"),
+        ("#b5e3a1", "pale green"),
+        ("#00604a", "bottle green"),
+        ("#c9b458", "sand"),
+    ),
+    "+": (
+        ("#7adbb8", "light green"),
+        ("#faf5a8", "light yellow"),
+        ("#c8d45f", "light olive"),
+        ("#bfe88a", "lime"),
+        ("#2f8a72", "sea green"),
+        ("#e0d08a", "straw"),
+    ),
+    "-": (
+        ("#00694e", "dark green"),
+        ("#5f5a00", "dark olive"),
+        ("#6b7a1e", "moss green"),
+        ("#7db356", "leaf green"),
+        ("#003a2d", "black green"),
+        ("#968436", "bronze"),
+    ),
+}
+
+_LAPS = (
+    (0, 0.35, "darker"),
+    (255, 0.5, "lighter"),
+    (0, 0.6, "much darker"),
+    (255, 0.72, "much lighter"),
+    (0, 0.18, "slightly darker"),
+    (255, 0.25, "slightly lighter"),
+)
+"""What a family's colours are mixed with when they begin again, how much, and in words."""
+
+_KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
+_NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
+_TURN = re.compile(r"turn ([+-]\d+)")
+_MARK = re.compile(r"\(([+-])\)|[#\s]([b-z]|\d+)$")
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What a name tells: kind, period n, direction, a mark such as ``+`` or ``b``, and the turn."""
+
+    kind: str
+    n: int
+    direction: int
+    mark: str
+    turn: int = 0
+
+
+def colour(name: str, kind: str | None = None) -> str:
+    """Return the colour of an attractor.
+
+    Parameters
+    ----------
+    name : str
+        The attractor's name, such as ``"rotation 1:+1"``, ``"oscillation 1:0 (-)"`` or
+        ``"tumbling chaos"``; also ``"undecided"`` and ``"failed"``.
+    kind : str, optional
+        Its kind, such as ``"rotation"``; needed only where the name does not begin with it.
+
+    Returns
+    -------
+    str
+        ``"#rrggbb"``, lower case. Equal for equal names, whatever else a map holds.
+
+    Examples
+    --------
+    >>> colour("rotation 1:+1"), colour("rotation 1:-1"), colour("rest")
+    ('#d55e00', '#0072b2', '#474747')
+    """
+    return _shade(name, kind)[0]
+
+
+def rgb(name: str, kind: str | None = None) -> tuple[int, int, int]:
+    """Return the colour of :func:`colour` as red, green and blue, each 0 to 255."""
+    return parts(colour(name, kind))
+
+
+def parts(code: str) -> tuple[int, int, int]:
+    """Return red, green and blue of ``"#rrggbb"``."""
+    return int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16)
+
+
+def describe(name: str, kind: str | None = None) -> str:
+    """Return the colour's name in words, for a legend that cannot show it: ``"sky blue"``."""
+    return _shade(name, kind)[1]
+
+
+def direction(name: str, kind: str | None = None) -> int:
+    """Return which way it turns: +1 forward (counter-clockwise), -1 backward, 0 neither."""
+    return _read(name, kind).direction
+
+
+def lap(name: str, kind: str | None = None) -> int:
+    """Return how often the colours of its family were used up before its own: usually 0.
+
+    ``oscillation 8:0`` has the colour of ``oscillation 2:0``, darkened, and the lap 1.
+    """
+    return _place(_read(name, kind))[1]
+
+
+def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    """Return colours for signed quantities: -1 and below dark blue, 0 white, 1 and above dark red.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Quantities over the largest magnitude to be told apart.
+
+    Returns
+    -------
+    ndarray of uint8, shape (n, 3)
+        Red, green, blue; forward is red and backward blue, as with rotations.
+    """
+    at = (np.clip(np.asarray(values, dtype=float), -1.0, 1.0) + 1.0) / 2.0 * (len(_DIVERGING) - 1)
+    steps = np.arange(len(_DIVERGING))
+    mixed = [np.interp(at, steps, _DIVERGING[:, channel]) for channel in range(3)]
+    return np.round(np.stack(mixed, axis=-1)).astype(np.uint8)
+
+
+def _shade(name: str, kind: str | None) -> _Shade:
+    shade, round_ = _place(_read(name, kind))
+    if not round_:
+        return shade
+    ground, part, word = _LAPS[(round_ - 1) % len(_LAPS)]
+    mixed = [round((1 - part) * int(shade[0][k : k + 2], 16) + part * ground) for k in (1, 3, 5)]
+    return "#" + "".join(f"{value:02x}" for value in mixed), f"{word} {shade[1]}"
+
+
+def _place(read: _Read) -> tuple[_Shade, int]:
+    """Return the colour of a name in its family, and how often the family was gone through."""
+    step = max(read.n, 1) - 1
+    family: tuple[_Shade, ...]
+    if read.kind in _SINGLE:
+        family, step = (_SINGLE[read.kind],), 0
+    elif read.kind in _DIRECTED:
+        family = _DIRECTED[read.kind][read.direction or 1]
+    elif read.kind == "oscillation":
+        family = _OSCILLATION.get(read.mark, _OSCILLATION[""])
+    else:
+        return (UNNAMED, "grey"), 0
+    around, at = divmod(step + _further(read.mark), len(family))
+    # Turns +1, -1, +2, ... take the laps one after the other.
+    return family[at], around + 2 * abs(read.turn) - (read.turn > 0)
+
+
+def _read(name: str, kind: str | None) -> _Read:
+    words = name.replace("\N{MINUS SIGN}", "-").replace("_", " ").lower().strip()
+    found = next((k for k in _KINDS if words.startswith(k.replace("_", " "))), None)
+    found = found or (kind or "").lower().replace(" ", "_")
+    numbers = _NUMBERS.search(words)
+    n, w = (int(numbers[1]), int(numbers[2])) if numbers else (1, 0)
+    mark = _MARK.search(_TURN.sub("", words[numbers.end() :] if numbers else words))
+    turn = (w > 0) - (w < 0)
+    if not turn and found in _DIRECTED:
+        sign = _TURN.sub("", words)
+        turn = -1 if "-" in sign else 1 if "+" in sign else 0
+    away = _TURN.search(words)
+    counted = int(away[1]) if away else 0
+    return _Read(found, n, turn, (mark[1] or mark[2]) if mark else "", counted)
+
+
+def _further(mark: str) -> int:
+    """Return how many shades a mark such as ``b`` or ``2`` moves on; a twin's sign: 0."""
+    if mark.isdigit():
+        return max(int(mark) - 1, 0)
+    return ord(mark) - ord("a") if mark.isalpha() else 0

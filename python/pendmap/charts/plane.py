@@ -1,0 +1,239 @@
+"""The phase plane as it is drawn: cells, ticks, thinned maps, copies of points, wrapped curves."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+Floats = npt.NDArray[np.float64]
+Ticks = list[tuple[float, str]]
+TWO_PI = 2.0 * math.pi
+
+FEWEST, MOST = 2.0, 6.5
+"""Steps between ticks that a range of angles may have."""
+
+FURTHEST = 1000
+"""Multiples of pi beyond which angles are labelled with plain numbers."""
+
+NARROW = 1e-4
+"""Width of a window, relative to its distance from 0, under which its ticks have an offset."""
+
+_FINE = 8
+"""Pixels of the narrowest cell where cells are not equally wide."""
+
+MOST_COPIES = 100
+"""Copies of a point, 2 pi apart, that are told apart in a window."""
+
+
+def edges(dataset: xr.Dataset, name: str) -> Floats:
+    """Return the edges of the cells along a rising axis of N values, shape (N + 1,).
+
+    The outer edges are those of the outermost cells, and between two cells the edge is half-way
+    from one to the other. Cells have the bounds that the axis names (CF conventions); without them
+    each reaches half-way to its neighbours, and a lone cell is 1 wide.
+    """
+    axis = dataset[name]
+    x = np.asarray(axis.values, dtype=float)
+    bounds = axis.attrs.get("bounds")
+    if bounds in dataset:
+        pairs = np.sort(np.asarray(dataset[bounds].transpose(name, ...).values, dtype=float))
+        first, last = pairs[0, 0], pairs[-1, 1]
+        between = 0.5 * (pairs[:-1, 1] + pairs[1:, 0])
+    elif x.size > 1:
+        between = 0.5 * (x[:-1] + x[1:])
+        first, last = 2 * x[0] - between[0], 2 * x[-1] - between[-1]
+    else:
+        first, between, last = x[0] - 0.5, x[:0], x[0] + 0.5
+    return np.array([first, *between, last])
+
+
+def outer_edges(dataset: xr.Dataset, name: str) -> tuple[float, float]:
+    """Return the first and the last of the edges of the cells along an axis."""
+    every = edges(dataset, name)
+    return float(every[0]), float(every[-1])
+
+
+def pixels(dataset: xr.Dataset, array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
+    """Return an array over cells as an image: each pixel has the cell that its centre lies in.
+
+    A pixel is a cell where cells are equally wide; else the narrowest has eight pixels. There are
+    at most ``limit`` along an axis, and they are chosen before anything is converted, so that a
+    large map is never copied whole.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What the array is of, its axes rising.
+    array : xarray.DataArray
+        Values over two axes.
+    limit : int
+        Rows and columns at most.
+    """
+    cells = {str(d): _cells(edges(dataset, str(d)), limit) for d in array.dims}
+    return np.asarray(array.isel(cells).values)
+
+
+def _cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
+    """Return the cell of each pixel between these edges."""
+    count, whole = bounds.size - 1, float(bounds[-1] - bounds[0])
+    widths = np.diff(bounds)
+    rounding = 8 * np.finfo(float).eps * float(np.abs(bounds).max())
+    if np.ptp(widths) <= 1e-6 * widths.mean() + rounding:
+        if count <= limit:
+            return slice(None)
+        return ((np.arange(limit) + 0.5) * (count / limit)).astype(np.intp)
+    narrowest = max(float(widths.min()), _FINE * whole / limit)
+    shown = min(limit, math.ceil(_FINE * whole / narrowest))
+    centres = bounds[0] + (np.arange(shown) + 0.5) * (whole / shown)
+    inside: npt.NDArray[np.intp] = np.searchsorted(bounds[1:-1], centres, side="right")
+    return inside
+
+
+def on_line(dataset: xr.Dataset) -> bool:
+    """Return whether angles are not wrapped: an effect counts turns."""
+    return str(dataset.attrs.get("angle")) == "line"
+
+
+def angles(dataset: xr.Dataset, theta: Floats) -> tuple[float, float]:
+    """Return the limits of an axis of these angles: a turn, or on the line all of them."""
+    return padded(theta) if on_line(dataset) and theta.size else (-math.pi, math.pi)
+
+
+def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floats:
+    """Return the points, shape (m, 2), that are in [low, high], and their copies 2 pi k further.
+
+    On the line there are no copies. None are returned where there would be more than a hundred
+    of each.
+    """
+    if on_line(dataset):
+        return points[(points[:, 0] >= low) & (points[:, 0] <= high)]
+    if high - low > MOST_COPIES * TWO_PI:
+        return np.empty((0, 2))
+    slack = 1e-9 * max(1.0, abs(low), abs(high))
+    first = math.floor((low - math.pi) / TWO_PI)
+    last = math.ceil((high + math.pi) / TWO_PI)
+    every = np.concatenate([points + np.array([k * TWO_PI, 0.0]) for k in range(first, last + 1)])
+    inside: Floats = every[(every[:, 0] >= low - slack) & (every[:, 0] <= high + slack)]
+    return inside
+
+
+def angle_ticks(low: float, high: float) -> Ticks:
+    """Return a handful of ticks at multiples of pi; plain numbers in a small or far window."""
+    if max(abs(low), abs(high)) > FURTHEST * math.pi:
+        return plain_ticks(low, high)
+    for quarters in (2**k for k in range(12)):
+        step = quarters * math.pi / 4
+        if FEWEST <= (high - low) / step <= MOST:
+            first, last = _between(low, high, step)
+            return [(k * step, _multiple_of_pi(k * quarters)) for k in range(first, last + 1)]
+    return plain_ticks(low, high)
+
+
+def plain_ticks(low: float, high: float) -> Ticks:
+    """Return about five round places between ``low`` and ``high`` with their labels."""
+    raw = (high - low) / 6
+    size = max(abs(low), abs(high))
+    if not (size * 1e-15 < raw < math.inf) or raw < sys.float_info.min:
+        return [(low, _written(low, 17))]  # narrower than numbers can tell apart
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(m * power for m in (1, 2, 2.5, 5, 10) if m * power >= raw * 0.999)
+    first, last = _between(low, high, step)
+    digits = min(17, max(6, 3 + math.floor(math.log10(size / step))))
+    return [(k * step, _written(k * step, digits)) for k in range(first, last + 1)]
+
+
+def short_ticks(low: float, high: float, *, angle: bool) -> tuple[float, Ticks]:
+    """Return what is subtracted from an axis, usually 0, and the ticks of the difference."""
+    shift = _offset(low, high)
+    make = angle_ticks if angle and not shift else plain_ticks
+    return shift, make(low - shift, high - shift)
+
+
+def shifted(name: str, shift: float) -> str:
+    """Return an axis's name, symbol and unit with a blank between, with what is subtracted."""
+    if not shift:
+        return name
+    symbol, _, unit = name.partition(" ")
+    sign = "\N{MINUS SIGN}" if shift > 0 else "+"
+    return f"{symbol} {sign} {abs(shift):.15g} {unit}".strip()
+
+
+def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
+    """Return a curve on the cylinder, its angle wrapped to (-pi, pi] and cut where it wraps.
+
+    Parameters
+    ----------
+    theta : array_like, shape (n,)
+        Angle in rad, unwrapped.
+    velocity : array_like, shape (n,)
+        Nondimensional velocity.
+
+    Returns
+    -------
+    ndarray, shape (n + 3 m, 2)
+        Each of the m crossings adds the point on one edge, a row of nan, and that on the other.
+    """
+    angle, rate = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
+    within = wrapped(angle)
+    turn = np.round((angle - within) / TWO_PI)
+    curve: Floats = np.stack([within, rate], axis=1)
+    at = np.flatnonzero(np.diff(turn))
+    edge = np.where(turn[at + 1] > turn[at], math.pi, -math.pi)
+    part = (edge - within[at]) / (angle[at + 1] - angle[at])
+    part = np.clip(part, 0.0, 1.0)  # where rounding is coarser than the steps
+    crossing = rate[at] + part * (rate[at + 1] - rate[at])
+    gap = np.full_like(edge, np.nan)
+    extra = np.stack([edge, crossing, gap, gap, -edge, crossing], axis=1).reshape(-1, 2)
+    return np.insert(curve, np.repeat(at + 1, 3), extra, axis=0)
+
+
+def wrapped(theta: Floats) -> Floats:
+    """Return angles in (-pi, pi], also where they are as large as numbers get."""
+    within: Floats = math.pi - np.remainder(math.pi - theta, TWO_PI)
+    return within
+
+
+def padded(values: Floats) -> tuple[float, float]:
+    """Return the limits of an axis that holds the values, with a margin, never empty."""
+    low, high = float(np.min(values)), float(np.max(values))
+    pad = max(0.06 * (high - low), 0.05, 1e-6 * max(abs(low), abs(high)))
+    return low - pad, high + pad
+
+
+def _offset(low: float, high: float) -> float:
+    """Return a round number near a window that is narrow for its distance from 0; else 0.
+
+    Ticks of such a window are short as differences from it, and too long as they are.
+    """
+    width = high - low
+    if not 0.0 < width < NARROW * max(abs(low), abs(high)):
+        return 0.0
+    unit = 10.0 ** math.ceil(math.log10(width))
+    return unit * round(low / unit)
+
+
+def _written(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+
+
+def _between(low: float, high: float, step: float) -> tuple[int, int]:
+    return math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
+
+
+def _multiple_of_pi(quarters: int) -> str:
+    """Return ``quarters * pi / 4`` as it is written, such as -3 pi/2."""
+    if quarters == 0:
+        return "0"
+    divisor = math.gcd(quarters, 4)
+    top, bottom = abs(quarters) // divisor, 4 // divisor
+    sign = "\N{MINUS SIGN}" if quarters < 0 else ""
+    below = f"/{bottom}" if bottom > 1 else ""
+    return f"{sign}{top if top > 1 else ''}\N{GREEK SMALL LETTER PI}{below}"

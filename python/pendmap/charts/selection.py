@@ -1,0 +1,254 @@
+"""Results and selections of them as they are drawn: axes rise, shares are those of what is there.
+
+A selection that xarray makes keeps tables and attributes of the whole result, and may reverse or
+transpose its axes. Figures and recordings show what :func:`shown` makes of it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap.charts import plane
+from pendmap.errors import InputError
+from pendmap.formatting import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterable
+
+    import numpy.typing as npt
+    import xarray as xr
+
+
+_TABLES, _COLUMNS = ("kind", "curve", "attractor", "orbit"), ("eigenvalue", "part", "trajectory")
+"""Dimensions that stand before the axes of a picture, and after them."""
+
+_KEYS = {"lyapunov": ("averaged",), "trajectory": ("event_time",)}
+"""Variables that rise along dimensions without a coordinate."""
+
+_OVER: dict[str, dict[str, tuple[str, ...]]] = {
+    "basins": {"fraction": ("attractor",)},
+    "bifurcation": {"kind": ("kind",), "entry_kind": ("entry",), "point_value": ("point",)},
+    "lifetime": {"captured": ("attractor", "elapsed"), "tail_mean": ("tail_begin",)},
+    "lyapunov": {"growth": ("elapsed",), "kind": ("attractor",)},
+    "melnikov": {"p_melnikov": ("omega", "branch")},
+    "orbits": {"kind": ("orbit",), "point_theta": ("point",)},
+    "parameter_map": {"kind": ("kind",), "regime_kinds": ("set",)},
+    "tongues": {"p": ("critical",), "asymptotic": ("curve", "omega")},
+    "trajectory": {"theta": ("time",), "section_time": ("period",)},
+}
+"""What variables of a result are over, whatever is selected from it."""
+
+_CELLS = {
+    "basins": ("label", "settle_periods", "net_turns"),
+    "bifurcation": ("up", "down"),
+    "parameter_map": ("regime", "exponent"),
+}
+"""Variables over the axes of a picture."""
+
+_OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
+"""Beginnings of the names of attributes that nobody can tell of a part of a map."""
+
+_BLOCK = 1_000_000
+"""Cells that are counted at a time, so that a large map is never converted whole."""
+
+
+def shown(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a result, or a selection of one, ready to be drawn.
+
+    Axes rise, dimensions stand in one order, and of a selection shares, tables and summary are
+    those of the part, or say that they are of the whole. Of a whole result nothing changes.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result of pendmap, or what selecting, reversing and transposing made of one.
+
+    Raises
+    ------
+    InputError
+        If it is a list of starts, an axis has no values or only one without a range, a variable
+        is missing or over other dimensions, or a table that others refer to is not whole.
+    """
+    kind = str(dataset.attrs["kind"])
+    if kind == "basins" and "theta" not in dataset.coords:
+        raise InputError("a list of starts is no map: only basins on a grid can be drawn")
+    axes = _axes(dataset)
+    for name in axes:
+        if name not in dataset.dims:
+            raise InputError(
+                f"{name} must be a range here, got a single value: select like"
+                f" isel({name}=slice(3, 4))"
+            )
+        if not dataset.sizes[name]:
+            raise InputError(f"{name} must have one value at least in a selection, got none")
+    over = _OVER.get(kind, {}) | dict.fromkeys(_CELLS.get(kind, ()), axes)
+    for name, dimensions in over.items():
+        if name not in dataset or set(dataset[name].dims) != set(dimensions):
+            there = f"is over {_listed(dataset[name].dims)}" if name in dataset else "is missing"
+            raise InputError(
+                f"{name} must be over {_listed(dimensions)} here, as isel and sel of ranges leave"
+                f" it, but {there}"
+            )
+    dataset = _rising(dataset, _KEYS.get(kind, ()))
+    dataset = dataset.transpose(*_TABLES, *axes, *_COLUMNS, ..., missing_dims="ignore")
+    count = _COUNTED.get(kind)
+    return dataset if count is None else count(dataset)
+
+
+def _listed(dimensions: Iterable[Hashable]) -> str:
+    return ", ".join(map(str, dimensions)) or "nothing"
+
+
+def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Return the axes of a picture, rows first."""
+    a = dataset.attrs
+    axes: dict[str, tuple[str, ...]] = {
+        "basins": ("velocity", "theta"),
+        "parameter_map": (str(a.get("rows")), str(a.get("columns"))),
+        "bifurcation": (str(a.get("varied")),),
+        "lifetime": ("elapsed",),
+        "lyapunov": ("elapsed",),
+        "melnikov": ("omega",),
+        "tongues": ("omega",),
+        "trajectory": ("time",),
+    }
+    return axes.get(str(a["kind"]), ())
+
+
+def _rising(dataset: xr.Dataset, keys: tuple[str, ...]) -> xr.Dataset:
+    """Return a dataset whose coordinates of numbers, and those of kinds, rise."""
+    numbers = [
+        name for name in dataset.indexes if name == "kind" or dataset[name].dtype.kind in "iuf"
+    ]
+    for name in [*numbers, *(key for key in keys if key in dataset)]:
+        values = dataset[name].values
+        if not (values[:-1] <= values[1:]).all():
+            dataset = dataset.sortby(name)
+    return dataset
+
+
+def _basins(dataset: xr.Dataset) -> xr.Dataset:
+    """Count the cells of a part of a basin map anew."""
+    label, settle = dataset["label"].values, dataset["settle_periods"].values
+    whole = int(dataset.attrs["cells"])
+    ids = dataset["id"].values.astype(int)
+    present = np.unique(label)
+    if not np.isin(present[present > 0], ids).all():
+        raise InputError("attractor: a selection of it cannot be drawn; it must be one of an axis")
+    if label.size == whole:
+        return dataset
+    counts = np.zeros(int(ids.max(initial=0)) + 2, dtype=np.int64)
+    settled, total, longest = 0, 0, -1
+    for rows in np.array_split(np.arange(label.shape[0]), -(-label.size // _BLOCK)):
+        counts += np.bincount(label[rows].ravel().astype(np.int64) + 1, minlength=counts.size)
+        known = settle[rows][settle[rows] >= 0]
+        settled, total = settled + known.size, total + int(known.sum())
+        longest = max(longest, int(known.max(initial=-1)))
+    share = counts / label.size
+    fraction = share[ids + 1]
+    error = np.sqrt(fraction * (1 - fraction) / label.size)
+    part = dataset.assign(fraction=("attractor", fraction), stderr=("attractor", error))
+    part.attrs = {k: v for k, v in part.attrs.items() if not str(k).startswith(_OF_THE_WHOLE)} | {
+        "cells": label.size,
+        "failed": float(share[0]),
+        "undecided": float(share[1]),
+        "mean_settle": total / settled if settled else -1.0,
+        "longest_settle": longest,
+    }
+    return _told(part, f"{counted(label.size, 'cell')} of {whole}")
+
+
+def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
+    """Count the cells of a part of a map over two parameters anew."""
+    regime = dataset["regime"]
+    whole = int(dataset.attrs["cells"])
+    if "set" in dataset.indexes:
+        regime = regime.copy(data=_places(dataset, "set", regime.values))
+    if regime.size == whole:
+        return dataset
+    used, place, count = np.unique(regime.values, return_inverse=True, return_counts=True)
+    part = dataset.isel(set=used).assign(
+        regime=regime.copy(data=place.reshape(regime.shape).astype(np.int16)),
+        regime_share=("set", count / regime.size),
+    )
+    shares = {key: float(part[key].mean()) for key in ("undecided", "failed")}
+    part.attrs = part.attrs | {"cells": regime.size} | shares
+    return _told(part, f"{counted(regime.size, 'cell')} of {whole}")
+
+
+def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
+    """Keep the attractors and points at the values that are there."""
+    name = str(dataset.attrs["varied"])
+    values = dataset[name].values
+    if "entry_value" not in dataset:  # of an earlier version, and whole
+        return dataset.assign(entry_value=("entry", values[dataset["entry_cell"].values]))
+    if dataset["entry_kind"].values.max(initial=-1) != dataset.sizes["kind"] - 1:
+        raise InputError("kind: a selection of kinds cannot be drawn; it must be one of values")
+    owner = _places(dataset, "entry", dataset["point_entry"].values)
+    sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
+    kept = np.isin(dataset["entry_value"].values, values)
+    loose = np.isin(dataset["loose_value"].values, values)
+    # The last place is that of no entry, -1.
+    new = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
+    part = dataset.isel(entry=kept, point=kept[owner], loose=loose)
+    part = part.assign(
+        point_entry=("point", new[owner[kept[owner]]]),
+        up=(name, new[sweeps["up"]]),
+        down=(name, new[sweeps["down"]]),
+    )
+    if kept.all() and loose.all():
+        return part
+    return _told(part, f"{counted(values.size, 'value')}")
+
+
+def _tongues(dataset: xr.Dataset) -> xr.Dataset:
+    """Keep the critical points at the frequencies that are there."""
+    omega = dataset["omega"].values
+    for prefix in ("", "undamped_", "inverted_"):
+        table = prefix.removesuffix("_") or "critical"
+        if f"{table}_omega" in dataset:
+            own = dataset[f"{table}_omega"].values
+            dataset = dataset.isel({table: np.isin(own, omega)})
+            own = dataset[f"{table}_omega"].values
+            dataset[f"{prefix}index"] = (table, np.searchsorted(omega, own))
+    return dataset
+
+
+def _trajectory(dataset: xr.Dataset) -> xr.Dataset:
+    """Keep the points of the section that are within the times that are there."""
+    first, last = (float(dataset["time"].values[end]) for end in (0, -1))
+    at, slack = dataset["section_time"].values, 1e-9 * max(abs(first), abs(last))
+    return dataset.isel(period=(at >= first - slack) & (at <= last + slack))
+
+
+def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
+    """Return where the rows of a table with these numbers stand; -1 of -1, which is none."""
+    own = dataset[table].values
+    place = np.searchsorted(own, numbers)
+    found = own[np.minimum(place, own.size - 1)] == numbers if own.size else numbers < 0
+    if not (found | (numbers < 0)).all():
+        raise InputError(f"{table}: a selection of it cannot be drawn; it must be one of an axis")
+    return np.where(numbers < 0, -1, place)
+
+
+def _told(part: xr.Dataset, which: str) -> xr.Dataset:
+    """Say in the summary what is shown, and that what follows is of the whole."""
+    spans = [
+        f"{name} = {low:.6g} to {high:.6g}"
+        for name in reversed(_axes(part))
+        for low, high in [plane.outer_edges(part, name)]
+    ]
+    said = f"A part is shown: {', '.join(spans)}, {which}. What follows is of the whole."
+    part.attrs = part.attrs | {"summary": f"{said}\n{part.attrs['summary']}"}
+    return part
+
+
+_COUNTED: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
+    "basins": _basins,
+    "bifurcation": _bifurcation,
+    "parameter_map": _parameter_map,
+    "tongues": _tongues,
+    "trajectory": _trajectory,
+}

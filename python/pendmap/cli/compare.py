@@ -1,0 +1,97 @@
+"""``pendmap compare``: a model against records that it was not fitted to."""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from pathlib import Path
+
+import click
+
+from pendmap.cli.inputs import keep_inputs
+from pendmap.cli.model_options import rig_from
+from pendmap.cli.options import rate_option, simd_option
+from pendmap.cli.show import Written, plain, progress_bar, write_all, write_table
+from pendmap.cli.types import NUMBER, OutputFile, Whole
+from pendmap.errors import MOST_SEED, MOST_THREADS, instruction_set
+
+
+@click.command("compare")
+@click.argument("model", type=click.Path(path_type=Path), metavar="MODEL")
+@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
+@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@click.option(
+    "--members",
+    type=Whole(20, 100_000),
+    default=400,
+    help="Starts of the model beside each forced run.  [default: 400]",
+)
+@click.option(
+    "--spread",
+    type=NUMBER,
+    default=0.01,
+    help="Of these about the measured start, rad, and over w0.  [default: 0.01]",
+)
+@click.option("--seed", type=Whole(0, MOST_SEED), default=0, help="Draws them.  [default: 0]")
+@click.option("--threads", type=Whole(1, MOST_THREADS), help="Threads.  [default: one a processor]")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files.")
+@rate_option
+@simd_option
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+def command(  # noqa: PLR0913 (an option each)
+    *,
+    model: Path,
+    path: Path,
+    plot: Path | None,
+    members: int,
+    spread: float,
+    seed: int,
+    threads: int | None,
+    rate_hz: float | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Simulate a MODEL beside every run of an EXPERIMENT.
+
+    MODEL is a model file in SI, as identify writes it; nothing of it is adapted. Of a free decay
+    the rms is over the whole record, from the start that brings it nearest; periods and peaks are
+    those of a motion from the first measured peak, in percent of the measured ones, as in the
+    paper's table 1. A forced run is compared with an ensemble from a neighbourhood of its start: by
+    wells visited, escapes, angle covered, time to settle and greatest velocity, and by the steady
+    state that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
+    """
+    if plot is None and not as_json:
+        plot = OutputFile([".png"]).convert("compare.png", None, None)
+    from pendmap.comparison import Ensemble, compare
+    from pendmap.comparison.free import as_json as fields
+    from pendmap.comparison.free import as_text, tables
+    from pendmap.records import files_of, read_experiment
+    from pendmap.records.summary import doubts_said
+
+    keep_inputs([model, *files_of(path)], {"--plot": [plot]})
+    rig = rig_from(model)
+    ensemble = Ensemble(members, spread, seed)
+    with progress_bar("compare", shown=sys.stderr.isatty() and not quiet) as progress:
+        experiment = read_experiment(path, rate_hz=rate_hz)
+        comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
+    written = Written()
+    if plot is not None:
+        from pendmap import figures
+
+        draw = functools.partial(figures.draw_comparison, comparison)
+        written = write_all([(draw, plot)], keep=True)
+    if as_json:
+        more = {"model": str(model), "simd": instruction_set()}
+        click.echo(json.dumps(plain(fields(comparison) | more), allow_nan=False))
+    elif not quiet:
+        doubts = list(doubts_said(experiment, *(one.run for one in comparison.every)))
+        for line in doubts:
+            click.echo(line)
+        for table in tables(comparison):
+            write_table(*table)
+        for line in as_text(comparison):
+            if line not in doubts:
+                click.echo(line)
+        written.say()
+    written.check()

@@ -1,0 +1,118 @@
+"""``pendmap effects``: the library of effects."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap.files import toml_text
+
+if TYPE_CHECKING:
+    from pendmap.model.library import EffectDefinition, EffectParameter
+
+
+@click.command("effects")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option(
+    "--effects",
+    "path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Show those of a file instead, its [[formula]]; they are checked.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None:
+    """Show the library of effects: formula, parameters, which data reveal each.
+
+    The formulas stand on the right of th'' = ..., with v = th'; those of drives say what the pivot
+    does, those of readings what the sensor shows. In brackets: values of interest without
+    dimensions, and what makes them those of a model file in SI. With NAMEs those effects alone, and
+    how they stand in a model file.
+    """
+    from pendmap.cli.show import plain
+    from pendmap.model import load_formulas
+    from pendmap.model.effects import definition
+    from pendmap.model.library import effects, of_formulas
+
+    own = [] if path is None else load_formulas(path)
+    known = {formula.name: formula for formula in own}
+    wanted = {name if name in known else definition(name)["name"] for name in names}
+    listed = effects() if path is None else of_formulas(own)
+    shown = [effect for effect in listed if not wanted or effect.name in wanted]
+    if as_json:
+        table = [plain(dataclasses.asdict(effect)) for effect in shown]
+        click.echo(json.dumps({"effects": table}, allow_nan=False))
+    elif sys.stdout.isatty():
+        _draw(shown)
+    else:
+        for effect in shown:
+            _write(effect)
+    if wanted and not as_json:
+        click.echo(
+            "\nIn a model file without dimensions, which simulate and basins take by --model:"
+        )
+        for effect in shown:
+            said = [known[effect.name].table] if effect.name in known else []
+            tables = {"formula": said, "effect": [_example(effect)]}
+            click.echo(f"\n{toml_text({k: v for k, v in tables.items() if v})}".rstrip())
+
+
+def _draw(effects: list[EffectDefinition]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("effect", "formula", "parameters", "revealed by", "maps", show_lines=True)
+    for effect in effects:
+        parameters = "\n".join(_parameter(parameter) for parameter in effect.parameters)
+        cells = (effect.name, effect.formula, parameters, effect.revealed_by, _maps(effect))
+        # Not markup: a formula may have brackets.
+        table.add_row(*(Text(cell) for cell in cells))
+    Console().print(table)
+
+
+def _write(effect: EffectDefinition) -> None:
+    click.echo(f"{effect.name:<24} {effect.formula}")
+    for parameter in effect.parameters:
+        click.echo(f"{'':<26} {_parameter(parameter)}")
+    click.echo(f"{'':<26} {effect.group}; maps {_maps(effect)}; revealed by {effect.revealed_by}")
+
+
+def _maps(effect: EffectDefinition) -> str:
+    """What maps do with an effect, with the word maps before it."""
+    if effect.group == "reading":
+        return "do not see it"
+    return {"frozen": "hold it at lab_time", "no": "refuse it"}.get(effect.mappable, "have it")
+
+
+def _parameter(parameter: EffectParameter) -> str:
+    low, high = parameter.typical
+    unit = "" if parameter.unit == "1" else parameter.unit
+    power = f"{parameter.power_of_w0:g}"
+    if parameter.power_of_w0_less:
+        power = f"({power}-{parameter.power_of_w0_less})"
+    if power == "0":
+        values = f"{low:g} to {high:g} {unit}".rstrip()
+    else:
+        scale = "w0" if power == "1" else f"w0^{power}"
+        values = f"{low:g} to {high:g}; in SI times {scale}, {unit}"
+    return f"{parameter.name}, {parameter.role}: {parameter.meaning} ({values})"
+
+
+def _example(effect: EffectDefinition) -> dict[str, Any]:
+    """An effect as a table of a model file, its parameters of a usual size."""
+    return {
+        "name": effect.name,
+        "parameters": {p.name: _usual(*p.typical) for p in effect.parameters},
+    }
+
+
+def _usual(low: float, high: float) -> float:
+    """A round value between two."""
+    return float(f"{math.sqrt(low * high) if low > 0 else high / 2:.1g}")

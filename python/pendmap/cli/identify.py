@@ -1,0 +1,122 @@
+"""``pendmap identify``: damping from a record, by every method."""
+
+from __future__ import annotations
+
+import functools
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap.cli.options import Outputs, output_options, rate_option, simd_option
+from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
+from pendmap.errors import instruction_set
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from pendmap.identification import IdentificationReport
+    from pendmap.model import Rig
+
+
+SUFFIX = ".toml"
+
+
+@click.command("identify")
+@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
+@click.option(
+    "--method", "methods", multiple=True, metavar="NAME", help="One of them alone; may be repeated."
+)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    help="Fit this effect of the library too; may be repeated.",
+)
+@rate_option
+@simd_option
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@output_options((SUFFIX,), "Model")
+def command(
+    *,
+    path: Path,
+    methods: tuple[str, ...],
+    effects: tuple[str, ...],
+    rate_hz: float | None,
+    **given: Any,  # noqa: ANN401
+) -> None:
+    """Identify natural frequency, viscous damping and Coulomb friction from free decays.
+
+    EXPERIMENT is a file with times and angles, or a folder with an experiment.toml. The default
+    method fits the whole record by its trajectory; the paper's and its rivals stand beside it. In
+    brackets: standard errors in the last digits. Writes identify.toml, a model for --model of every
+    other command, identify.png and identify.rrd if no output is named. --json alone writes no file.
+    """
+    from pendmap.errors import InputError
+    from pendmap.identification import identified_model, identify_experiment
+    from pendmap.records import files_of, read_experiment
+
+    outputs = Outputs.take(given, "identify", SUFFIX, files_of(path))
+    with progress_bar("read", shown=outputs.shows_progress):
+        experiment = read_experiment(path, rate_hz=rate_hz)
+    with progress_bar("identify", shown=outputs.shows_progress) as progress:
+        report = identify_experiment(
+            experiment, methods=methods or None, effects=effects, progress=progress
+        )
+    try:
+        model = identified_model(report, "pendmap " + shlex.join(sys.argv[1:]))
+    except InputError:
+        _show(report, outputs)
+        raise
+    with progress_bar("write", shown=outputs.shows_progress):
+        written = write_all(_files(outputs, report, model), keep=True)
+    _show(report, outputs, written.name(outputs.out))
+    if not outputs.as_json and not outputs.quiet:
+        written.say()
+    written.check()
+    open_viewer(outputs)
+
+
+def _files(
+    outputs: Outputs, report: IdentificationReport, model: Rig
+) -> Iterator[tuple[Callable[[Path], Path], Path]]:
+    if outputs.out is not None:
+        from pendmap.model import save_model
+
+        yield functools.partial(save_model, model), outputs.out
+    if outputs.plot is not None:
+        from pendmap import figures
+
+        yield functools.partial(figures.draw_identification, report), outputs.plot
+    if outputs.rerun is not None:
+        from pendmap import viewer
+
+        yield functools.partial(viewer.record_identification, report), outputs.rerun
+
+
+def _show(report: IdentificationReport, outputs: Outputs, model: str | None = None) -> None:
+    if outputs.as_json:
+        from pendmap.identification.summary import as_json
+
+        fields = as_json(report) | {"model": model, "simd": instruction_set()}
+        click.echo(json.dumps(plain(fields), allow_nan=False))
+    elif not outputs.quiet:
+        _say(report)
+
+
+def _say(report: IdentificationReport) -> None:
+    from pendmap.identification.summary import as_text, foremost, methods_table, table1_table
+
+    doubts = [f"Warning: {text}" for text in foremost(report)]
+    for line in doubts:
+        click.echo(line)
+    for head, rows in (methods_table(report), table1_table(report)):
+        if rows:
+            write_table(head, rows)
+    for line in as_text(report):
+        if line not in doubts:
+            click.echo(line)

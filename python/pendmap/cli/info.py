@@ -1,0 +1,57 @@
+"""``pendmap info``: what is installed, and what it runs on."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import platform
+
+import click
+
+_LEANS_ON = (
+    "numpy",
+    "scipy",
+    "xarray",
+    "pandas",
+    "netcdf4",
+    "matplotlib",
+    "rerun-sdk",
+    "click",
+    "rich",
+)
+
+
+@click.command("info")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+def command(*, as_json: bool) -> None:
+    """Show the version, the instruction set used, the threads."""
+    from pendmap import _core
+    from pendmap.errors import instruction_set
+
+    simd = instruction_set()
+    versions = {name: _version(name) for name in _LEANS_ON}
+    facts = {
+        "version": _core.__version__,
+        "simd": simd,
+        "simd_available": _core.simd_available(),
+        "threads": _core.default_threads(),
+        "python": platform.python_version(),
+        "versions": versions,
+    }
+    if as_json:
+        click.echo(json.dumps(facts))
+        return
+    click.echo(f"pendmap {facts['version']}")
+    available = ", ".join(_core.simd_available())
+    click.echo(f"instruction set  {simd} (this processor has {available}; --simd asks for one)")
+    click.echo(f"threads          {facts['threads']}")
+    click.echo(f"Python           {facts['python']}")
+    for name, version in versions.items():
+        click.echo(f"{name:<17}{version or 'not installed'}")
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None

@@ -1,0 +1,51 @@
+"""``pendmap look``: what a record holds."""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from pathlib import Path
+
+import click
+
+from pendmap.cli.inputs import keep_inputs
+from pendmap.cli.options import rate_option
+from pendmap.cli.show import Written, plain, progress_bar, write_all
+from pendmap.cli.types import OutputFile
+
+
+@click.command("look")
+@click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
+@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@rate_option
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+def command(
+    *, path: Path, plot: Path | None, rate_hz: float | None, as_json: bool, quiet: bool
+) -> None:
+    """Say what a record holds and what is odd about it, before anything is fitted.
+
+    A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
+    experiment.toml, or each of its files is a free run. Channels, rate, noise without a model,
+    releases and rest, gaps, outliers, missed counts, units: what is certain is mended as it is
+    read, and said. The files stay as they are.
+    """
+    from pendmap.records import files_of, read_experiment
+    from pendmap.records.summary import as_json as fields
+    from pendmap.records.summary import as_text
+
+    keep_inputs(files_of(path), {"--plot": [plot]})
+    with progress_bar("read", shown=sys.stderr.isatty() and not quiet):
+        experiment = read_experiment(path, rate_hz=rate_hz)
+    written = Written()
+    if plot is not None:
+        from pendmap import figures
+
+        written = write_all([(functools.partial(figures.draw_record, experiment), plot)])
+    if as_json:
+        click.echo(json.dumps(plain(fields(experiment)), allow_nan=False))
+    elif not quiet:
+        click.echo(as_text(experiment))
+        written.say()
+    written.check()

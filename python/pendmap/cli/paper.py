@@ -1,0 +1,116 @@
+"""``pendmap paper``: the paper's figures, by number."""
+
+from __future__ import annotations
+
+import functools
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pendmap.cli.options import simd_option
+from pendmap.cli.show import write_all
+from pendmap.cli.types import OutputFile, Whole
+from pendmap.errors import MOST_SEED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from pendmap.identification import IdentificationReport
+
+
+_PICTURES = (".png", ".svg", ".pdf")
+
+
+@click.command("paper")
+@click.argument("figure", metavar="FIGURE", nargs=-1, required=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=None,
+    metavar="DIR",
+    help="Folder for the files, made if it is not there.  [default: the current one]",
+)
+@click.option(
+    "--plot",
+    type=OutputFile(_PICTURES),
+    help="File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
+)
+@click.option(
+    "--seed", type=Whole(0, MOST_SEED), default=0, help="Of the rig's noise.  [default: 0]"
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@simd_option
+@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+def command(  # noqa: PLR0913 (an option each)
+    *,
+    figure: tuple[str, ...],
+    out: Path | None,
+    plot: Path | None,
+    seed: int,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Draw a figure of Horton, Wiercigroch & Xu (2008): 1 to 9, table1, or all of these.
+
+    1 shows critical curves and the strange attractors, 2 tumbling chaos at these points, 3 the
+    pendulum, its symbols and its equation. The others are made on a virtual rig like the paper's:
+    4 a decay with its half cycles, 5 the decrements, 6 the decay by each model, 7 and table1 the
+    errors of each, 8 steady states after 2500 s (it takes some minutes), 9 transient tumbling.
+    Writes figure_1.png to figure_9.png and table_1.csv, those that are asked for.
+    """
+    from pendmap.paper import figures
+
+    keys = figures.wanted(" ".join(figure))
+    if plot is not None and out is not None:
+        raise click.UsageError("one of --plot and --out must be left out, got both")
+    if plot is not None and len(keys) > 1:
+        raise click.UsageError("--plot must have one figure, it is one file; --out takes a folder")
+    if out is not None:
+        out.mkdir(exist_ok=True)  # the folder above is there, as for every other file
+    folder = out or Path()
+    for key in keys if plot is None else ():  # before anything is computed
+        OutputFile((".png", ".csv")).convert(folder / _name(key), None, None)
+    written = write_all(_files(keys, folder, plot, seed))
+    if as_json:
+        click.echo(json.dumps({"files": written}))
+    elif not quiet:
+        if any(Path(name).suffix == ".csv" for name in written):
+            _say(figures.report(seed))
+        written.say()
+    written.check()
+
+
+def _files(
+    keys: Sequence[str], out: Path, plot: Path | None, seed: int
+) -> Iterator[tuple[Callable[[Path], Path], Path]]:
+    from pendmap.paper import figures
+
+    for key in keys:
+        path = plot or out / _name(key)
+        if path.suffix != ".csv":
+            yield functools.partial(figures.draw, key, seed=seed), path
+        if key == figures.TABLE:
+            yield functools.partial(_write_table, seed), path.with_suffix(".csv")
+
+
+def _write_table(seed: int, path: Path) -> Path:
+    from pendmap.paper import figures
+
+    return figures.write_table(figures.report(seed), path)
+
+
+def _say(found: IdentificationReport) -> None:
+    """Print what each method finds, what its simulation misses, and the paper's table."""
+    from pendmap.cli.show import write_table
+    from pendmap.identification.summary import methods_table, table1_table
+    from pendmap.paper import figures
+
+    for head, rows in (methods_table(found), table1_table(found), figures.printed_table()):
+        write_table(head, rows)
+
+
+def _name(key: str) -> str:
+    """Return a figure's file, or that of the table."""
+    return "table_1.csv" if key.startswith("table") else f"figure_{key}.png"

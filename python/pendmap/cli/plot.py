@@ -1,0 +1,83 @@
+"""``pendmap plot``: a result drawn again."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import click
+
+from pendmap.cli.show import write_all
+from pendmap.cli.types import OutputFile
+from pendmap.errors import InputError
+
+
+@click.command("plot")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    "--plot",
+    "out",
+    type=OutputFile([".png", ".svg", ".pdf"]),
+    help="Figure to write: .png .svg .pdf.  [default: FILE with .png]",
+)
+@click.option(
+    "--layer",
+    help="One part alone: labels, settle, turns, exponent of basins, over draws probability and"
+    " entropy; kinds, exponent, attractors, period, winding, undecided, 'share KIND', over draws"
+    " certainty of a map; history, energy, phase, section of a trajectory; theta, velocity of a"
+    " bifurcation diagram; omega-p, e-alpha2 of critical curves.",
+)
+@click.option("--size", help="Width x height in inches, like 8x4.")
+@click.option("--dpi", type=click.IntRange(20, 1200), help="Pixels an inch of a .png.")
+@click.option("--colormap", help="Colours of the fields, by matplotlib's names.")
+@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+def command(  # noqa: PLR0913 (the options above)
+    *,
+    file: Path,
+    out: Path | None,
+    layer: str | None,
+    size: str | None,
+    dpi: int | None,
+    colormap: str | None,
+    quiet: bool,
+) -> None:
+    """Draw a result again, in another size, colours or layer, without computing."""
+    inches = _size(size)
+    if not file.name:
+        raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
+    target = out or OutputFile([".png"]).convert(file.with_suffix(".png"), None, None)
+
+    from pendmap import figures
+    from pendmap.files.dataset import load
+
+    draw = functools.partial(
+        figures.draw, load(file), layer=layer, size=inches, dpi=dpi, colormap=colormap
+    )
+    try:
+        written = write_all([(draw, target)])
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    except MemoryError:
+        raise
+    except Exception as error:
+        # Nobody but the file says what is drawn: numbers that no result has end anywhere.
+        raise InputError(
+            f"{file}: cannot be drawn: its content is not a result's: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+    if written and not quiet:
+        written.say()
+    written.check()
+
+
+def _size(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        width, height = (float(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise click.UsageError(f"--size must be WIDTHxHEIGHT in inches, got {text!r}") from None
+    if not (1 <= width <= 100 and 1 <= height <= 100):  # noqa: PLR2004
+        raise click.UsageError(f"--size must be 1 to 100 inches, got {text!r}")
+    return width, height

@@ -1,0 +1,162 @@
+"""``pendmap rig``: experiments from the virtual rig."""
+
+from __future__ import annotations
+
+import functools
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap.cli.show import write_all
+from pendmap.cli.types import NUMBER, OutputFile
+from pendmap.formatting import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from pendmap import virtual_rig
+
+
+@click.command("rig")
+@click.argument("name", required=False, metavar="[free_decay|forced|hidden]")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder to write.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Draws all.  [default: 0]")
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    help="Effect to hide, more than once for several: a name of --list, also with its parameters"
+    " (magnet:dipole,amplitude=0.1,d=0.2), any (the seed chooses) or none.  [default: hidden: any]",
+)
+@click.option("--size", type=NUMBER, default=1.0, help="Scales drawn effects.  [default: 1]")
+@click.option("--noise", type=NUMBER, help="Degrees.  [default: 0.1; hidden: 0.05 to 0.5]")
+@click.option("--correlation", type=NUMBER, default=0.0, help="AR(1) of the noise.  [default: 0]")
+@click.option("--counts", type=int, default=4096, help="A turn; 0: no steps.  [default: 4096]")
+@click.option("--rate", type=NUMBER, default=100.0, help="Samples a second, Hz.  [default: 100]")
+@click.option("--jitter", type=NUMBER, default=0.0, help="Of the clock, s rms.  [default: 0]")
+@click.option("--dropouts", type=NUMBER, default=0.0, help="Share of samples lost.  [default: 0]")
+@click.option("--outliers", type=NUMBER, default=0.0, help="Share that is false.  [default: 0]")
+@click.option(
+    "--mess",
+    type=NUMBER,
+    default=0.0,
+    help="Weak disturbances beside the effects (texture of the bearing, drifting zero, slow noise),"
+    " in multiples of the noise.  [default: 0]",
+)
+@click.option("--free", type=int, help="Free decays.  [default: 1; forced: 0; hidden: 5]")
+@click.option("--forced", type=int, help="Runs under drive.  [default: 0; forced and hidden: 4]")
+@click.option(
+    "--duration",
+    type=NUMBER,
+    help="Of each run, s.  [default: until rest; forced: 30 to 40; hidden: 15 to 30]",
+)
+@click.option("--w0", type=NUMBER, help="Natural frequency, rad/s.  [default: 6.0 to 6.4]")
+@click.option(
+    "--c-over-m", type=NUMBER, help="Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]"
+)
+@click.option(
+    "--tr", "friction", type=NUMBER, help="Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]"
+)
+@click.option(
+    "--plot",
+    type=OutputFile([".png", ".svg", ".pdf"]),
+    help="Figure of the records: .png .svg .pdf.",
+)
+@click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
+@click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+def command(  # noqa: PLR0913 (an option each)
+    *,
+    name: str | None,
+    out: Path | None,
+    plot: Path | None,
+    replace: bool,
+    listing: bool,
+    as_json: bool,
+    quiet: bool,
+    **given: Any,  # noqa: ANN401 (the other options above)
+) -> None:
+    """Write an experiment of a virtual rig: records, and the truth in a file beside them.
+
+    free_decay is one release near pi; forced are runs under drive; hidden has runs of both kinds
+    and an effect in them that the paper's equation lacks. What is hidden stands in
+    DIR.truth.toml alone. The same seed gives the same experiment.
+    """
+    from pendmap import virtual_rig
+
+    if listing:
+        _list(virtual_rig.describe(), as_json=as_json)
+        return
+    if name is None or out is None:
+        missing = "NAME (free_decay, forced or hidden)" if name is None else "--out DIR"
+        raise click.UsageError(f"{missing} is missing")
+    request = virtual_rig.Request(name, **given)
+    where = virtual_rig.places(out, replace=replace)
+    experiment = virtual_rig.make(request)
+    written = write_all(_files(experiment, where, plot))
+    whole = _names(where) in written
+    if as_json:
+        places = {"experiment": where.experiment, "truth": where.truth} if whole else {}
+        places |= {"plot": plot} if plot is not None and str(plot) in written else {}
+        click.echo(json.dumps({name: str(path) for name, path in places.items()}))
+    elif not quiet:
+        if whole:
+            seconds = sum(run.plan.duration for run in experiment.runs)
+            runs = counted(len(experiment.runs), "run")
+            click.echo(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
+            click.echo(f"The truth: {where.truth}")
+        if plot is not None and str(plot) in written:
+            click.echo(f"The records: {plot}")
+    written.check()
+
+
+def _files(
+    experiment: virtual_rig.Experiment, where: virtual_rig.Places, plot: Path | None
+) -> Iterator[tuple[Callable[[Path], Path | str], Path]]:
+    from pendmap import virtual_rig
+
+    def both(_: Path) -> str:
+        virtual_rig.write(experiment, where)
+        return _names(where)
+
+    yield both, where.experiment
+    if plot is not None:
+        yield functools.partial(_draw, experiment, where.experiment.name), plot
+
+
+def _names(where: virtual_rig.Places) -> str:
+    return f"{where.experiment}, {where.truth}"
+
+
+def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
+    """Draw the records, with what the folder says about them and nothing that it hides."""
+    from pendmap import figures, virtual_rig
+
+    held = virtual_rig.held_out(experiment)
+    records = []
+    for k, run in enumerate(experiment.runs):
+        plan = run.plan
+        words = [f"run_{k:02d}: {plan.kind}"]
+        if plan.kind == "forced":
+            omega = "\N{GREEK CAPITAL LETTER OMEGA}"
+            words += [f"p = {plan.p:g}", f"{omega} = {plan.frequency:g} rad/s"]
+        words += ["held out"] if k in held else []
+        records.append(figures.RunPanel(", ".join(words), run.time, run.angle))
+    sensor = experiment.sensor
+    counts = f", {sensor.counts} counts a turn" if sensor.counts else ""
+    subtitle = f"virtual rig, {counted(len(records), 'run')}; {sensor.rate:g} Hz{counts}"
+    title = f"Measured angle: {name}"
+    return figures.draw_runs(records, path, title=title, subtitle=subtitle)
+
+
+def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps({"effects": effects}))
+        return
+    for effect in effects:
+        click.echo(f"{effect['name']:<26} {effect['formula']}")
+        click.echo(f"{'':<26} {effect['parameters']}")

@@ -1,0 +1,328 @@
+"""A model beside a forced run: what its wandering is like, and the steady state it reaches."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.comparison import steady
+from pendmap.comparison.ensemble import Simulated, Start, start_of
+from pendmap.comparison.itinerary import Itineraries, Ruler
+from pendmap.errors import MOST_SEED, InputError, check_number, check_whole
+from pendmap.formatting import counted
+from pendmap.identification.fit import fit_runs
+from pendmap.identification.methods.joint import as_angles, as_fit_run, reading_of_run
+from pendmap.signal.robust import intervals_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.methods.base import Estimate
+    from pendmap.identification.readings import Reading
+    from pendmap.identification.runs import FitRun
+    from pendmap.model import Rig
+    from pendmap.records import Run
+
+    Floats = NDArray[np.float64]
+
+
+_AT_ONCE: Final = 4_000_000
+"""Samples that are held at once."""
+_FOLLOWED: Final = 100
+"""Members that are followed on to where they settle."""
+_FEWEST: Final = 32
+"""Samples without which neither the noise nor a start is known."""
+_UNLIKELY: Final = 0.01
+"""Chance below which a statistic is said to be unlike the model: of the five of a run that a true
+model gives, one is in at most one run of twenty."""
+_EVEN: Final = (2.5, 97.5)
+"""Percent: the ends of the middle 95 %."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Ensemble:
+    """How the starts of a model are chosen.
+
+    Parameters
+    ----------
+    members : int
+        How many; 20 to 100,000.
+    spread : float
+        Standard deviation about the measured start, in rad and over the natural frequency; beside
+        the start's own standard error.
+    seed : int
+        Draws starts and noise.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range.
+    """
+
+    members: int = 400
+    spread: float = 0.01
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_whole("members", self.members, 20, 100_000)
+        if not 0 <= check_number("spread", self.spread) <= 1:
+            raise InputError(f"spread must be a number from 0 to 1 rad, got {self.spread:g}")
+        check_whole("seed", self.seed, 0, MOST_SEED)
+
+
+@dataclasses.dataclass(frozen=True)
+class Statistic:
+    """A number of the record beside those of the ensemble.
+
+    Attributes
+    ----------
+    name, unit : str
+        What it is.
+    measured : float
+        Of the record; infinite for a time that has not come when it ends.
+    ensemble : ndarray, shape (M,)
+        Of each member.
+    """
+
+    name: str
+    unit: str
+    measured: float
+    ensemble: Floats
+
+    @property
+    def median(self) -> float:
+        """Of the ensemble."""
+        return float(np.quantile(self.ensemble, 0.5, method="inverted_cdf"))
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """The middle 95 % of the ensemble."""
+        low, high = np.percentile(self.ensemble, _EVEN, method="inverted_cdf")
+        return float(low), float(high)
+
+    @property
+    def chance(self) -> float:
+        """Chance that the model gives a value as far out, on either side."""
+        below = 1 + int((self.ensemble <= self.measured).sum())
+        above = 1 + int((self.ensemble >= self.measured).sum())
+        return min(1.0, 2 * min(below, above) / (self.ensemble.size + 1))
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ForcedComparison:
+    """A model beside one forced run.
+
+    Parameters
+    ----------
+    run : Run
+        The record.
+    sigma : float
+        Its noise, rad.
+    rms : float
+        Of record less model in windows of up to three swings, each from the state that brings the
+        model nearest, rad.
+    windows : int
+        How many these are.
+    start : Start
+        Where the run begins.
+    phase : Estimate or None
+        Phase of a drive that was not known, rad, as it was found.
+    time, measured : ndarray, shape (N,)
+        The record at equal times, s and rad.
+    velocity : ndarray, shape (N,)
+        Its velocity, rad/s.
+    example : (ndarray, ndarray), shape (N,)
+        Reading and velocity of the member whose statistics are nearest to the ensemble's medians.
+    lost : int
+        Members whose motion left the range of numbers.
+    statistics : tuple of Statistic
+        Wells visited, escapes, angle covered, time to settle, greatest velocity.
+    steady : Steady or None
+        The steady state, where the record reaches one under a periodic drive.
+    ensemble : Ensemble
+        How members were chosen.
+    """
+
+    run: Run
+    sigma: float
+    rms: float
+    windows: int
+    start: Start
+    phase: Estimate | None
+    time: Floats
+    measured: Floats
+    velocity: Floats
+    example: tuple[Floats, Floats]
+    lost: int
+    statistics: tuple[Statistic, ...]
+    steady: steady.Steady | None
+    ensemble: Ensemble
+
+    def __repr__(self) -> str:
+        held = ", held out" if self.run.hold_out else ""
+        ends = "no steady state" if self.steady is None else self.steady.measured.kind
+        return (
+            f"<ForcedComparison {self.run.name}{held}: rms {self.rms:.3g} rad in "
+            f"{self.windows} windows, noise {self.sigma:.3g} rad; {ends}>"
+        )
+
+    @property
+    def unlike(self) -> tuple[Statistic, ...]:
+        """The statistics that the model gives with a chance of less than 1 %."""
+        return tuple(one for one in self.statistics if one.chance < _UNLIKELY)
+
+
+def compare_forced(
+    model: Rig,
+    run: Run,
+    ensemble: Ensemble,
+    *,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> ForcedComparison:
+    """Compare a model with a forced run; only an unknown phase of the drive is adapted.
+
+    Where the motion is chaotic, two paths part however good the model is: what is compared is what
+    they do, over a neighbourhood of the measured start. Members are read with the noise of the
+    record and measured like it. Where the record ends on a steady state, so do they, and the two
+    cycles are compared at the same phase of the drive.
+
+    Parameters
+    ----------
+    model : Rig
+        In SI.
+    run : Run
+        Under a drive, or with its pivot's motion recorded.
+    ensemble : Ensemble
+        How many members, and how far apart.
+    threads : int, optional
+        Number of threads; by default one a processor.
+    progress : callable, optional
+        Called now and then with the members done and in all.
+
+    Raises
+    ------
+    InputError
+        If the record cannot be followed.
+    """
+    worth = reading_of_run(run)
+    fit: TrajectoryFit = fit_runs([as_fit_run(run, worth)], model, free=(), profiled=())
+    given = as_fit_run(run, worth)
+    found_phase = [each for name, each in fit.estimates.items() if name.startswith("phi")]
+    if given.drive is not None and found_phase:
+        given = dataclasses.replace(given, drive={**given.drive, "phi": found_phase[0].value})
+    start = start_of(fit, given)
+    time, measured = _evenly(run, worth, given, start.time)
+    period = None if given.drive is None else math.tau / float(given.drive["Omega"] or math.nan)
+    ruler = Ruler(time[1] - time[0], math.tau / model.w0, period, worth.sigma)
+    own = Itineraries.of(measured[None], ruler)
+    theta, velocity = start.drawn(ensemble.members, ensemble.spread, model.w0, ensemble.seed)
+    simulated = Simulated(given, model, threads)
+    made, kept = _members(simulated, (theta, velocity), time, ruler, progress)
+    theta, velocity = theta[kept], velocity[kept]
+    example = _example(made)
+    reading = simulated.readings(theta[example], velocity[example], time)[0]
+    found = None
+    if period is not None and own.n[0]:
+        closes, since = (int(own.n[0]), int(own.w[0])), time[0] + float(own.settled[0])
+        cycle = steady.folded(time, measured, period, closes, since)
+        starts = start.time, theta[:_FOLLOWED], velocity[:_FOLLOWED]
+        ends = steady.reached(simulated, starts, period)
+        found = steady.compared(cycle, ends)
+    return ForcedComparison(
+        run=run,
+        sigma=worth.sigma,
+        rms=fit.rms,
+        windows=len(fit.windows),
+        start=start,
+        phase=found_phase[0] if found_phase else None,
+        time=time,
+        measured=measured,
+        velocity=ruler.velocity(measured),
+        example=(reading, ruler.velocity(reading)),
+        lost=ensemble.members - theta.size,
+        statistics=_statistics(own, made),
+        steady=found,
+        ensemble=ensemble,
+    )
+
+
+def too_short(model: Rig, run: Run) -> str:
+    """Return how a record is too short to be compared; empty where it is not."""
+    samples = int(run.trusted.sum())
+    seconds = float(np.ptp(run.time[run.trusted]))
+    swing = math.tau / model.w0
+    if samples >= _FEWEST and seconds >= swing:
+        return ""
+    return (
+        f"it is too short: {counted(samples, 'sample')} over {seconds:.3g} s; {_FEWEST} over "
+        f"{swing:.3g} s, one swing, are needed"
+    )
+
+
+def _evenly(run: Run, worth: Reading, given: FitRun, begin: float) -> tuple[Floats, Floats]:
+    """Return times from the start on, one sample apart, and the record's angle at these."""
+    tick = intervals_of(run.time).tick
+    time = np.arange(begin, given.time[-1] + 0.5 * tick, tick)
+    resting = [s for s in run.segments if s.what == "rest"]
+    known = run.trusted.copy()
+    for rest in resting:
+        known |= (run.time >= rest.from_s) & (run.time <= rest.to_s)
+    angle = run.theta if run.rod_sensor is not None else as_angles(run) - worth.shift
+    return time, np.interp(time, given.time[known], angle[known])
+
+
+def _members(
+    model: Simulated,
+    starts: tuple[Floats, Floats],
+    time: Floats,
+    ruler: Ruler,
+    progress: Callable[[int, int], object] | None,
+) -> tuple[Itineraries, NDArray[np.bool_]]:
+    """Return what the members do, and which have stayed in the range of numbers."""
+    draw = np.random.default_rng(0)  # of noise, in which nothing is sensitive
+    count, many = starts[0].size, max(1, _AT_ONCE // time.size)
+    parts, kept = [], np.zeros(count, dtype=bool)
+    for first in range(0, count, many):
+        own = slice(first, first + many)
+        reading = model.readings(starts[0][own], starts[1][own], time)
+        kept[own] = np.isfinite(reading).all(axis=1)
+        noise = draw.normal(0.0, ruler.sigma, reading.shape)
+        parts.append(Itineraries.of((reading + noise)[kept[own]], ruler))
+        if progress is not None:
+            progress(min(first + many, count), count)
+    if not kept.any():
+        raise InputError(
+            f"{model.run.name}: the model leaves the range of numbers from every start"
+        )
+    return Itineraries.joined(parts), kept
+
+
+def _statistics(own: Itineraries, made: Itineraries) -> tuple[Statistic, ...]:
+    rows = (
+        ("wells visited", "", "wells"),
+        ("escapes from a well", "", "escapes"),
+        ("angle covered", "rad", "covered"),
+        ("time to settle", "s", "settled"),
+        ("greatest velocity", "rad/s", "fastest"),
+    )
+    return tuple(
+        Statistic(name, unit, float(getattr(own, key)[0]), getattr(made, key).astype(float))
+        for name, unit, key in rows
+    )
+
+
+def _example(made: Itineraries) -> slice:
+    """Return the place of the member whose ranks are nearest to the middle of all statistics."""
+    ranks = []
+    for one in (made.wells, made.escapes, made.covered, made.settled, made.fastest):
+        order = np.argsort(np.argsort(one, kind="stable"), kind="stable")
+        ranks.append(order / max(order.size - 1, 1) - 0.5)
+    place = int(np.argmin(np.abs(ranks).max(axis=0)))
+    return slice(place, place + 1)

@@ -1,0 +1,178 @@
+"""What a pendulum does among its wells: one ruler for a measured path and for simulated ones.
+
+A well is the range of angles around one hanging position, from one top to the next. Paths of chaos
+are not laid over one another: what is compared is how many wells they visit, how often they escape
+from one to another, how far they go, how fast, and when they settle.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Whole = NDArray[np.int64]
+
+
+LONGEST: Final = 8
+"""The longest cycle that is looked for, in forcing periods."""
+
+_MARGIN: Final = 0.1
+"""A path is in a well once it is this far below the tops beside it, rad: noise at the top is no
+escape."""
+_REPEATED: Final = 0.05
+"""Readings that come back this near, rad, repeat themselves; with six times the noise if that is
+more."""
+_NOISES: Final = 6.0
+_HELD: Final = 5
+"""Periods for which a motion must repeat itself to have settled."""
+_SWING: Final = 0.06
+"""Half a window of the local polynomials that give velocities, over a small swing."""
+_DEGREE: Final = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Ruler:
+    """How paths are measured.
+
+    Parameters
+    ----------
+    tick : float
+        Between two samples, s.
+    swing : float
+        Period of small swings, s.
+    period : float or None
+        Of the drive, s; None where nothing drives periodically, and only rest is settled.
+    sigma : float
+        Noise of the readings, rad.
+    """
+
+    tick: float
+    swing: float
+    period: float | None
+    sigma: float
+
+    @property
+    def near(self) -> float:
+        """How near a reading comes back that repeats itself, rad."""
+        return max(_REPEATED, _NOISES * math.sqrt(2) * self.sigma)
+
+    def velocity(self, reading: Floats) -> Floats:
+        """Slopes of local cubics, rad/s, shape (..., N) as the readings."""
+        from scipy.signal import savgol_filter  # noqa: PLC0415 (scipy takes a while)
+
+        half = max(round(_SWING * self.swing / self.tick), 2)
+        width = min(2 * half + 1, (reading.shape[-1] - 1) // 2 * 2 + 1)
+        if width <= _DEGREE:
+            return np.gradient(reading, self.tick, axis=-1)
+        return np.asarray(savgol_filter(reading, width, _DEGREE, deriv=1, delta=self.tick, axis=-1))
+
+
+@dataclasses.dataclass(frozen=True)
+class Itineraries:
+    """What each of M paths does.
+
+    Attributes
+    ----------
+    wells, escapes : ndarray of int, shape (M,)
+        How many different wells it visits, and how often it passes into another.
+    covered : ndarray, shape (M,)
+        Greatest less least angle, rad.
+    fastest : ndarray, shape (M,)
+        Greatest speed, rad/s.
+    settled : ndarray, shape (M,)
+        Seconds after which it repeats itself until its end; infinite where it does not.
+    n, w : ndarray of int, shape (M,)
+        Forcing periods after which it does so then, and net turns over them; 0 where it does not.
+    """
+
+    wells: Whole
+    escapes: Whole
+    covered: Floats
+    fastest: Floats
+    settled: Floats
+    n: Whole
+    w: Whole
+
+    @classmethod
+    def of(cls, reading: Floats, ruler: Ruler) -> Itineraries:
+        """Measure paths, readings in rad, not wrapped, shape (M, N)."""
+        well = wells(reading)
+        n, w, settled = repeats(reading, ruler)
+        passed = np.abs(np.diff(well, axis=-1)).sum(axis=-1)
+        return cls(
+            wells=np.array([np.unique(row).size for row in well], dtype=np.int64),
+            escapes=passed.astype(np.int64),
+            covered=np.ptp(reading, axis=-1),
+            fastest=np.abs(ruler.velocity(reading)).max(axis=-1),
+            settled=settled,
+            n=n,
+            w=w,
+        )
+
+    @classmethod
+    def joined(cls, parts: list[Itineraries]) -> Itineraries:
+        """Return all paths of several measurements as one."""
+        names = [field.name for field in dataclasses.fields(cls)]
+        return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+
+
+def wells(reading: Floats) -> Whole:
+    """Return the number of the well at each sample, 0 that of ``theta = 0``, shape (M, N).
+
+    Within 0.1 rad of a top, or beyond, it is still the one before.
+    """
+    nearest = np.round(reading / math.tau).astype(np.int64)
+    inside = np.abs(reading - math.tau * nearest) < math.pi - _MARGIN
+    inside[..., 0] = True
+    place = np.where(inside, np.arange(reading.shape[-1]), 0)
+    last = np.maximum.accumulate(place, axis=-1)
+    return np.asarray(np.take_along_axis(nearest, last, axis=-1))
+
+
+def repeats(reading: Floats, ruler: Ruler) -> tuple[Whole, Whole, Floats]:
+    """Return ``n``, ``w`` and since when ``theta(t + n T) = theta(t) + 2 pi w``, shapes (M,).
+
+    The least ``n`` with which that holds for five periods at the end; 0 and infinity where none
+    does. Without a period: ``n = 1``, ``w = 0`` since when a path stays where it ends.
+    """
+    count, size = reading.shape
+    n, w = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    settled = np.full(count, math.inf)
+    if ruler.period is None:
+        away = np.abs(reading - reading[:, -1:]) > ruler.near
+        since = _last(away) + 1
+        held = (size - since) * ruler.tick >= ruler.swing
+        n[held], settled[held] = 1, since[held] * ruler.tick
+        return n, w, settled
+    for cycle in range(1, LONGEST + 1):
+        shift = cycle * ruler.period / ruler.tick
+        whole, part = int(shift), shift - int(shift)
+        kept = size - whole - 1
+        least = math.ceil(_HELD * ruler.period / ruler.tick)
+        free = n == 0
+        if kept < least or not free.any():
+            break
+        own = reading[free]
+        later = (1 - part) * own[:, whole : whole + kept] + part * own[:, whole + 1 :][:, :kept]
+        apart = later - own[:, :kept]
+        turns = np.round(apart[:, -least:].mean(axis=-1) / math.tau)
+        since = _last(np.abs(apart - math.tau * turns[:, None]) > ruler.near) + 1
+        held = kept - since >= least
+        which = np.flatnonzero(free)[held]
+        n[which], w[which] = cycle, turns[held].astype(np.int64)
+        settled[which] = since[held] * ruler.tick
+    return n, w, settled
+
+
+def _last(true: NDArray[np.bool_]) -> Whole:
+    """Return the last place that is true in each row, -1 where none is."""
+    size = true.shape[-1]
+    found = size - 1 - np.argmax(true[:, ::-1], axis=-1)
+    return np.where(true.any(axis=-1), found, -1).astype(np.int64)

@@ -1,0 +1,269 @@
+"""Steady states: the cycle that a record ends on beside those that a model reaches."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.analysis.regimes import kind_of
+from pendmap.comparison.itinerary import LONGEST
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.comparison.ensemble import Simulated
+
+    Floats = NDArray[np.float64]
+
+
+SAMPLES: Final = 64
+"""Samples of a cycle a forcing period."""
+_HARMONICS: Final = 12
+"""Harmonics of the drive that a cycle has: beyond there is noise."""
+_CYCLES: Final = 50
+"""Cycles at the end of a record that are averaged, at most."""
+_STEADY: Final = 0.01
+"""Cycles are averaged from where their later half differs from the earlier one by less, rad rms."""
+_AT_REST: Final = 0.05
+"""A cycle of a lesser amplitude, rad, is rest."""
+_DECAY: Final = 10.0
+"""A model is followed on until viscous damping alone has shrunk what is left by this power of e, in
+periods between ..."""
+_FOLLOWED: Final = (100, 2000)
+_CLOSED: Final = 1e-3
+"""Then it is on a cycle if it comes back this near, rad."""
+_ONE: Final = 0.02
+"""Cycles nearer than this, rad, are one."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Cycle:
+    """A closed motion.
+
+    Attributes
+    ----------
+    n, w : int
+        Forcing periods, and net turns over them.
+    time : ndarray, shape (S,)
+        From where the drive's time is a whole number of periods, s.
+    theta, velocity : ndarray, shape (S,)
+        Reading of the angle, rad, not wrapped, and its derivative, rad/s.
+    """
+
+    n: int
+    w: int
+    time: Floats
+    theta: Floats
+    velocity: Floats
+
+    @classmethod
+    def of(cls, n: int, w: int, period: float, theta: Floats) -> Cycle:
+        """Return the cycle through readings at equal times, by Fourier's series."""
+        time = np.arange(theta.size) * n * period / theta.size
+        turning = math.tau * w / (n * period)
+        waves = np.fft.rfft(theta - turning * time)
+        waves[n * _HARMONICS + 1 :] = 0
+        rate = math.tau * np.fft.rfftfreq(theta.size, n * period / theta.size)
+        smooth = turning * time + np.fft.irfft(waves, theta.size)
+        velocity = turning + np.fft.irfft(1j * rate * waves, theta.size)
+        return cls(n, w, time, smooth, velocity)
+
+    @property
+    def swing(self) -> Floats:
+        """The angle less its steady turning, rad."""
+        return np.asarray(
+            self.theta - math.tau * self.w * np.arange(self.theta.size) / self.theta.size
+        )
+
+    @property
+    def amplitude(self) -> float:
+        """Half of the range of :attr:`swing`, rad."""
+        return 0.5 * float(np.ptp(self.swing))
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it hardly moves."""
+        return self.w == 0 and self.amplitude < _AT_REST
+
+    @property
+    def kind(self) -> str:
+        """``rest``, ``oscillation period 2``, ``rotation 1:1``, ..."""
+        if self.w:
+            return kind_of("rotation", self.n, self.w)
+        if self.at_rest:
+            upside_down = math.cos(float(self.theta.mean())) < 0
+            return kind_of("inverted_rest" if upside_down else "rest", 1, 0)
+        return kind_of("oscillation", self.n, 0)
+
+    def moved(self, periods: int) -> Cycle:
+        """Return the same motion from some whole periods later on."""
+        at = periods * SAMPLES
+        turned = math.tau * self.w
+        theta = np.concatenate([self.theta[at:], self.theta[:at] + turned])
+        return dataclasses.replace(
+            self, theta=theta, velocity=np.concatenate([self.velocity[at:], self.velocity[:at]])
+        )
+
+    def nearest(self, other: Cycle) -> tuple[float, Cycle]:
+        """Return the rms angle between both, rad, and this one so moved that it is least.
+
+        By whole periods of the drive and whole turns; infinite where ``n`` or ``w`` differ.
+        """
+        if (self.n, self.w) != (other.n, other.w):
+            return math.inf, self
+        best = (math.inf, self)
+        for periods in range(self.n):
+            one = self.moved(periods)
+            turns = round(float(np.mean(other.theta - one.theta)) / math.tau)
+            one = dataclasses.replace(one, theta=one.theta + math.tau * turns)
+            apart = math.sqrt(float(np.mean((one.theta - other.theta) ** 2)))
+            if apart < best[0]:
+                best = apart, one
+        return best
+
+
+@dataclasses.dataclass(frozen=True)
+class Reached:
+    """A cycle that a model ends on.
+
+    Attributes
+    ----------
+    cycle : Cycle
+        The motion.
+    share : float
+        Of the starts that end there.
+    """
+
+    cycle: Cycle
+    share: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Steady:
+    """A record's steady state beside a model's.
+
+    Attributes
+    ----------
+    measured : Cycle
+        The mean of the record's last cycles.
+    cycles : int
+        How many these are.
+    reached : tuple of Reached
+        What the model ends on from the neighbourhood of the start, the most frequent first.
+    model : Cycle or None
+        The one of these that is nearest to the record's, moved onto it; none of the same ``n`` and
+        ``w`` where it ends elsewhere.
+    rms, rms_velocity : float
+        Of the difference, rad and rad/s; no numbers without a ``model``.
+    """
+
+    measured: Cycle
+    cycles: int
+    reached: tuple[Reached, ...]
+    model: Cycle | None
+    rms: float
+    rms_velocity: float
+
+    @property
+    def overestimate(self) -> float:
+        """Amplitude of the model over the measured one, less 1; no number at rest."""
+        if self.model is None or self.measured.at_rest:
+            return math.nan
+        return self.model.amplitude / self.measured.amplitude - 1
+
+
+def folded(
+    time: Floats, reading: Floats, period: float, closes: tuple[int, int], since: float
+) -> tuple[Cycle, int]:
+    """Return the mean of a record's last cycles, and how many these are.
+
+    Parameters
+    ----------
+    time, reading : ndarray, shape (N,)
+        s on the drive's clock, and rad.
+    period : float
+        Of the drive, s.
+    closes : (int, int)
+        ``n`` and ``w`` of the cycle.
+    since : float
+        Time from which it repeats itself, s.
+    """
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 (scipy takes a while)
+
+    n, w = closes
+    length = n * period
+    first = math.ceil(since / period)
+    count = max(1, int((time[-1] - first * period) / length + 1e-9))
+    first += max(0, count - _CYCLES) * n
+    count = min(count, _CYCLES)
+    at = np.arange(n * SAMPLES) * period / SAMPLES
+    turns = math.tau * w * np.arange(count)
+    begins = (first + n * np.arange(count)) * period
+    rows = CubicSpline(time, reading)(begins[:, None] + at) - turns[:, None]
+    while count > 1:  # the last ones where what is left of the way there still shrinks
+        early, late = rows[: count // 2].mean(axis=0), rows[count // 2 :].mean(axis=0)
+        if math.sqrt(float(np.mean((late - early) ** 2))) < _STEADY:
+            break
+        rows = rows[count - count // 2 :]
+        count //= 2
+    return Cycle.of(n, w, period, rows.mean(axis=0)), count
+
+
+def reached(
+    model: Simulated, starts: tuple[float, Floats, Floats], period: float
+) -> tuple[Reached, ...]:
+    """Return the cycles that a model ends on, the most frequent first.
+
+    Parameters
+    ----------
+    model : Simulated
+        The model under the run's drive.
+    starts : (float, ndarray, ndarray)
+        Time on the run's clock, s, and angles and velocities then, rad and rad/s, shapes (M,).
+    period : float
+        Of the drive, s.
+    """
+    begin, theta, velocity = starts
+    rate = 0.5 * model.model.c_over_m * period
+    periods = min(max(_DECAY / rate if rate else math.inf, _FOLLOWED[0]), _FOLLOWED[1])
+    first = math.ceil(begin / period) + math.ceil(periods)
+    times = (first + np.arange(2 * LONGEST * SAMPLES + 1) / SAMPLES) * period
+    readings = model.readings(theta, velocity, np.concatenate([[begin], times]))
+    groups: list[tuple[Cycle, int]] = []
+    for row in readings[:, 1:]:
+        cycle = _closed(row, period)
+        if cycle is None:
+            continue
+        for k, (other, count) in enumerate(groups):
+            if cycle.nearest(other)[0] < _ONE:
+                groups[k] = other, count + 1
+                break
+        else:
+            groups.append((cycle, 1))
+    groups.sort(key=lambda group: -group[1])
+    return tuple(Reached(cycle, count / theta.size) for cycle, count in groups)
+
+
+def _closed(row: Floats, period: float) -> Cycle | None:
+    """Return the shortest cycle on which readings close; None where they do on none."""
+    for n in range(1, LONGEST + 1):
+        size = n * SAMPLES
+        apart = row[size:] - row[:-size]
+        w = round(float(apart.mean()) / math.tau) if np.isfinite(apart).all() else 0
+        if np.abs(apart - math.tau * w).max() < _CLOSED:
+            return Cycle.of(n, w, period, row[:size])
+    return None
+
+
+def compared(measured: tuple[Cycle, int], ends: tuple[Reached, ...]) -> Steady:
+    """Return a record's cycle beside the nearest one of a model."""
+    cycle, cycles = measured
+    found = [one.cycle.nearest(cycle) for one in ends]
+    rms, model = min(found, key=lambda pair: pair[0], default=(math.inf, cycle))
+    if not math.isfinite(rms):
+        return Steady(cycle, cycles, ends, None, math.nan, math.nan)
+    off = math.sqrt(float(np.mean((model.velocity - cycle.velocity) ** 2)))
+    return Steady(cycle, cycles, ends, model, rms, off)

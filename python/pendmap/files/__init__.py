@@ -1,0 +1,26 @@
+"""Files: written whole or not at all, TOML, and results as NetCDF or Zarr (``files.dataset``)."""
+
+from pendmap.files.atomic import (
+    COMPLETE,
+    STOPS,
+    check_regular,
+    check_room,
+    held_interrupts,
+    read_whole,
+    whole_file,
+    whole_folder,
+)
+from pendmap.files.toml import read_toml, toml_text
+
+__all__ = [
+    "COMPLETE",
+    "STOPS",
+    "check_regular",
+    "check_room",
+    "held_interrupts",
+    "read_toml",
+    "read_whole",
+    "toml_text",
+    "whole_file",
+    "whole_folder",
+]

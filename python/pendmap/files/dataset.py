@@ -1,0 +1,193 @@
+"""Results in files: NetCDF, and Zarr where it is installed."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+
+from pendmap.errors import InputError
+from pendmap.files import check_regular, whole_file, whole_folder
+
+FORMAT_VERSION: Final = 1
+"""Version of the layout of the datasets, in their attribute ``format_version``."""
+SUFFIXES: Final = (".nc", ".zarr")
+"""The kinds of file a result is stored in."""
+_MARKS: Final = frozenset(("format_version", "kind"))
+"""Attributes by which a dataset says that it is a result."""
+KINDS: Final = {
+    "basins": ("basins", "basins_of"),
+    "bifurcation": ("bifurcation",),
+    "lifetime": ("lifetime",),
+    "lyapunov": ("lyapunov",),
+    "melnikov": ("melnikov",),
+    "orbits": ("orbit",),
+    "parameter_map": ("parameter_map",),
+    "tongues": ("tongues",),
+    "trajectory": ("simulate",),
+}
+"""The kinds of result, and the functions that return each."""
+_LARGE: Final = 4096
+_ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
+"""Names of the files of a stored result: descriptions and chunks."""
+
+
+def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a result; the file is complete or absent.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result of pendmap.
+    path : str or path
+        Its suffix chooses the format: .nc (NetCDF 4) or .zarr.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If it is not a result of pendmap, the suffix is not known, or .zarr is asked for and zarr is
+        not installed.
+    OSError
+        If the file cannot be written.
+    """
+    target = Path(path)
+    if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
+        made = {name for functions in KINDS.values() for name in functions}
+        raise InputError(
+            f"{target}: what shall be saved is not a result of pendmap: it must be one of the "
+            f"datasets that {', '.join(sorted(made))} return"
+        )
+    if target.suffix.lower() == ".zarr":
+        return _save_zarr(dataset, target)
+    with whole_file(target, SUFFIXES) as part:
+        dataset.to_netcdf(part, engine="netcdf4", encoding=_encoding(dataset))
+    return target
+
+
+def _is_result(dataset: xr.Dataset) -> bool:
+    return set(dataset.attrs) >= _MARKS
+
+
+def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
+    large = (name for name, v in dataset.data_vars.items() if v.size > _LARGE)
+    # Whole rows in chunks of about a megabyte, so that compression works on a part at a time.
+    return {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in large}
+
+
+def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
+    try:
+        import zarr  # noqa: F401, PLC0415 (an extra: only where it is asked for)
+    except ImportError:
+        raise InputError(
+            f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works"
+        ) from None
+    check_replaceable(target)
+    with whole_folder(target) as part:
+        dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
+    return target
+
+
+def check_replaceable(path: str | os.PathLike[str]) -> None:
+    """Refuse to replace what is not a stored result and nothing else.
+
+    A folder is a result if it says so and each file in it has a name that :func:`save` gives.
+
+    Parameters
+    ----------
+    path : str or path
+        Where a result shall be stored as .zarr; it need not exist.
+
+    Raises
+    ------
+    InputError
+        If it is a file, or a folder with anything else in it.
+    OSError
+        If it cannot be read.
+    """
+    target = Path(path)
+    wanted = "must be a new folder, or a result of pendmap, which is replaced"
+    if target.exists() and not target.is_dir():
+        raise InputError(f"{target}: {wanted}; it is a file")
+    if not target.exists() or not any(target.iterdir()):
+        return
+    try:
+        said = json.loads((target / ".zattrs").read_bytes())
+    except (FileNotFoundError, ValueError):
+        said = {}
+    if not isinstance(said, dict) or not said.keys() >= _MARKS or said["kind"] not in [*KINDS]:
+        raise InputError(f"{target}: {wanted}; it is a folder of something else")
+    for entry in target.rglob("*"):
+        if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):
+            raise InputError(f"{target}: {wanted}; it holds {entry.name!r}, no part of a result")
+
+
+def load(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a result back into memory.
+
+    Parameters
+    ----------
+    path : str or path
+        A file that :func:`save` wrote.
+
+    Raises
+    ------
+    InputError
+        If it is not a result of pendmap, or of a later format.
+    OSError
+        If it cannot be read.
+    """
+    source = Path(path)
+    if not source.exists():
+        raise FileNotFoundError(2, "no such file", str(source))
+    if source.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {source.suffix!r}")
+    zarr = source.suffix.lower() == ".zarr"
+    if not (zarr and source.is_dir()):
+        check_regular(source)
+    try:
+        dataset: xr.Dataset = (
+            xr.open_zarr(source, consolidated=True)
+            if zarr
+            else xr.open_dataset(source, engine="netcdf4")
+        )
+        with dataset:
+            _check_result(dataset, source)
+            return dataset.load()
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of the reader
+        raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+
+
+def _check_result(dataset: xr.Dataset, source: Path) -> None:
+    if not _is_result(dataset):
+        raise InputError(f"{source}: is not a result of pendmap")
+    version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
+    if not isinstance(version, int | np.integer) or not 1 <= version <= FORMAT_VERSION:
+        known = f"this pendmap reads format {FORMAT_VERSION}"
+        raise InputError(f"{source}: has format {version}, {known}")
+    if not isinstance(kind, str):
+        raise InputError(f"{source}: has kind {kind}, which is no text")
+    # What is lazily opened has a size, but takes no memory yet.
+    if dataset.nbytes > _memory() / 2:
+        size = f"{dataset.nbytes / 2**20:.0f} MiB"
+        raise InputError(f"{source}: must unpack to half of this memory at most, got {size}")
+
+
+def _memory() -> float:
+    """Bytes of memory of this machine; without bound where it does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return math.inf

@@ -1,0 +1,274 @@
+"""Peaks and crossings of a record with few samples a period, by a pendulum's own swings.
+
+A quartic through a peak needs more samples than such a record has within a quarter swing. What
+joins them here is the equation of motion, with parameters that are found again every few swings.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.special import ellipk
+
+from pendmap.identification.swing_fit import Windows, fit_swings
+from pendmap.identification.turning import End, Outline, median_of_five, outline, stop, zigzags
+from pendmap.records.resolution import levels_shared, step_of
+from pendmap.signal.half_cycles import after_turns
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.identification.swing_fit import SwingFit
+
+    Floats = NDArray[np.float64]
+
+
+COARSE: Final = 20.0
+"""Samples a period of small swings below which nine of them, which a quartic needs for errors that
+can be believed, reach farther than a quartic follows a peak."""
+_FINE: Final = 32
+"""Points a period of the curve through the samples in which turns are looked for."""
+_GAP: Final = 2.5
+"""A pause of this many samples is a gap."""
+_CLEAR: Final = 0.02
+"""Noise over the whole way that is assumed where it is not known yet: only large swings count."""
+_LONGEST: Final = 0.8
+"""Half width of a turn's window at most, in half swings: friction changes its sign at the next."""
+_LEAST: Final = 3.2
+"""Half width of a turn's window, in samples, where that is more than a quarter swing."""
+_BESIDE: Final = 0.95
+"""Half width of a crossing's window in quarter swings."""
+_RESOLVED: Final = 8.0
+"""A peak counts if it stands this many of its standard errors away from the one before."""
+
+
+def is_coarse(time: Floats, theta: Floats) -> bool:
+    """Whether a record swings with fewer than 20 samples a period, that of small swings."""
+    _, swing = _swinging(theta)
+    time, theta = time[swing:], theta[swing:]
+    raw = _natural(time, theta)
+    if raw is None or 2 * math.pi / raw >= COARSE * float(np.median(np.diff(time))):
+        return False
+    # Spikes of single samples are gone from the median; quick swings are gone as well, or slower.
+    calm = _natural(time, median_of_five(theta))
+    return calm is None or calm > 0.6 * raw
+
+
+def _swinging(theta: Floats) -> tuple[float, int]:
+    """Where a record rests, in whole turns, rad, and from which sample it swings about that."""
+    tail = theta[-max(theta.size // 4, 1) :]
+    rest = math.tau * round(float(np.median(tail)) / math.tau) if theta.size else 0.0
+    return rest, after_turns(theta - rest)
+
+
+def _natural(time: Floats, theta: Floats) -> float | None:
+    """The natural frequency by the times of the turns of large swings, rad/s."""
+    if time.size < 8:  # noqa: PLR2004 (two half swings, roughly)
+        return None
+    turns = zigzags(theta, 0.1 * float(np.ptp(theta)) + 1e-12, np.empty(0, np.intp))
+    if turns.size < 3:  # noqa: PLR2004
+        return None
+    size = np.minimum(np.abs(np.diff(theta[turns])) / 2, 3.1)
+    return float(np.median(2 * ellipk(np.sin(size / 2) ** 2) / np.diff(time[turns])))
+
+
+def coarse_finder(time: Floats, theta: Floats, sigma: float | None) -> CoarseFinder:
+    """Return the finder of a record; every method asks for that of the same one."""
+    return _finder(time.tobytes(), theta.tobytes(), sigma)
+
+
+@functools.lru_cache(maxsize=4)
+def _finder(time: bytes, theta: bytes, sigma: float | None) -> CoarseFinder:
+    return CoarseFinder(np.frombuffer(time), np.frombuffer(theta), sigma)
+
+
+class CoarseFinder:
+    """One record, a curve through its samples, and swings fitted to it.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, increasing, and rad from the downward rest.
+    sigma : float, optional
+        Noise of a sample, rad; by default what the fits leave of swings that are clear.
+    """
+
+    def __init__(self, time: Floats, theta: Floats, sigma: float | None) -> None:
+        # What goes over the top before has no turns, and no part in how far swings go.
+        rest, swing = _swinging(theta)
+        self.rotated = swing > 0
+        time, theta = time[swing:], theta[swing:] - rest
+        self.step = float(np.median(np.diff(time)))
+        self.time, self.theta, self.count = time, theta, step_of(theta)
+        self.w0 = _natural(time, theta) or 1.0
+        self.fine = _through(time, theta, max(math.ceil(_FINE * self.step * self.w0 / math.tau), 2))
+        least = self.count / math.sqrt(12)
+        self.sigma = max(sigma or 0.0, least, 1e-15)
+        self.course: Outline | None = None
+        if sigma is None:
+            clear = _CLEAR * float(np.ptp(theta))
+            self._follow(clear)
+            self.sigma = max(clear / 4, least)
+            if self.course is not None and self.course.turns.size > 3:  # noqa: PLR2004
+                self.sigma = max(self._turns(None)[0].sigma, least)
+        self._follow(self.sigma)
+
+    @property
+    def swings(self) -> bool:
+        """Whether the record turns twice or more."""
+        return self.course is not None
+
+    def _follow(self, sigma: float) -> None:
+        """Outline the curve; the mean over its points has no less noise than a sample."""
+        t, x = self.fine
+        points = max(0.2 * math.tau / self.w0 / float(np.median(np.diff(t))), 1.0)
+        self.course = outline(t, x, sigma * math.sqrt(points))
+
+    def _turns(self, sigma: float | None) -> tuple[SwingFit, bool, bool]:
+        """Fit all turns; whether the first is where the record begins, and whether it was held."""
+        course = self.course
+        assert course is not None  # noqa: S101 (callers have asked)
+        t, x = self.fine
+        instants, states = list(t[course.turns]), list(x[course.turns])
+        begins, held = True, False
+        first = int(course.turns[0])
+        extreme = int(np.argmax(np.abs(x[: first // 2 + 1] - x[first])))
+        leaves = float(t[max(course.left - 1, 0)])
+        if self.rotated:
+            begins = False
+        elif leaves - t[0] > 3 * self.step:
+            held = True
+            instants, states = [leaves, *instants], [float(np.median(x[: course.left])), *states]
+        elif t[extreme] - t[0] > 0.75 * self.step:
+            begins = False
+            instants, states = [float(t[extreme]), *instants], [float(x[extreme]), *states]
+        else:
+            instants, states = [float(t[0]), *instants], [float(x[0]), *states]
+        at, size = np.array(instants), np.clip(np.array(states), -3.1, 3.1)
+        zero = float(np.median(x[course.turns][-3:-1] + x[course.turns][-2:])) / 2
+        zero = zero if abs(zero) < 0.5 * float(np.abs(size).max()) else 0.0
+        quarter = ellipk(np.sin((size - zero) / 2) ** 2) / self.w0
+        half = np.minimum(2 * _LONGEST * quarter, np.maximum(quarter, _LEAST * self.step))
+        apart = np.diff(at, prepend=-math.inf, append=math.inf)
+        low = at - np.minimum(half, 0.85 * apart[:-1])
+        high = at + np.minimum(half, 0.85 * apart[1:])
+        low[0] = t[0] if held else low[0]
+        windows = Windows.around(
+            (self.time, self.theta),
+            list(zip(low, high, strict=True)),
+            np.sign(size).tolist(),
+            held=held,
+        )
+        form = np.tile([self.w0**2, 0.01 * self.w0, 0.0, zero], (at.size, 1))
+        return fit_swings(windows, (at, size, form), sigma=sigma), begins, held
+
+    def found(self) -> list[End]:
+        """All peaks, in order of time."""
+        return list(self._found)
+
+    @functools.cached_property
+    def _found(self) -> list[End]:
+        if self.course is None:
+            return []
+        fit, begins, held = self._turns(self.sigma)
+        result: list[End] = []
+        self.fit, rows = fit, []
+        for k, (instant, angle) in enumerate(zip(fit.instant, fit.state, strict=True)):
+            stderr_time, stderr_angle = (
+                float(part[k]) * self._shared(instant) for part in (
+                    fit.stderr_instant, fit.stderr_state,
+                )
+            )  # fmt: skip
+            kind = "turn"
+            if k == 0 and begins:
+                # A first peak that lies before the record was not seen.
+                if not held and instant < self.time[0] - max(3 * stderr_time, 0.05 * self.step):
+                    continue
+                kind = "release"
+            end = End(float(instant), float(angle), stderr_time, stderr_angle, kind)
+            if stderr_time * self.w0 > 1 or not math.isfinite(stderr_angle):
+                continue
+            if result and not _resolved(result[-1], end):
+                continue
+            result.append(end)
+            rows.append(k)
+        self.rows = rows
+        t, x = self.time, self.theta
+        rest = self.course.rest
+        if rest is not None:
+            later = int(np.searchsorted(t, self.fine[0][rest]))
+            course = dataclasses.replace(self.course, rest=min(later, t.size - 1))
+            last = stop(t, x, self.sigma, course, result)
+            result = result if last is None else [*result, last]
+        return result
+
+    def _shared(self, instant: float) -> float:
+        """Errors that samples near a turn share where the count is coarser than the noise."""
+        if self.count <= 2 * self.sigma:
+            return 1.0
+        near = np.abs(self.time - instant) <= max(math.pi / 2 / self.w0, 2 * self.step)
+        return levels_shared(self.theta[near], self.count)
+
+    def crossings(
+        self, ends: list[End], index: NDArray[np.int64]
+    ) -> tuple[Floats, Floats, NDArray[np.int64]]:
+        """Instants at which the angle is zero between two peaks, their errors and half cycles."""
+        spans, at, speed, half, rows = [], [], [], [], []
+        pairs = zip(itertools.pairwise(ends), index[:-1], self.rows, strict=False)
+        for (before, after), k, row in pairs:
+            if after.kind == "stop" or before.angle * after.angle >= 0:
+                continue
+            t, x = self.fine
+            inside = np.flatnonzero((t > before.time) & (t < after.time))
+            passed = inside[x[inside] * before.angle <= 0]
+            if passed.size == 0:
+                continue
+            size = min(abs(before.angle), abs(after.angle), 3.1)
+            reach = _BESIDE * min(
+                float(t[passed[0]]) - before.time, after.time - float(t[passed[0]])
+            )
+            spans.append((float(t[passed[0]]) - reach, float(t[passed[0]]) + reach))
+            at.append(float(t[passed[0]]))
+            w = math.sqrt(self.fit.form[row, 0])
+            speed.append(math.copysign(2 * w * math.sin(size / 2), -before.angle))
+            half.append(k)
+            rows.append(row)
+        if not spans:
+            return np.empty(0), np.empty(0), np.empty(0, np.int64)
+        known = self.fit.rows(rows)
+        windows = Windows.around(
+            (self.time, self.theta), spans, np.sign(speed).tolist(), crossing=True
+        )
+        start = np.array(at), np.array(speed), known.form
+        fit = fit_swings(windows, start, sigma=self.sigma, known=known)
+        good = np.isfinite(fit.stderr_instant) & (fit.stderr_instant * self.w0 < 1)
+        return fit.instant[good], fit.stderr_instant[good], np.array(half, np.int64)[good]
+
+
+def _resolved(before: End, after: End) -> bool:
+    return abs(after.angle - before.angle) > _RESOLVED * math.hypot(
+        before.stderr_angle, after.stderr_angle
+    )
+
+
+def _through(time: Floats, theta: Floats, factor: int) -> tuple[Floats, Floats]:
+    """A curve through the samples, ``factor`` points for each; none across a gap."""
+    steps = np.diff(time)
+    gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
+    parts = []
+    for t, x in zip(np.split(time, gaps), np.split(theta, gaps), strict=True):
+        if t.size < 4:  # noqa: PLR2004 (a cubic)
+            continue
+        places = np.arange(factor * (t.size - 1) + 1) / factor
+        fine = np.interp(places, np.arange(t.size), t)
+        parts.append((fine, CubicSpline(t, x)(fine)))
+    if not parts:
+        return time, theta
+    fine, angle = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return fine, angle

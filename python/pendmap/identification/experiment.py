@@ -1,0 +1,396 @@
+"""Damping from an experiment by every method, with all that tables and figures of it need."""
+
+from __future__ import annotations
+
+import dataclasses
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.errors import FitDiverged, InputError, check_callable, check_type, instruction_set
+from pendmap.formatting import Readable, counted
+from pendmap.identification.fit import refuse_astray
+from pendmap.identification.methods.base import Identification
+from pendmap.identification.methods.joint import JointFit, as_fit_run, fit_together
+from pendmap.identification.methods.registry import check_names, identify, identify_peaks
+from pendmap.identification.methods.trajectory import METHOD as BEST
+from pendmap.identification.methods.trajectory import OFFSET, TooShortError, identification_of
+from pendmap.identification.parameters import SENSOR
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.table1 import Table1, table_of, table_of_run
+from pendmap.model import Rig
+from pendmap.model.effects import definition
+from pendmap.records import Experiment
+from pendmap.records.summary import unit_wrong
+from pendmap.signal.robust import span
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from pendmap.model import Effect
+    from pendmap.records import Run
+
+
+DRAG: Final = "quadratic_drag"
+"""The effect that is tried unasked where viscous damping and friction leave more than the noise."""
+
+MISSES: Final = 1.2
+"""Residual over noise above which the drag is tried."""
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class IdentificationReport(Readable):
+    """What every method says of an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        The records.
+    run : Run
+        The free decay that the methods of peaks read, and that is drawn.
+    peaks : Peaks
+        Its peaks.
+    methods : mapping of str to Identification
+        By method, the best one first.
+    joint : JointFit or None
+        What stands behind the best one; none where it was not asked for or cannot be applied.
+    table : Table1
+        Table 1 and figure 7 of the decay.
+    with_drag : JointFit or None
+        The same with quadratic drag, where the best one leaves more than the noise and no effect
+        was asked for.
+    """
+
+    experiment: Experiment
+    run: Run
+    peaks: Peaks
+    methods: dict[str, Identification]
+    joint: JointFit | None
+    table: Table1
+    with_drag: JointFit | None = None
+
+    def __repr__(self) -> str:
+        sound = (found.short for found in self.methods.values() if found.sound)
+        best = next(sound, "no method gives a model")
+        more = f"; {counted(len(self.methods), 'method')}, {counted(len(self.runs), 'run')}"
+        return f"<IdentificationReport {self.run.name}: {best}{more}>"
+
+    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+        """Return the tables and lines that ``pendmap identify`` prints."""
+        from pendmap.identification import summary  # noqa: PLC0415 (summaries are of reports)
+
+        tables = [summary.methods_table(self), summary.table1_table(self)]
+        return tables, list(summary.as_text(self))
+
+    @property
+    def best(self) -> Identification:
+        """The first method that could be applied and whose search converged.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        for found in self.methods.values():
+            if found.sound:
+                return found
+        lost = [name for name, found in self.methods.items() if not found.converged]
+        if lost:
+            raise InputError(
+                f"{self.run.name}: no model: {lost[0]} did not converge, and no other method can "
+                "be applied"
+            )
+        reasons = "; ".join(self.methods[next(iter(self.methods))].warnings)
+        raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """Every run that a method read."""
+        return (self.run,) if self.joint is None else self.joint.runs
+
+    @property
+    def passed_over(self) -> str:
+        """Which better method the best one stands in for, and why, in words; empty if for none."""
+        first = next(iter(self.methods.values()))
+        if first.sound or not any(found.sound for found in self.methods.values()):
+            return ""
+        why = "cannot be applied" if first.converged else "did not converge"
+        return f"{first.method} {why}: the model is that of {self.best.method}"
+
+    @property
+    def model(self) -> Rig:
+        """The pendulum that the best method found, with its effects."""
+        best = self.best
+        if best.model is not None:
+            return best.model
+        return dataclasses.replace(best.rig, gravity=self.experiment.gravity)
+
+
+def decay_of(experiment: Experiment) -> Run:
+    """Return the free run of an experiment that swings longest and is not held out.
+
+    Raises
+    ------
+    InputError
+        If there is none, or nothing moves.
+    """
+    free = [run for run in experiment.runs if run.kind == "free" and not run.hold_out]
+    if not free:
+        raise InputError(
+            f"{experiment.path}: must have a free decay, no run is free and not held out"
+        )
+    experiment.refuse_still(free)
+    return max((run for run in free if run.moves), key=_length)
+
+
+def _length(run: Run) -> float:
+    return float(np.ptp(run.time[run.trusted]))
+
+
+def identify_experiment(
+    experiment: Experiment,
+    *,
+    methods: Iterable[str] | None = None,
+    start: Rig | None = None,
+    effects: Sequence[Effect | str] = (),
+    progress: Callable[[int, int], object] | None = None,
+) -> IdentificationReport:
+    """Identify damping from an experiment by every method.
+
+    The trajectory method fits all free runs that are not held out together, each with a start of
+    its own; the others read the longest of them.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As of :func:`pendmap.read_experiment`.
+    methods : iterable of str, optional
+        Names of :data:`pendmap.identification.METHODS`; by default all.
+    start : Rig, optional
+        Where the trajectory method begins, with its effects; by default found from the record.
+    effects : sequence of Effect or str
+        Further effects, or their names, that it fits the sizes of.
+    progress : callable, optional
+        Called with the steps done and those to do: one for each method, the peaks and the table.
+
+    Raises
+    ------
+    InputError
+        If a method or an effect is not known, an effect is one of the drive, there is no free
+        decay, or the trajectory that fits best is plainly not one of these records.
+    """
+    check_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    if start is not None:
+        check_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
+    check_callable("progress", progress)
+    names = check_names(methods)
+    for effect in effects:
+        name = effect if isinstance(effect, str) else effect.name
+        if definition(name)["group"] == "drive":
+            raise InputError(
+                f"effect {name} acts on the drive: it must be one that acts on free decays, of "
+                "damping, torque or reading"
+            )
+    run = decay_of(experiment)
+    if run.peaks_only:
+        peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
+        found = identify_peaks(peaks, names)
+        return IdentificationReport(experiment, run, peaks, found, None, table_of(peaks, found))
+    others = [name for name in names if name != BEST]
+    steps, before = len(names) + 2, len(names) - len(others) + 1
+    report = progress or (lambda _done, _total: None)
+    sigma, joint, found = None, None, {}
+    if BEST in names:
+        joint, found[BEST] = _best(experiment, run, start, effects)
+        if joint is not None:
+            sigma = joint.readings[0].sigma
+    report(before - 1, steps)
+    peaks = find_peaks(run.time, run.theta, sigma=sigma, trusted=run.trusted)
+    report(before, steps)
+    found |= identify(
+        run.time,
+        run.theta,
+        sigma=sigma,
+        trusted=run.trusted,
+        methods=others,
+        peaks=peaks,
+        progress=lambda done, _total: report(before + done, steps),
+    )
+    table = table_of_run(run, peaks, found)
+    drag = None if joint is None or start is not None or effects else _with_drag(joint)
+    report(steps, steps)
+    return IdentificationReport(experiment, run, peaks, found, joint, table, drag)
+
+
+def _with_drag(joint: JointFit) -> JointFit | None:
+    """Return a fit with drag, positive, where the one without leaves more than the noise."""
+    noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
+    if joint.fit.rms < MISSES * noise:
+        return None
+    try:
+        found = fit_together(joint.runs, start=joint.fit.model, effects=[DRAG])
+    except FitDiverged:
+        return None
+    drag = next(effect for effect in found.fit.model.effects if effect.name == DRAG)
+    opposes = min(drag.values) > 0
+    return found if opposes and found.fit.rms < joint.fit.rms else None
+
+
+def _best(
+    experiment: Experiment, run: Run, start: Rig | None, effects: Sequence[Effect | str]
+) -> tuple[JointFit | None, Identification]:
+    others = [r for r in experiment.runs if r.kind == "free" and not r.hold_out and r is not run]
+    runs = [run, *(r for r in others if r.moves and not r.peaks_only)]
+    known = {"gravity": experiment.gravity}
+    if experiment.w0 is not None:
+        known["w0"] = experiment.w0
+    try:
+        joint = fit_together(runs, start=start, known=known, effects=effects)
+    except TooShortError as error:
+        return None, Identification(BEST, warnings=(str(error),), applicable=False)
+    except FitDiverged as error:
+        if start is not None or effects:
+            raise
+        # No other method can stand in for what was asked for by name; without that they can.
+        return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
+    certain = joint.fit.converged or len(runs) > 1
+    if certain and not unit_wrong(experiment, *runs):
+        refuse_astray(
+            experiment.path,
+            [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)],
+            joint.fit,
+        )
+    part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
+    return joint, identification_of(joint.fit, joint.readings, part)
+
+
+# Which runs of an experiment were read, and which were left out and why.
+
+
+STILL: Final = "in which nothing moves"
+"""What a run is that shows no motion."""
+
+COPY: Final = "that copies another"
+"""What a run is whose readings count in another one."""
+
+
+def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
+    """Return how many runs were read and which were not, in words; empty if all were.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        All of its runs.
+    read : sequence of Run
+        Those of them that were read.
+    """
+    reasons: dict[str, int] = {}
+    for run in experiment.runs:
+        if any(run is each for each in read):
+            continue
+        # Where runs held out are read all the same, that is no reason for a forced one.
+        held = run.hold_out and (run.kind == "free" or not any(each.hold_out for each in read))
+        why = "held out" if held else "forced"
+        if run.kind == "free" and not run.hold_out:
+            why = "of peaks alone" if run.peaks_only else "shorter" if run.moves else STILL
+        elif run.kind == "free" and not run.moves:
+            why = STILL
+        elif run.kind == "free" and run.peaks_only and any(each.hold_out for each in read):
+            why = "of peaks alone"
+        if run.copied:
+            why = COPY
+        reasons[why] = reasons.get(why, 0) + 1
+    if not reasons:
+        return ""
+    first, *others = (
+        f"{counted(n, 'run')} {why}"
+        if why in {"held out", "of peaks alone", STILL, COPY}
+        else counted(n, f"{why} run")
+        for why, n in reasons.items()
+    )
+    last = f" and {others.pop()}" if others else ""
+    words = ", ".join([first, *others]) + last
+    verb = "is" if sum(reasons.values()) == 1 else "are"
+    return f"{counted(len(read), 'run')} read; {words} {verb} not used"
+
+
+# The model that was identified, as a model file: with its covariance and where it comes from.
+
+
+def identified_model(report: IdentificationReport, command: str = "") -> Rig:
+    """Return the model of the best method with the notes of its file.
+
+    ``[covariance]`` has ``names``, ``matrix`` and the 95 % intervals ``ci95`` of all that was
+    fitted together, both wider where the model leaves more than chance allows; ``[provenance]``
+    the method, the records with their SHA-256, the version, the command, and of a fit of the whole
+    record ``rms``, which it leaves, and ``noise``, both in rad.
+
+    Parameters
+    ----------
+    report : IdentificationReport
+        As of :func:`pendmap.identification.identify_experiment`.
+    command : str
+        How it was called.
+
+    Raises
+    ------
+    InputError
+        If no method could be applied.
+    """
+    best = report.best
+    notes: dict[str, Any] = {}
+    if best.covariance is not None:
+        names, matrix = best.covariance
+        # A sensor's bias and tilt are no part of the pendulum.
+        kept = [k for k, name in enumerate(names) if name.partition("[")[0] not in SENSOR]
+        names = tuple(names[k] for k in kept)
+        matrix = np.asarray(matrix)[np.ix_(kept, kept)]
+        own = {"offset": f"{OFFSET}.d"}
+        notes["covariance"] = {
+            "names": [own.get(name, name) for name in names],
+            "matrix": np.asarray(matrix).tolist(),
+            "ci95": {
+                own.get(name, name): list(e.ci95)
+                for name, e in best.estimates.items()
+                if e.ci95 is not None and name in names
+            },
+        }
+    sha256 = report.experiment.sha256
+    runs = report.joint.runs if report.joint is not None else (report.run,)
+    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
+    rms = noise = None
+    if report.joint is not None and best.method == BEST:
+        rms, noise = report.joint.fit.rms, report.joint.noise
+    notes["provenance"] = provenance(files, command, rms=rms, noise=noise)
+    notes["provenance"]["method"] = best.method
+    try:
+        return dataclasses.replace(report.model, notes=notes)
+    except InputError as error:
+        raise InputError(f"{report.run.name}: what was found is no model: {error}") from None
+
+
+def provenance(
+    files: Mapping[str, str],
+    command: str,
+    *,
+    rms: float | None = None,
+    noise: float | None = None,
+) -> dict[str, Any]:
+    """Return the table ``[provenance]`` of a model file.
+
+    Parameters
+    ----------
+    files : mapping of str to str
+        Records and their SHA-256.
+    command : str
+        How it was made; left out if empty.
+    rms, noise : float, optional
+        Root mean square of what the model leaves of the records, and the noise of a reading, rad:
+        where the one is above 1.5 times the other every map of the model says so.
+    """
+    table: dict[str, Any] = {"version": version("pendmap"), "simd": instruction_set()}
+    if command:
+        table["command"] = command
+    table |= {name: x for name, x in (("rms", rms), ("noise", noise)) if x is not None}
+    return table | {"records": [{"file": name, "sha256": code} for name, code in files.items()]}

@@ -1,0 +1,1 @@
+"""Methods of identification: one module each, and their registry."""

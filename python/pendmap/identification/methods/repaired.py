@@ -1,0 +1,150 @@
+"""The combined decrement repaired: all peaks by least squares, the zero estimated too."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pendmap.identification.methods.base import Identification, too_few
+from pendmap.identification.methods.combined import CUT, small_peaks, unphysical
+from pendmap.identification.methods.decrement import recursion
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.period import frequency
+from pendmap.identification.uncertainty import estimates, jacobian
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+
+_NAME = "combined_repaired"
+_FEWEST = 6
+_MISFIT = 2.0
+
+
+def identify(  # noqa: PLR0913 (the record, and what is known of it)
+    time: ArrayLike,
+    theta: ArrayLike,
+    *,
+    sigma: float | None = None,
+    trusted: ArrayLike | None = None,
+    peaks: Peaks | None = None,
+    cut: float = CUT,
+) -> Identification:
+    """Identify viscous damping and Coulomb friction by the repaired combined decrement.
+
+    All peaks under the cut are fitted by ``x_k = b + s (-1)^k a_k`` with ``a_k`` by eqs. 2.4 to
+    2.6: unknown are ``a_0``, ``delta``, ``theta_r`` and the angle's zero error ``b``; weights are
+    the peaks' standard errors. The half cycle that stops is not among them. ``w0`` comes from the
+    amplitude-corrected period ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, fitted to the times of all
+    of them. What is left of the paper's bias is that of the linear recursion at 12 degrees.
+
+    Parameters
+    ----------
+    time, theta : array, shape (N,)
+        s, and rad from the downward rest, unwrapped.
+    sigma : float, optional
+        Noise of a sample, rad; by default estimated.
+    trusted : array of bool, shape (N,), optional
+        Samples that may be used.
+    peaks : Peaks, optional
+        Those of the record, where they are known; by default found.
+    cut : float
+        Peaks above are dropped, rad.
+
+    Returns
+    -------
+    Identification
+        ``w0``, ``c_over_m``, ``Tr``, ``offset``, with their covariance.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eqs. 2.4 to 2.6.
+    """
+    if peaks is None:
+        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    return from_peaks(peaks, cut=cut)
+
+
+def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
+    """Identify damping from peaks; see :func:`identify`."""
+    small, warnings = small_peaks(peaks, cut)
+    count = len(small)
+    if count < _FEWEST:
+        under = f"under {math.degrees(cut):.3g} degrees"
+        total = len(peaks.turned)
+        return too_few(_NAME, count, _FEWEST, of=total, where=under, warnings=warnings)
+    measured = small.amplitude
+    sign = math.copysign(1.0, measured[0]) * (-1.0) ** np.arange(count)
+    # Peaks that somebody else measured may come without errors: then all weigh the same.
+    error = small.stderr_amplitude
+    known = bool(np.all(error > 0))
+    error = error if known else np.ones(count)
+
+    def model(unknown: Floats) -> Floats:
+        first, delta, theta_r, zero = unknown
+        return np.asarray(zero + sign * recursion(first, delta, theta_r, count))
+
+    size = np.abs(measured)
+    slope = (size[0] - size[-1]) / (count - 1)
+    start = np.array([size[0], 0.5 * slope / (size.mean() * math.pi), slope / 4, 0.0])
+    fit = least_squares(
+        lambda u: (model(u) - measured) / error,
+        start,
+        x_scale=np.maximum(np.abs(start), 1e-4),
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    misfit = 2 * float(fit.cost) / (count - 4)
+    covariance = np.linalg.inv(fit.jac.T @ fit.jac) * (max(misfit, 1.0) if known else misfit)
+    if known and misfit > _MISFIT:
+        warnings.append(
+            f"the recursion does not fit the peaks: chi^2 per degree of freedom is {misfit:.3g}; "
+            "the errors are widened by it"
+        )
+    _, delta, theta_r, zero = fit.x
+    zeta = delta / math.sqrt(1 + delta**2)
+    # The fitted peaks are so much surer than the measured ones that their errors do not count.
+    times = small.stderr_time
+    smooth = dataclasses.replace(
+        small,
+        amplitude=model(fit.x) - zero,
+        stderr_amplitude=np.zeros(count),
+        stderr_time=times if np.all(times > 0) else np.ones(count),
+    )
+    period = frequency(smooth, zeta=zeta)
+    period_error = period.stderr
+    if not np.all(small.stderr_time > 0):
+        period_error *= math.sqrt(min(period.misfit, 1.0))
+
+    def si(unknown: Floats) -> Floats:
+        w0, delta, theta_r, zero = unknown
+        return np.array([w0, 2 * w0 * delta / math.sqrt(1 + delta**2), w0**2 * theta_r, zero])
+
+    inner = np.zeros((4, 4))
+    inner[0, 0] = period_error**2
+    inner[1:, 1:] = covariance[1:, 1:]
+    values = np.array([period.w0, delta, theta_r, zero])
+    slopes = jacobian(si, values, np.sqrt(np.diag(inner)) / 10)
+    outer = slopes @ inner @ slopes.T
+    names = ("w0", "c_over_m", "Tr", "offset")
+    found = si(values)
+    warnings += unphysical(dict(zip(names, found, strict=True)))
+    used = (
+        f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
+        "degrees), all of them, and their times"
+    )
+    return Identification(
+        _NAME,
+        estimates(names, found, outer),
+        used,
+        tuple(warnings),
+        covariance=(names, np.asarray(outer)),
+        misfit=misfit,
+    )

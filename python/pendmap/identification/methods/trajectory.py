@@ -1,0 +1,379 @@
+"""The best method: the whole record of a free decay against the equation of motion.
+
+``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')``, with further terms by effects, is followed
+from release to rest, stops included, and all its numbers are adapted to all readings at once
+(:mod:`pendmap.identification.fit`). Nothing is linearised, no peak is picked.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.errors import FitDiverged, InputError, check_number
+from pendmap.identification.fit import TrajectoryFit, fit_runs
+from pendmap.identification.methods.base import Estimate, Identification
+from pendmap.identification.parameters import SENSOR
+from pendmap.identification.readings import Reading, reading_of
+from pendmap.identification.runs import FitRun
+from pendmap.identification.start import starting_values
+from pendmap.identification.turning import rough_start
+from pendmap.model import Rig
+from pendmap.model.effects import Effect, opposes
+from pendmap.signal.robust import from_first, span
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.readings import Reading
+
+
+METHOD: Final = "trajectory"
+TOO_GOOD: Final = 0.7
+"""A sum of squares below this part of its degrees of freedom shows that sigma is too large."""
+
+
+def identify(  # noqa: PLR0913 (the record, and what is known of it)
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    *,
+    sigma: float | None = None,
+    trusted: NDArray[np.bool_] | None = None,
+    start: Rig | Mapping[str, float] | None = None,
+    offset: bool = True,
+    friction: bool = True,
+    effects: Sequence[Effect] = (),
+    free: Sequence[str] | None = None,
+) -> Identification:
+    """Return the damping found in a free decay by fitting its whole trajectory.
+
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        In s; each after the one before it.
+    theta : ndarray of float, shape (n,)
+        Readings of the angle from the downward rest, rad, unwrapped.
+    sigma : float, optional
+        Their standard error, rad; if none is given, the noise of the record as it is seen without
+        any model.
+    trusted : ndarray of bool, shape (n,), optional
+        Which samples count; all if none are given.
+    start : Rig or mapping of str to float, optional
+        Where the search starts; else from zero crossings and the energy of each half swing.
+    offset : bool
+        Whether the sensor may read zero at another angle; ``offset`` is what it reads at rest
+        there.
+    friction : bool
+        Whether there may be Coulomb friction.
+    effects : sequence of Effect
+        Whatever else acts, parameters in SI.
+    free : sequence of str, optional
+        Which of their parameters (``effect.parameter``) are fitted; if none are given, all but
+        those that are shapes: exponents, orders and widths.
+
+    Returns
+    -------
+    Identification
+        ``w0``, ``c_over_m``, ``Tr``, ``offset`` and the effects' parameters. Damping may come out
+        negative, which no pendulum has and a warning says: something else is missing then.
+
+    Raises
+    ------
+    InputError
+        If the arrays do not fit together.
+
+    References
+    ----------
+    Bock (1983), Progress in Scientific Computing 2, 95, for the method; Venzon & Moolgavkar (1988),
+    Applied Statistics 37, 87, for the intervals.
+    """
+    try:
+        fit, reading = fit_decay(
+            time,
+            theta,
+            sigma=sigma,
+            trusted=trusted,
+            start=start,
+            offset=offset,
+            friction=friction,
+            effects=effects,
+            free=free,
+        )
+    except TooShortError as error:
+        return Identification(METHOD, warnings=(str(error),), applicable=False)
+    return identification_of(fit, [reading], span(np.asarray(time)))
+
+
+def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str) -> Identification:
+    """Return a fit as every method gives its result.
+
+    Parameters
+    ----------
+    fit : TrajectoryFit
+        To one record or more.
+    readings : sequence of Reading
+        Of each record.
+    part : str
+        Which part of them, in words.
+    """
+    renamed = {f"{OFFSET}.d": "offset"}
+    names = tuple(renamed.get(name, name) for name in fit.names)
+    # Where the model does not fit, the noise is not what the errors come from.
+    wider = math.sqrt(fit.widening)
+    found = [
+        dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
+        for e in fit.estimates.values()
+    ]
+    estimates = dict(zip(names, found, strict=True))
+    count, whole = len(fit.windows), len(readings)
+    motions = "one motion" if whole == 1 else f"{whole} motions"
+    how = f"as {motions}" if count == whole else f"in {count} windows"
+    total = sum(len(reading.each) for reading in readings)
+    units = {r.unit for r in readings}
+    sigmas = [r.sigma * (r.gain if len(units) == 1 else 1.0) for r in readings]
+    noise = " to ".join(f"{x:.2e}" for x in sorted({min(sigmas), max(sigmas)}))
+    noise += f" {units.pop() if len(units) == 1 else 'rad'}"
+    return Identification(
+        METHOD,
+        estimates=estimates,
+        used=f"{fit.samples} readings of {total}, {part}, {how}; noise {noise}",
+        warnings=tuple(_warnings(fit, estimates, readings)),
+        covariance=(names, fit.widening * fit.covariance),
+        misfit=fit.chi2 / max(fit.degrees, 1),
+        model=fit.model,
+        converged=fit.converged,
+    )
+
+
+def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    *,
+    sigma: float | None = None,
+    trusted: NDArray[np.bool_] | None = None,
+    start: Rig | Mapping[str, float] | None = None,
+    offset: bool = True,
+    friction: bool = True,
+    effects: Sequence[Effect] = (),
+    free: Sequence[str] | None = None,
+) -> tuple[TrajectoryFit, Reading]:
+    """Return the fit behind :func:`identify`, with curve and residuals, and the standard errors.
+
+    Parameters and errors are those of :func:`identify`.
+
+    Raises
+    ------
+    TooShortError
+        If the record gives no start and none is given.
+    """
+    time, theta = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, theta))
+    if time.shape != theta.shape or time.ndim != 1:
+        raise InputError(
+            f"time has {time.shape} values and theta {theta.shape}: they must be as many"
+        )
+    if not (np.all(np.isfinite(time)) and np.all(np.isfinite(theta))):
+        raise InputError("time and theta must be finite numbers, one is not")
+    if sigma is not None and check_number("sigma", sigma) <= 0:
+        raise InputError(f"sigma must be a number above 0, got {sigma:g}")
+    good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
+    if good.shape != time.shape:
+        raise InputError("trusted and time differ in length: they must be as many")
+    elapsed, first = from_first(time)
+    reading = reading_of(elapsed, theta, sigma, trusted=good)
+    run = FitRun(
+        elapsed,
+        theta - reading.shift,
+        reading.each,
+        trusted=good,
+        lab_time_s=first,
+        count=reading.interval,
+    )
+    found, (reading,) = fit_from_start(
+        [run],
+        [reading],
+        start=start,
+        offset=offset,
+        friction=friction,
+        effects=effects,
+        free=free,
+    )
+    return found, reading
+
+
+def _warnings(
+    fit: TrajectoryFit, estimates: Mapping[str, Estimate], readings: Sequence[Reading]
+) -> list[str]:
+    found = []
+    opposing = [
+        f"{e.name}.{size}" for e in fit.model.effects if opposes(e.definition) for size in e.sizes
+    ]
+    for name in ("c_over_m", "Tr", *opposing):
+        if name in estimates and estimates[name].value < 0:
+            low, high = estimates[name].ci95 or (-math.inf, math.inf)
+            found.append(
+                f"{name} is {estimates[name].value:.3g}, which no pendulum has: "
+                + (
+                    "its interval reaches 0"
+                    if low <= 0 <= high
+                    else "an effect is missing in the model"
+                )
+            )
+    ratio = fit.chi2 / max(fit.degrees, 1)
+    if fit.widening > 1:
+        found.append(
+            f"the model does not fit: residuals are {math.sqrt(ratio):.2g} times the noise, and "
+            "the errors are widened by that factor; an effect is missing in the model"
+        )
+    elif ratio < TOO_GOOD and not any(reading.coarse for reading in readings):
+        found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
+    if not fit.converged:
+        found.append("the search did not converge")
+    # How a sensor leans shows in wide swings alone: nobody asks for it.
+    wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
+    lost = [name for name, e in wanted.items() if e.ci95 is None]
+    if lost:
+        found.append(f"no end was found for the interval of {', '.join(lost)}")
+    laws = [reading.law for reading in readings if reading.law]
+    found += [f"{law}: each reading counts by the noise at its {law.grows_with}" for law in laws]
+    coarse = [f"{r.gain * r.count:.3g} {r.unit}" for r in readings if r.coarse]
+    if coarse:
+        found.append(
+            f"the sensor's count ({', '.join(dict.fromkeys(coarse))}) is coarser than its noise: "
+            "readings are taken for intervals"
+        )
+    return found
+
+
+# From a record to a fit: a start that the record gives, then the search.
+#
+# Where a rough start leads astray, a second one is taken from the methods of peaks.
+
+
+OFFSET: Final = "encoder_offset"
+"""The effect that is the sensor's zero."""
+POOR: Final = 0.1
+"""Residuals above this part of the record's own scatter are no fit: the search went astray."""
+
+
+LACKING: Final = 4.0
+"""Where the sum of squares is so many times what noise makes of it, the model lacks more than the
+noise: by its law the slowest readings alone would say what the model is."""
+
+
+class TooShortError(InputError):
+    """The record gives no start: fewer than two half swings, or none that fall."""
+
+
+def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
+    runs: Sequence[FitRun],
+    readings: Sequence[Reading],
+    *,
+    start: Rig | Mapping[str, float] | None = None,
+    offset: bool = True,
+    friction: bool = True,
+    effects: Sequence[Effect | str] = (),
+    free: Sequence[str] | None = None,
+) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
+    """Return the fit to several records, from a start that the first gives, and their readings.
+
+    Where a rough start leads to a poor fit, a second one begins where the methods of peaks, or a
+    global search over their envelope, say; the better one counts. Readings whose noise grows with
+    speed count by it, unless the model lacks more than the noise: then they count alike.
+
+    Parameters
+    ----------
+    runs, readings : sequence
+        The records, and what their readings are worth.
+    start, offset, friction, effects, free
+        As of :func:`identify`; effects may be names, whose sizes then begin small.
+
+    Raises
+    ------
+    TooShortError
+        If the first record gives no start and none is given.
+    """
+    first = runs[0]
+    good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
+    time, theta = first.time[good], first.angle[good]
+    doubt = max(reading.doubt for reading in readings)
+    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
+    # A sensor on the rod does not see where the angle is 0; it has a bias instead.
+    zeroed = offset and any(run.rod_sensor is None for run in runs)
+
+    def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
+        model = _start_of(begin, time, theta, readings[0].sigma)
+        if not friction:
+            model = dataclasses.replace(model, Tr=0.0)
+        named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
+        known = [*model.effects, *named]
+        zero = [OFFSET] if zeroed and OFFSET not in {e.name for e in known} else []
+        more = [Effect(name, {"d": 0.0}) for name in zero]
+        model = dataclasses.replace(model, effects=(*known, *more))
+        wanted = _sizes(known) if free is None else free
+        return fit_runs(runs, model, [*names, *wanted, *_sizes(more)], sigma_doubt=doubt)
+
+    found = fitted(start)
+    if found.widening > LACKING and any(reading.law for reading in readings):
+        readings = [dataclasses.replace(r, each=r.alike, law=None) for r in readings]
+        runs = [
+            dataclasses.replace(run, sigma=r.each) for run, r in zip(runs, readings, strict=True)
+        ]
+        found = fitted(start)
+    poor = not found.converged or found.rms > POOR * float(np.std(theta))
+    if isinstance(start, Rig) or not poor:
+        return found, tuple(readings)
+    try:
+        found_by_peaks = _by_peaks(time, theta, readings[0].sigma)
+        again = fitted(dict(start or {}) | found_by_peaks)
+    except (FitDiverged, TooShortError):
+        return found, tuple(readings)
+    better = (again.converged, -again.chi2) > (found.converged, -found.chi2)
+    return again if better else found, tuple(readings)
+
+
+def _sizes(effects: Sequence[Effect]) -> list[str]:
+    """Return the names of all parameters of effects but those of shape."""
+    return [f"{effect.name}.{size}" for effect in effects for size in effect.sizes]
+
+
+def _start_of(
+    start: Rig | Mapping[str, float] | None,
+    time: NDArray[np.float64],
+    theta: NDArray[np.float64],
+    sigma: float,
+) -> Rig:
+    """Return where a search starts: what is given, the rest from the half swings of the record.
+
+    Raises
+    ------
+    TooShortError
+        If ``w0`` is not known and the record gives no start.
+    """
+    if isinstance(start, Rig):
+        return start
+    known: dict[str, Any] = dict(start or {})
+    if "w0" not in known:
+        known = (rough_start(time, theta, sigma) or _by_peaks(time, theta, sigma)) | known
+    return Rig(**known)
+
+
+def _by_peaks(
+    time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
+) -> dict[str, float]:
+    """Return a start from the methods of peaks, which know rotations too."""
+    try:
+        start = starting_values(time, theta, sigma=sigma)
+    except InputError:
+        start = None
+    if start is None or start.source == "guess":
+        raise TooShortError(
+            "the record must show three half swings or more of a free decay, or a natural frequency"
+            " must be given: w0 = 6.2 under [rig] in experiment.toml"
+        )
+    return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}

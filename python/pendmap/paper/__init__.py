@@ -1,0 +1,1 @@
+"""The figures of Horton, Wiercigroch & Xu (2008)."""

@@ -1,0 +1,298 @@
+"""The pendulum with its moving pivot, drawn (figure 3)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Arc, Circle, FancyArrowPatch, Polygon, Rectangle
+
+from pendmap.charts.methods import MEASURED, look
+from pendmap.comparison.free import MODEL
+from pendmap.figures import blocks, forced
+from pendmap.figures import sheet as sheets
+from pendmap.formatting import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from pendmap.comparison import ForcedComparison
+
+
+TITLE: Final = "The parametric pendulum"
+SIZE: Final = (6.0, 5.6)
+"""Inches."""
+THETA: Final = math.radians(38.0)
+"""How far it is drawn out."""
+LENGTH: Final = 3.0
+BOB: Final = 0.3
+ASIDE: Final = 0.5
+"""Lengths in units of the drawing, of which one is an inch."""
+
+_DRIVE: Final = "cos(\u03a9t + \u03c6)"
+_STEEL: Final = "#3d4f66"
+_DARK: Final = "#1d3557"
+_RAIL: Final = "#b8c2cf"
+_FORCE: Final = "#d55e00"
+_MOTION: Final = "#0072b2"
+_HELP: Final = "#8a8a8a"
+
+
+def figure(
+    *, size: tuple[float, float] | None = None, dpi: float = 200.0, title: str | None = None
+) -> Figure:
+    """Return the drawing: pivot, rod, bob, angle, excitation, gravity, torques of friction.
+
+    The pivot's acceleration upward, p g cos(Omega t + phi), adds to gravity; so its place is
+    ``-Y cos(Omega t + phi)``, upward, with ``Y = p g / Omega**2``.
+    """
+    width, height = size or SIZE
+    equation = f"th'' + (c/m) th' + w0\u00b2 (1 + p {_DRIVE}) sin th = \u2212Tr sign(th')"
+    known = "w0\u00b2 = g/l, p = Y\u03a9\u00b2/g"
+    equation = f"{equation};   {known}".replace("th", "\u03b8").replace("w0", "\u03c9\u2080")
+    made = sheets.headed((width, height), dpi, title or TITLE, equation, left=0.3)
+    scale = min((width - 0.2) / 5.8, (height - 0.75) / 4.85)
+    wide, high = (width - 0.2) / scale, (height - 0.75) / scale
+    axes = sheets.place(made, 0.1, 0.05, width - 0.2, height - 0.75)
+    axes.set_xlim(-wide / 2 + 0.55, wide / 2 + 0.55)
+    axes.set_ylim(1.25 - high, 1.25)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    font = 11.0 * min(scale, 1.2)
+    _guide(axes, font)
+    _rod(axes, font)
+    _forces(axes, font)
+    return made
+
+
+def _guide(axes: Axes, font: float) -> None:
+    """The slider on its rail, and how it moves."""
+    axes.add_patch(Rectangle((-0.42, -0.8), 0.1, 1.6, fc=_RAIL, ec="none", zorder=1))
+    for k in range(9):
+        y = -0.8 + 0.18 * k
+        axes.plot([-0.42, -0.54], [y, y + 0.12], color=_HELP, lw=0.7, zorder=1)
+    axes.add_patch(Rectangle((-0.3, -0.24), 0.6, 0.48, fc="white", ec=_DARK, lw=1.4, zorder=2))
+    _arrow(axes, (-0.82, -0.75), (-0.82, 0.75), _MOTION, both=True)
+    axes.plot([-0.94, -0.6], [0, 0], color=_HELP, lw=0.8, ls=(0, (6, 3)))
+    axes.text(
+        -0.98, 0.3, f"\u2212Y {_DRIVE}", ha="right", va="center", color=_MOTION, fontsize=font
+    )
+    axes.text(
+        -0.98, -0.02, "the pivot's place,\nupward", ha="right", va="center", color=_HELP,
+        fontsize=0.78 * font, linespacing=1.3,
+    )  # fmt: skip
+
+
+def _rod(axes: Axes, font: float) -> None:
+    """Rod and bob, where they hang at rest, the angle, the length."""
+    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
+    down = -LENGTH - 0.3
+    axes.plot([0, 0], [-0.3, down], color=_HELP, lw=0.9, ls=(0, (6, 3)), zorder=1)
+    axes.add_patch(Circle((0, -LENGTH), BOB, fc="none", ec=_HELP, lw=0.9, ls=(0, (3, 2)), zorder=1))
+    across, along = 0.055 * math.cos(THETA), 0.055 * math.sin(THETA)
+    axes.add_patch(
+        Polygon(
+            [(-across, -along), (across, along), (x + across, y + along), (x - across, y - along)],
+            fc=_STEEL, ec="none", zorder=3,
+        )
+    )  # fmt: skip
+    axes.add_patch(Circle((0, 0), 0.13, fc="white", ec=_DARK, lw=1.6, zorder=4))
+    axes.add_patch(Circle((0, 0), 0.04, fc=_DARK, ec="none", zorder=5))
+    axes.add_patch(Circle((x, y), BOB, fc=_DARK, ec="none", zorder=4))
+    axes.text(
+        x, y, "m", color="white", ha="center", va="center", fontsize=font, style="italic", zorder=5
+    )
+    radius = 1.55
+    axes.add_patch(
+        Arc((0, 0), 2 * radius, 2 * radius, theta1=270, theta2=270 + math.degrees(THETA) - 4,
+            color=_DARK, lw=1.3)
+    )  # fmt: skip
+    end = THETA - math.radians(0.5)
+    before = THETA - math.radians(6)
+    _arrow(
+        axes,
+        (radius * math.sin(before), -radius * math.cos(before)),
+        (radius * math.sin(end), -radius * math.cos(end)),
+        _DARK,
+    )
+    half = THETA / 2
+    axes.text(
+        (radius + 0.22) * math.sin(half), -(radius + 0.22) * math.cos(half), "\u03b8",
+        ha="center", va="center", fontsize=1.3 * font, color=_DARK,
+    )  # fmt: skip
+    # The length stands beside the rod, on the other side of the angle, from pivot to bob.
+    move = (ASIDE * math.cos(THETA), ASIDE * math.sin(THETA))
+    _arrow(axes, move, (x + move[0], y + move[1]), _HELP, both=True, thin=True)
+    for (foot_x, foot_y), bare in (((0.0, 0.0), 0.2), ((x, y), BOB + 0.04)):
+        ends = (bare, ASIDE + 0.08)
+        axes.plot(
+            [foot_x + end * math.cos(THETA) for end in ends],
+            [foot_y + end * math.sin(THETA) for end in ends],
+            color=_HELP, lw=0.7, zorder=4,
+        )  # fmt: skip
+    axes.text(
+        x / 2 + 1.4 * move[0], y / 2 + 1.4 * move[1], "l", ha="center", va="center",
+        fontsize=1.1 * font, style="italic",
+    )  # fmt: skip
+
+
+def _forces(axes: Axes, font: float) -> None:
+    """Gravity, and friction and drag against the motion."""
+    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
+    _arrow(axes, (x, y - BOB), (x, y - BOB - 0.75), _FORCE)
+    axes.text(x + 0.14, y - BOB - 0.5, "m g", color=_FORCE, fontsize=font, va="center",
+              style="italic")  # fmt: skip
+    # The velocity is along the arc, upward.
+    side = (math.cos(THETA), math.sin(THETA))
+    start = (x + (ASIDE + 0.14) * side[0], y + (ASIDE + 0.14) * side[1])
+    _arrow(axes, start, (start[0] + 0.7 * side[0], start[1] + 0.7 * side[1]), _MOTION)
+    axes.text(
+        start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "d\u03b8/dt > 0",
+        color=_MOTION, fontsize=font, ha="center", va="bottom",
+    )  # fmt: skip
+    # A torque on the axle, against the turning.
+    first, last, radius = math.radians(52), math.radians(-14), 0.98
+    axes.add_patch(
+        Arc((0, 0), 2 * radius, 2 * radius, theta1=math.degrees(last) + 6,
+            theta2=math.degrees(first), color=_FORCE, lw=1.6)
+    )  # fmt: skip
+    before = last + math.radians(9)
+    _arrow(
+        axes,
+        (radius * math.cos(before), radius * math.sin(before)),
+        (radius * math.cos(last), radius * math.sin(last)),
+        _FORCE,
+    )
+    axes.text(
+        1.14, 0.42,
+        "drag and dry friction over m l\u00b2:\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)",
+        color=_FORCE, fontsize=0.82 * font, va="center", linespacing=1.4,
+    )  # fmt: skip
+
+
+def _arrow(  # noqa: PLR0913 (from, to, look)
+    axes: Axes,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    colour: str,
+    *,
+    both: bool = False,
+    thin: bool = False,
+) -> None:
+    axes.add_patch(
+        FancyArrowPatch(
+            start,
+            end,
+            arrowstyle="<|-|>" if both else "-|>",
+            mutation_scale=9 if thin else 13,
+            color=colour,
+            lw=0.9 if thin else 1.6,
+            shrinkA=0,
+            shrinkB=0,
+            zorder=5,
+        )
+    )
+
+
+# Forced runs beside a model: steady states, and paths that tumble, a figure each.
+
+
+WIDTH: Final = 11.6
+HIGH: Final = 3.3
+GAP: Final = 0.75
+"""Inches: of a sheet, of a row, between its panels."""
+_STEADY: Final = 2
+"""Steady states in a row."""
+_LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
+
+
+def steady_figure(
+    runs: Sequence[ForcedComparison], *, dpi: float, title: str, subtitle: str
+) -> Figure:
+    """Return the figure: a phase plane for each run, the record as points, the model as a line."""
+    rows = -(-len(runs) // _STEADY)
+    size = (0.7 * WIDTH, rows * HIGH + 1.2)
+    figure = sheets.headed(size, dpi, title, subtitle, left=0.1)
+    _legend(figure, rows * HIGH + 0.42, "o", size[0])
+    for k, one in enumerate(runs):
+        row, column = divmod(k, _STEADY)
+        whole = blocks.Box(0.0, (rows - 1 - row) * HIGH, size[0], HIGH)
+        box = whole.less(left=0.78, right=0.16, top=0.55, bottom=0.5).columns(_STEADY, GAP)[column]
+        axes = box.panel(figure)
+        forced.draw_cycles(axes, one)
+        axes.set_title(f"({_LETTERS[k]}) {_steady_said(one)}")
+    return figure
+
+
+def _steady_said(one: ForcedComparison) -> str:
+    drive = _drive(one)
+    found = one.steady
+    if found is None:
+        return f"{drive}: no steady state"
+    if found.model is None:
+        return f"{drive}: {found.measured.kind},\nnot that of the model"
+    error = 100 * found.overestimate
+    return f"{drive}: {found.measured.kind},\namplitude of the model {error:+.2g} %"
+
+
+def _drive(one: ForcedComparison) -> str:
+    given = one.run.drive or {}
+    p, frequency = given.get("p") or 0.0, given.get("Omega") or 0.0
+    return f"p = {p:g}, \N{GREEK CAPITAL LETTER OMEGA} = {frequency:.4g} rad/s"
+
+
+def tumbling_figure(
+    runs: Sequence[ForcedComparison], *, dpi: float, title: str, subtitle: str
+) -> Figure:
+    """Return the figure: a row a run, histories, phase planes and statistics side by side.
+
+    A record and a member of the ensemble stand beside one another, never over one another.
+    """
+    size = (WIDTH, len(runs) * HIGH + 1.2)
+    figure = sheets.headed(size, dpi, title, subtitle, left=0.1)
+    _legend(figure, len(runs) * HIGH + 0.42, "", size[0])
+    letters = iter(f"({letter}) " for letter in _LETTERS)
+    for k, one in enumerate(runs):
+        box = blocks.Box(0.0, (len(runs) - 1 - k) * HIGH, WIDTH, HIGH)
+        heading = f"{_drive(one)}: {counted(one.ensemble.members, 'member')} of the ensemble"
+        cells = blocks.named(figure, box, heading).columns(4, GAP)
+        fastest = max(float(np.abs(v).max()) for v in (one.velocity, one.example[1]))
+        paths = ((one.measured, one.velocity), one.example)
+        colours = (MEASURED, look(MODEL).colour)
+        named = ("record", "a member")
+        for cell, path, colour, name in zip(
+            cells[0].rows((1, 1), (0.62,)), paths, colours, named, strict=True
+        ):
+            axes = cell.panel(figure)
+            forced.draw_history(axes, one.time, path[0], colour)
+            axes.set_title(next(letters) + name)
+            if name == "record":
+                axes.set_xlabel("")
+        for cell, path, colour, name in zip(cells[1:3], paths, colours, named, strict=True):
+            axes = cell.panel(figure)
+            forced.draw_phase(axes, path, colour, fastest)
+            axes.set_title(next(letters) + name)
+        axes = cells[3].less(left=-0.45, bottom=-0.3).panel(figure)
+        forced.draw_statistics(axes, one)
+        axes.set_title(next(letters) + "record (95 % of the ensemble)")
+    return figure
+
+
+def _legend(figure: Figure, top: float, marker: str, width: float) -> None:
+    line = "" if marker else "-"
+    handles: list[Artist] = [
+        Line2D([], [], color=MEASURED, marker=marker, ls=line, lw=1.6, ms=4, mfc="none"),
+        Line2D([], [], color=look(MODEL).colour, lw=1.6),
+    ]
+    texts = ["virtual rig", "identified model"]
+    if not marker:
+        shades, named = forced.legend()
+        handles, texts = [*handles, *shades], [*texts, *named]
+    box = blocks.Box(0.0, top - 1.0, width, 1.0)
+    blocks.named(figure, box, "", handles, texts)

@@ -1,0 +1,216 @@
+"""The paper's figures and its table by their numbers, on a virtual rig like the paper's."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import re
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from pendmap.errors import InputError
+from pendmap.files import whole_file
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+
+    from pendmap.identification import IdentificationReport
+
+
+TABLE: Final = "table1"
+FIGURES: Final = {
+    "1": "Critical curves; strange attractors a, b and c",
+    "2": "Tumbling chaos",
+    "3": "The parametric pendulum",
+    "4": "A decay, its velocity and half cycles",
+    "5": "The decrement of each three peaks",
+    "6": "The decay by each model",
+    "7": "The errors of each model",
+    "8": "Steady states after 2500 s",
+    "9": "Transient tumbling",
+    TABLE: "Damping by each method, and what its simulation misses (%)",
+}
+"""What can be drawn, by the names a user types."""
+_TRANSIENT: Final = 500
+"""Periods that are left out before figure 2 begins."""
+_MOTIONS: Final = {"8": "steady_states", "9": "tumbling"}
+_RIG: Final = "virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s\u00b2"
+_PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
+
+PRINTED: Final = {
+    "combined": (7.31, 7.18, 0.0, 1.58),
+    "log_decrement": (16.95, 17.46, 4.35, 6.04),
+    "de_paula": (64.81, 41.58, 9.17, 13.29),
+}
+"""The paper's table 1, percent: periods of 0.26 s and 1.54 s, peaks of 1.2 rad and 2.53 rad."""
+_PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 2.53 rad")
+
+
+_SQUARES: Final = (0.05, 1.6)
+_HIGHEST: Final = 2.6
+_COLUMNS: Final = 120
+"""Range of alpha^2, largest e, and frequencies of figure 1."""
+
+
+def wanted(name: str) -> list[str]:
+    """Return the keys of :data:`FIGURES` that a user means, by ``4``, ``figure 4``, ``all``, ...
+
+    Raises
+    ------
+    InputError
+        If there is no such figure.
+    """
+    text = re.sub(r"[\s_.-]+", "", name.lower())
+    text = re.sub(r"^(figure|fig)(?=\d)", "", text)
+    if text == "all":
+        return list(FIGURES)
+    if text in FIGURES:
+        return [text]
+    there = f"{', '.join(key for key in FIGURES if key != TABLE)}, {TABLE} and all"
+    raise InputError(f"figure must be one of the paper's ({there}), got {name!r}")
+
+
+@functools.lru_cache(maxsize=1)
+def report(seed: int = 0) -> IdentificationReport:
+    """Return what is identified from the virtual rig's record, which is read as any other."""
+    import numpy as np  # noqa: PLC0415 (names are checked without it)
+
+    from pendmap.identification import identify_experiment  # noqa: PLC0415
+    from pendmap.records import read_experiment  # noqa: PLC0415
+    from pendmap.virtual_rig import paper_decay  # noqa: PLC0415
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "virtual_rig.csv"
+        columns = np.column_stack(paper_decay(seed))
+        np.savetxt(path, columns, "%.12g", ",", header="t_s,theta_rad", comments="")
+        return identify_experiment(read_experiment(path))
+
+
+def tumbling(periods: int = 6000) -> list[xr.Dataset]:
+    """Return trajectories at the paper's three points of tumbling chaos, without their transients.
+
+    Each begins at ``theta = 1`` at rest; the first 500 of all ``periods`` are left out.
+    """
+    from pendmap.analysis.trajectory import simulate  # noqa: PLC0415
+    from pendmap.model import PRESETS  # noqa: PLC0415 (likewise)
+
+    runs = []
+    for name in ("fig2a", "fig2b", "fig2c"):
+        pendulum, samples = PRESETS[name], 48
+        run = simulate(pendulum, 1.0, 0.0, periods * pendulum.period, tol=1e-7, samples=samples)
+        after = {"time": slice(_TRANSIENT * samples, None), "period": slice(_TRANSIENT, None)}
+        runs.append(run.isel(after))
+    return runs
+
+
+def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
+    """Draw one figure, or the table, into a file.
+
+    Parameters
+    ----------
+    key : str
+        A key of :data:`FIGURES`.
+    path : str or path
+        ``.png``, ``.svg`` or ``.pdf``; an existing file is replaced.
+    seed : int
+        Of the noise in the record.
+
+    Raises
+    ------
+    InputError
+        For a figure that is not there, or another suffix.
+    OSError
+        If the file cannot be written.
+    """
+    from pendmap import figures  # noqa: PLC0415
+    from pendmap.paper import motions  # noqa: PLC0415
+
+    (key,) = wanted(key) if key != "all" else ("all",)
+    if key not in FIGURES:
+        raise InputError(f"key must be one figure, got {key!r}")
+    number = "Table 1" if key == TABLE else f"Figure {key}"
+    title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
+    if key == "1":
+        return figures.draw_tongues(_critical(), path, title=title, marks=_strange())
+    if key == "2":
+        return figures.draw_tumbling(tumbling(), path, title=title)
+    if key == "3":
+        return figures.draw_pendulum(path, title=title)
+    if key in _MOTIONS:
+        runs = getattr(motions, _MOTIONS[key])(report(seed).methods["combined_repaired"].rig, seed)
+        steady, subtitle = (
+            key == "8",
+            f"{_RIG};   model by the combined method, repaired; seed {seed}",
+        )
+        return figures.draw_motions(runs, path, steady=steady, title=title, subtitle=subtitle)
+    found = report(seed)
+    return figures.draw_identification(
+        found,
+        path,
+        parts=(_PARTS[key],),
+        title=title,
+        subtitle=f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1\u00b0, zero off by "
+        f"0.05\u00b0, seed {seed}",
+    )
+
+
+def _critical() -> xr.Dataset:
+    """Return the critical curves of figure 1: alpha^2 up to 1.6, e up to 2.6."""
+    import numpy as np  # noqa: PLC0415
+
+    from pendmap.analysis.tongues import tongues  # noqa: PLC0415
+    from pendmap.model import Pendulum  # noqa: PLC0415
+
+    square = np.linspace(_SQUARES[0], _SQUARES[1], _COLUMNS)[::-1]
+    p_max = _HIGHEST / _SQUARES[0]
+    return tongues(
+        Pendulum(gamma=0.1),
+        1 / np.sqrt(square),
+        p_max,
+        plane="e-alpha2",
+        inverted=False,
+        refine=True,
+    )
+
+
+def _strange() -> list[tuple[float, float, str]]:
+    """Return the points of figure 2 as marks of figure 1."""
+    from pendmap.model import PRESETS  # noqa: PLC0415
+
+    return [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
+
+
+def printed_table() -> tuple[list[str], list[list[str]]]:
+    """Return the paper's own table 1, head and rows."""
+    rows = [[name, *(f"{x:g} %" for x in row)] for name, row in PRINTED.items()]
+    return ["the paper's own", *_PRINTED_HEAD], rows
+
+
+def write_table(found: IdentificationReport, path: str | os.PathLike[str]) -> Path:
+    """Write table 1 as CSV: a row for each period and peak, in percent a column for each method.
+
+    An empty cell is a simulation that rests by then.
+
+    Raises
+    ------
+    InputError
+        For another suffix than ``.csv``.
+    OSError
+        If the file cannot be written.
+    """
+    names = [name for name, each in found.methods.items() if each.applicable]
+    with (
+        whole_file(path, [".csv"]) as part,
+        part.open("w", encoding="utf-8", newline="") as file,
+    ):
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(["what", "measured", "unit", *(f"{name}_percent" for name in names)])
+        for row in found.table.rows:
+            errors = [row.errors.get(name, float("nan")) for name in names]
+            cells = ["" if error != error else repr(float(error)) for error in errors]  # noqa: PLR0124
+            unit = "s" if row.what == "period" else "rad"
+            out.writerow([row.what, repr(float(row.measured)), unit, *cells])
+    return Path(path)

@@ -1,0 +1,141 @@
+"""The forced motions of the paper's figures 8 and 9: a virtual rig beside the identified model."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from pendmap.comparison import ForcedComparison
+    from pendmap.model import Rig
+    from pendmap.virtual_rig import RunPlan
+
+
+STEADY: Final = (
+    (0.2, 1.9, "oscillation", 2, 0),
+    (0.6, 2.1, "oscillation", 2, 0),
+    (0.3, 2.0, "rotation", 1, 1),
+    (1.0, 2.0, "rotation", 1, 1),
+)
+"""Drives ``p`` and ``Omega / 6.2 rad/s``, and the attractor that a run is started toward: kind,
+period, turns. The paper gives no numbers for its own."""
+TUMBLING: Final = ((0.6, 2.0, 2.0, 6.0), (0.4, 2.0, 2.0, 6.0))
+"""``p``, ``Omega / 6.2 rad/s``, angle (rad) and velocity (rad/s) of the start."""
+SECONDS = 2500.0
+"""After so long the paper takes its steady states."""
+TUMBLED = 300.0
+"""Length of a run that tumbles, s: of the ensembles beside it all but a fiftieth settle in it."""
+_W0: Final = 6.2
+_CELLS: Final = 100
+_FASTEST: Final = 18.0
+"""Window of the basin map in which starts are chosen: velocities up to this, rad/s."""
+_RATE: Final = 50.0
+"""Samples a second: long runs are no denser than they need be."""
+_MEMBERS: Final = 40
+"""Starts beside a run of 2500 s: the question is where they end."""
+
+
+def steady_states(model: Rig, seed: int = 0) -> list[ForcedComparison]:
+    """Return runs of 2500 s, each started in the basin of an attractor of the model.
+
+    The start is the cell of the attractor's basin that is farthest from any other: what the model
+    does not know of the rig must not lead elsewhere.
+
+    Parameters
+    ----------
+    model : Rig
+        Identified from the rig's free decay.
+    seed : int
+        Of the noise.
+    """
+    from pendmap.virtual_rig import RunPlan  # noqa: PLC0415 (this module is imported for its numbers)
+
+    plans = []
+    for p, omega, kind, n, w in STEADY:
+        driven = dataclasses.replace(model, p=p, Omega=omega * _W0)
+        theta, velocity = _inside(driven, kind, n, w)
+        plans.append(
+            RunPlan("forced", theta, velocity, SECONDS, p=p, frequency=round(omega * _W0, 6))
+        )
+    return beside(model, plans, seed, _MEMBERS)
+
+
+def tumbling(model: Rig, seed: int = 0) -> list[ForcedComparison]:
+    """Return runs of 300 s from starts that tumble at first, without any pre-iterates.
+
+    Parameters
+    ----------
+    model : Rig
+        Identified from the rig's free decay.
+    seed : int
+        Of the noise.
+    """
+    from pendmap.virtual_rig import RunPlan  # noqa: PLC0415 (likewise)
+
+    plans = [
+        RunPlan("forced", theta, velocity, TUMBLED, p=p, frequency=round(omega * _W0, 6))
+        for p, omega, theta, velocity in TUMBLING
+    ]
+    return beside(model, plans, seed)
+
+
+def _inside(model: Rig, kind: str, n: int, w: int) -> tuple[float, float]:
+    """Return the start deepest inside the basin of an attractor."""
+    import numpy as np  # noqa: PLC0415 (likewise)
+    from scipy.ndimage import distance_transform_edt  # noqa: PLC0415
+
+    from pendmap.analysis.basins import basins  # noqa: PLC0415
+    from pendmap.analysis.grid import Axis, Grid  # noqa: PLC0415
+
+    grid = Grid(Axis(-math.pi, math.pi, _CELLS), Axis(-_FASTEST, _FASTEST, _CELLS))
+    found = basins(model, grid, check=False)
+    own = (found["kind"] == kind) & (found["n"] == n) & (found["w"] == w)
+    here = np.isin(found["label"].values, found["id"].values[own.values])
+    # The angle goes round: three times side by side, and the middle one counts.
+    deep = distance_transform_edt(np.tile(here, 3))[:, _CELLS : 2 * _CELLS]
+    row, column = np.unravel_index(int(np.argmax(deep)), deep.shape)
+    return float(found["theta"].values[column]), float(found["velocity"].values[row])
+
+
+def beside(
+    model: Rig, plans: list[RunPlan], seed: int, members: int = 400
+) -> list[ForcedComparison]:
+    """Run the virtual rig, read its records as any other, and compare the model with them.
+
+    Parameters
+    ----------
+    model : Rig
+        The model.
+    plans : list of RunPlan
+        The runs.
+    seed : int
+        Of the noise.
+    members : int
+        Starts beside each run.
+    """
+    from pendmap import virtual_rig  # noqa: PLC0415 (likewise)
+    from pendmap.comparison import Ensemble, compare  # noqa: PLC0415 (likewise)
+    from pendmap.records import read_experiment  # noqa: PLC0415
+    from pendmap.virtual_rig import experiment  # noqa: PLC0415
+
+    truth = experiment.PARAMETERS
+    request = virtual_rig.Request(
+        preset="forced",
+        seed=seed,
+        effects=("none",),
+        w0=truth.w0,
+        c_over_m=truth.c_over_m,
+        friction=truth.friction,
+        noise=math.degrees(experiment.SENSOR.noise),
+        counts=experiment.SENSOR.counts,
+        rate=_RATE,
+        plans=tuple(plans),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        where = virtual_rig.places(Path(folder) / "virtual_rig", replace=False)
+        virtual_rig.write(virtual_rig.make(request), where)
+        read = read_experiment(where.experiment)
+        return list(compare(model, read, ensemble=Ensemble(members=members)).forced)

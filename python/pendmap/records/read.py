@@ -1,0 +1,280 @@
+"""From a path to an experiment."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from pendmap.errors import InputError, check_number
+from pendmap.formatting import counted
+from pendmap.records import (
+    angle,
+    clock,
+    edges,
+    motion,
+    noise,
+    pivot,
+    resampled,
+    resolution,
+    samples,
+    scale,
+    signs,
+    trigger,
+    unmarked_peaks,
+)
+from pendmap.records.across import checked_together
+from pendmap.records.channels import Channels, channels_of
+from pendmap.records.description import ALONE, NAME, RunPlan, read_description
+from pendmap.records.experiment import Experiment, Finding, Run
+from pendmap.records.rod_sensors import gyroscope_of
+from pendmap.records.text import read_table
+from pendmap.records.work import Work
+
+if TYPE_CHECKING:
+    import os
+
+    from pendmap.records.description import Description
+    from pendmap.records.text import Table
+
+
+TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
+"""Suffixes of the files that are records in a folder without a description."""
+
+LEAST_RATE: Final = 1e-3
+MOST_RATE: Final = 1e9
+"""Hz that a record may have: one reading in a quarter of an hour to one in a nanosecond."""
+
+
+def files_of(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the files that an experiment is read from, without reading a record.
+
+    Parameters
+    ----------
+    path : str or path
+        As of :func:`read_experiment`.
+
+    Returns
+    -------
+    list of Path
+        The file, or ``experiment.toml`` and those that it names, which need not exist; without
+        one all that may be records.
+
+    Raises
+    ------
+    InputError
+        If the ``experiment.toml`` is none.
+    """
+    place = Path(path)
+    if not place.is_dir():
+        return [place]
+    if not (place / NAME).is_file():
+        return _tables(place)
+    plans = read_description(place / NAME).runs
+    return [place / NAME, *(place / file for file in dict.fromkeys(plan.file for plan in plans))]
+
+
+def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = None) -> Experiment:
+    """Read a record or a folder of records, and say what is odd about them.
+
+    A file (CSV, other text, Parquet, Excel) with a time and an angle is an experiment of one free
+    decay. A folder is one with an ``experiment.toml``; without it each of its files is a free
+    decay. Each free release of a file is a run of its own, named ``decay 1/3``. Nothing is written.
+    What is certain is mended (turns that a sensor wraps are unwrapped, milliseconds become seconds,
+    ...), and that is said; all else is only said.
+    ``Run.trusted`` marks the samples that are for fitting.
+
+    Parameters
+    ----------
+    path : str or path
+        The file or folder.
+    rate_hz : float, optional
+        Readings a second, Hz, for files without a column of times: ``t = k / rate_hz``. It goes
+        before ``rate_hz`` of [columns].
+
+    Returns
+    -------
+    Experiment
+        Its runs in SI: times in s, angles in rad from the downward rest.
+
+    Raises
+    ------
+    InputError
+        If there is no record in it, on one line that says what, where and what is allowed.
+    OSError
+        If a file cannot be read.
+
+    Examples
+    --------
+    >>> experiment = pendmap.read_experiment("lab")  # doctest: +SKIP
+    >>> experiment.runs[0].theta  # doctest: +SKIP
+    """
+    place = Path(path)
+    alone = ALONE if rate_hz is None else dataclasses.replace(ALONE, rate_hz=_rate(rate_hz))
+    if not place.is_dir():
+        found, findings = _runs(place, RunPlan(place.name), alone, {}, place.stem)
+        checked, together = checked_together(found)
+        digest = {place.name: found[0].sha256}
+        return Experiment(place, checked, {}, (*findings, *together), digest)
+    if not (place / NAME).is_file():
+        return _plain(place, alone)
+    description = read_description(place / NAME)
+    if rate_hz is not None:
+        description = dataclasses.replace(description, rate_hz=alone.rate_hz)
+    tables: dict[str, tuple[Table, str]] = {}
+    names = _names([plan.file for plan in description.runs])
+    runs: list[Run] = []
+    shared: list[Finding] = []
+    for count, (plan, name) in enumerate(zip(description.runs, names, strict=True), 1):
+        if not (place / plan.file).exists():
+            raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
+        found, findings = _runs(place / plan.file, plan, description, tables, name)
+        runs += found
+        shared += findings
+    digests = {run.file: run.sha256 for run in runs}
+    checked, together = checked_together(runs)
+    return Experiment(place, checked, description.known, (*shared, *together), digests)
+
+
+def _rate(value: float) -> float:
+    rate = check_number("rate_hz", value)
+    if not LEAST_RATE <= rate <= MOST_RATE:
+        raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
+    return rate
+
+
+def _tables(folder: Path) -> list[Path]:
+    """Return the files of a folder that may be records, in the order of their names."""
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in TABLES)
+    return [file for file in files if file.is_file() and not file.name.startswith((".", "~"))]
+
+
+def _plain(folder: Path, description: Description) -> Experiment:
+    """Read a folder without a description: each of its files is one free run."""
+    files = _tables(folder)
+    runs: list[Run] = []
+    text = f"no {NAME}: each file is taken for one free run, in the order of the names"
+    findings, refused = [Finding("no-description", text)], []
+    for file, name in zip(files, _names([file.name for file in files]), strict=True):
+        try:
+            found, shared = _runs(file, RunPlan(file.name), description, {}, name)
+        except InputError as error:
+            refused.append(str(error))
+            findings.append(Finding("file-left-out", f"left out: {error}"))
+            continue
+        runs += found
+        findings += shared
+    if not runs:
+        first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
+        count = counted(len(refused), "file")
+        raise InputError(
+            f"{folder}: has no {NAME}: there must be one, or files that are records, got"
+            f" {count}{first}"
+        )
+    checked, together = checked_together(runs)
+    digests = {run.file: run.sha256 for run in runs}
+    return Experiment(folder, checked, {}, (*findings, *together), digests)
+
+
+def _names(files: list[str]) -> list[str]:
+    """Name runs after their files, apart where several share one or a stem."""
+    stems = {file: file.rsplit(".", 1)[0] for file in files}
+    alike, every, before = Counter(stems.values()), Counter(files), Counter[str]()
+    names = []
+    for file in files:
+        before[file] += 1
+        name = stems[file] if alike[stems[file]] == 1 else file
+        names.append(f"{name} ({before[file]})" if every[file] > 1 else name)
+    return names
+
+
+def _runs(
+    path: Path,
+    plan: RunPlan,
+    description: Description,
+    tables: dict[str, tuple[Table, str]],
+    name: str,
+) -> tuple[list[Run], list[Finding]]:
+    """Return the runs of a file, one for each release, and what was found in none of them alone."""
+    if plan.file not in tables:
+        tables[plan.file] = read_table(path, description.reader)
+    table, digest = tables[plan.file]
+    channels = channels_of(table, description, plan, str(path))
+    work = Work.begin(str(path), plan, description.known, channels, table)
+    if plan.kind == "forced" and plan.drive is None and plan.pivot is None:
+        text = 'kind is "forced" and there is neither drive nor pivot: what drives it is not known'
+        work.say("drive-missing", text)
+    clock.mend(work)
+    work.cut(plan.from_s, plan.to_s)
+    if not work.peaks_only:
+        clock.cut_at_pauses(work)
+    unmarked_peaks.check(work, channels.columns)
+    angle.make(work)
+    if work.peaks_only:
+        # Their intervals are periods, no clock's.
+        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
+        work.refuse_short()
+        return [_run(work, name, channels, digest)], []
+    edges.check(work)
+    if work.edges:
+        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
+    else:
+        resampled.check(work)
+    samples.check(work)
+    moves = motion.moves(work)
+    if moves and work.made_of is None:
+        scale.check(work)
+    samples.say_steps(work)
+    edges.say(work)
+    if moves:
+        motion.check(work)
+        trigger.check_drive(work)
+        signs.check(work)
+        resolution.check(work)
+    pivot.smooth(work)
+    work.refuse_short()
+    works, shared = work.apart()
+    runs = []
+    for k, part in enumerate(works, 1):
+        if moves:
+            motion.check_zero(part)
+            noise.check(part)
+        own = f"{name} {k}/{len(works)}" if len(works) > 1 else name
+        runs.append(_run(part, own, channels, digest))
+    return runs, [dataclasses.replace(found, where=found.where or name) for found in shared]
+
+
+def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
+    plan = work.plan
+    gyroscope = None
+    if work.integrated:
+        gyroscope = gyroscope_of(work.time, work.theta, work.extra["velocity"])
+    return Run(
+        name=name,
+        file=plan.file,
+        kind=plan.kind,
+        time=work.time,
+        theta=work.theta,
+        trusted=work.trusted,
+        lab_time_s=plan.lab_time_s,
+        hold_out=plan.hold_out,
+        velocity=work.extra.get("velocity"),
+        acceleration=work.extra.get("acceleration"),
+        accelerometer=work.made_of,
+        gyroscope=gyroscope,
+        drive=plan.drive,
+        pivot=work.pivot(),
+        pivot_unit=work.pivot_unit,
+        findings=tuple(dataclasses.replace(f, where=f.where or name) for f in work.findings),
+        peaks_only=work.peaks_only,
+        segments=tuple(work.segments),
+        channels=_columns(channels),
+        unused=channels.unused,
+        count_rad=0.0 if work.edges else work.count,
+        sha256=digest,
+    )
+
+
+def _columns(channels: Channels) -> dict[str, str]:
+    return {channel: str(column) for channel, column in channels.columns.items()}

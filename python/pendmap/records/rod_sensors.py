@@ -1,0 +1,263 @@
+"""Where an accelerometer sits on the rod, and what it reads there.
+
+It measures the specific force, acceleration less gravity. At the distance r from the pivot that is
+
+    tangential, toward positive theta    r th'' + g sin(th)
+    radial, toward the pivot             r th'^2 + g cos(th)
+
+and where the phone has taken gravity out ("linear acceleration") the same without g. An angular
+acceleration th'' (two sensors, or a differentiated gyroscope) needs no place.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from pendmap.errors import InputError, check_flag, check_number, short_repr
+from pendmap.records.units import ANGULAR_ACCELERATIONS, plain, spelling
+from pendmap.signal.half_cycles import Swings, swings
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from pendmap.records.description import Column
+
+    Floats = NDArray[np.float64]
+
+
+LIKE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
+"""What a place looks like in [columns]."""
+
+DIRECTIONS: Final = ("tangential", "radial", "angular")
+_LONGEST: Final = 100.0
+
+Direction = Literal["tangential", "radial", "angular"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """What [columns] says of an accelerometer, as far as it says it."""
+
+    direction: Direction | None = None
+    distance_m: float | None = None
+    gravity_removed: bool | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Accelerometer:
+    """An accelerometer on the rod whose place is known.
+
+    Parameters
+    ----------
+    direction : str
+        ``"tangential"`` (toward positive theta), ``"radial"`` (toward the pivot) or ``"angular"``.
+    distance_m : float
+        From the pivot, m; 1 of an angular acceleration, whose readings are rad/s^2.
+    gravity : float
+        m/s^2; 0 where the readings are without it.
+    w0 : float
+        Natural frequency as the zero crossings of the readings show it, rad/s: it makes angles of
+        small readings. Not a number where no angle was made.
+    """
+
+    direction: Direction
+    distance_m: float
+    gravity: float
+    w0: float = math.nan
+
+    @property
+    def gain(self) -> float:
+        """Reading of a small free swing over its angle, ``g - r w0**2``; m/s^2 (or rad/s^2)."""
+        return self.gravity - self.distance_m * self.w0**2
+
+    @property
+    def unit(self) -> str:
+        """Of the readings."""
+        return "rad/s2" if self.direction == "angular" else "m/s2"
+
+
+def place_of(table: Mapping[str, object], where: str) -> Place:
+    """Return what a table of [columns] says of the place.
+
+    Raises
+    ------
+    InputError
+        If a value is none that it may be, or two exclude each other.
+    """
+    direction, distance = table.get("direction"), table.get("distance_m")
+    removed = table.get("gravity_removed")
+    if direction is not None and direction not in DIRECTIONS:
+        known = ", ".join(f'"{name}"' for name in DIRECTIONS)
+        shown = short_repr(direction)
+        raise InputError(f"{where}: direction must be one of {known}, got {shown}")
+    if distance is not None:
+        distance = check_number(f"{where}: distance_m", distance)
+        if not 0 < distance <= _LONGEST:
+            raise InputError(
+                f"{where}: distance_m must be more than 0, up to {_LONGEST:g}, from the pivot to"
+                f" the sensor in m, got {distance:g}"
+            )
+    if removed is not None:
+        removed = check_flag(f"{where}: gravity_removed", removed)
+    unit = table.get("unit")
+    if isinstance(unit, str) and "scale" not in table:
+        angular = spelling(unit) in ANGULAR_ACCELERATIONS
+        if angular and direction in {"tangential", "radial"}:
+            raise InputError(
+                f"{where}: unit must be m/s2 or g with direction {direction!r}, got {unit!r}, which"
+                ' needs direction = "angular"'
+            )
+        if direction == "angular" and not angular:
+            raise InputError(
+                f"{where}: unit must be rad/s2 or deg/s2 with direction 'angular', got {unit!r}"
+            )
+    return Place(direction, distance, removed)
+
+
+def accelerometer_of(
+    column: Column | None, unit: str | None, heading: str, gravity: float
+) -> tuple[Accelerometer | None, str]:
+    """Return the accelerometer of a column, or why its place is not known.
+
+    Parameters
+    ----------
+    column : Column or None
+        What [columns] says.
+    unit : str or None
+        Of the readings, as [columns] or the heading has it.
+    heading : str
+        Of the column: a "linear acceleration" is one without gravity.
+    gravity : float
+        m/s^2.
+    """
+    place = column.place if column else Place()
+    direction = place.direction
+    scaled = column is not None and column.scale is not None
+    if direction is None and not scaled and unit and spelling(unit) in ANGULAR_ACCELERATIONS:
+        direction = "angular"
+    if direction == "angular":
+        return Accelerometer("angular", 1.0, 0.0), ""
+    keys = {"direction": direction, "distance_m": place.distance_m}
+    missing = [key for key, value in keys.items() if value is None]
+    if direction is None or place.distance_m is None:
+        return None, " and ".join(missing)
+    removed = place.gravity_removed
+    if removed is None:
+        removed = re.match("linear", plain(heading)) is not None
+    return Accelerometer(direction, place.distance_m, 0.0 if removed else gravity), ""
+
+
+# A gyroscope alone: the angle that its rate integrates to, and what is not known of the sensor.
+#
+# It reads th' and a bias. White noise of the rate becomes a random walk of the integrated angle,
+# which no independent errors describe: a fit compares the rate, and the angle made here is where it
+# begins and what pictures show.
+
+
+OVER: Final = 4 * math.pi
+"""Radians from the middle from which a record turns over the top."""
+
+FEWEST: Final = 4
+"""Turning points that a drift is taken from."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Gyroscope:
+    """A gyroscope of whose readings alone the angle was made.
+
+    Parameters
+    ----------
+    w0 : float
+        Natural frequency, rad/s, as speeds in the middle of swings show it beside their angles: it
+        makes angles of readings.
+    bias : float
+        What it reads of nothing, rad/s, as the integrated angle drifts; not a number where no drift
+        was told from the motion. The fit has a bias of its own.
+    """
+
+    w0: float
+    bias: float = math.nan
+
+    @property
+    def gain(self) -> float:
+        """Reading of a small free swing over its angle, ``w0``; rad/s."""
+        return self.w0
+
+    @property
+    def unit(self) -> str:
+        """Of the readings."""
+        return "rad/s"
+
+
+def angle_of_rate(time: Floats, rate: Floats, good: NDArray[np.bool_] | None = None) -> Floats:
+    """Return the integral of a rate, rad, shape (N,): its zero is the middle of the swing.
+
+    A straight line that the sensor's bias adds is taken out. Of a record that turns over the top
+    neither is seen: there the last angle is 0.
+
+    Parameters
+    ----------
+    time, rate : ndarray, shape (N,)
+        s, increasing; rad/s.
+    good : ndarray of bool, shape (N,), optional
+        Which readings are not false; a spline passes the others over.
+    """
+    theta = _integral(time, rate, good)
+    if np.ptp(theta - np.median(theta)) > OVER:
+        return np.asarray(theta - theta[-1])
+    middle = _middles(time, theta)
+    if middle is None:
+        return np.asarray(theta - np.median(theta))
+    line = np.polyfit(*middle, 1)
+    return np.asarray(theta - np.polyval(line, time))
+
+
+def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
+    """Return what a rate and the angle of :func:`angle_of_rate` say of the sensor."""
+    found = swings(time, theta)
+    bias = math.nan
+    if np.ptp(theta - np.median(theta)) <= OVER and found.peak_time.size >= FEWEST:
+        # A line was taken out: by its slope readings are above the angle's own, but for false ones.
+        bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
+    return Gyroscope(_frequency(found, time, np.abs(rate - np.nan_to_num(bias))), bias)
+
+
+def _integral(time: Floats, rate: Floats, good: NDArray[np.bool_] | None) -> Floats:
+    from scipy.interpolate import CubicSpline
+
+    if good is not None and np.count_nonzero(good) > 1:
+        spline = CubicSpline(time[good], rate[good])
+        inside = np.clip(time, time[good][0], time[good][-1])
+        return np.asarray(spline.antiderivative()(inside))
+    return np.asarray(CubicSpline(time, rate).antiderivative()(time))
+
+
+def _middles(time: Floats, theta: Floats) -> tuple[Floats, Floats] | None:
+    """Return times and values halfway between turning points of either side."""
+    trend = np.polyval(np.polyfit(time, theta, 1), time)
+    found = swings(time, theta - trend)
+    if found.peak_time.size < FEWEST:
+        return None
+    peaks = found.peak + np.interp(found.peak_time, time, trend)
+    # Halves of (1, 2, 1): what the decay does to a plain mean of two turns cancels.
+    value = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
+    return found.peak_time[1:-1], value
+
+
+def _frequency(found: Swings, time: Floats, speed: Floats) -> float:
+    """Return ``w0`` from the energy of swings: th' = 2 w0 sin(A/2) where they pass the middle."""
+    size = np.abs(found.peak)
+    middle = (size[:-1] + size[1:]) / 2
+    swung = (size[:-1] < math.pi) & (size[1:] < math.pi)
+    if np.any(swung):
+        passing = np.interp(found.crossing[1:-1], time, speed)[swung]
+        return float(np.sum(passing) / np.sum(2 * np.sin(middle[swung] / 2)))
+    fastest = float(np.max(speed))  # it turns over the top from 2 w0 on
+    return fastest / 2 if fastest > 0 else 1.0

@@ -1,0 +1,1 @@
+"""Tools on sampled signals that know no pendulum."""

@@ -1,0 +1,110 @@
+"""Units: the one formula by which SI and numbers without dimensions become each other."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+TIME, VELOCITY, RATE = -1, 1, 1
+"""Powers of ``w0`` of a time, a velocity, and a rate like a Lyapunov exponent."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Units:
+    """What a result's numbers are counted in.
+
+    A number in SI is the one without dimensions times a power of ``w0``: times have the power -1
+    (``tau = w0 t``), velocities and exponents 1, accelerations 2. Angles are in rad either way.
+
+    Parameters
+    ----------
+    w0 : float
+        Natural frequency ``sqrt(g / l)`` in rad/s; 1 without dimensions.
+    si : bool
+        Whether results are in SI.
+    """
+
+    w0: float = 1.0
+    si: bool = False
+
+    def given(self, value: Any, power: float) -> Any:  # noqa: ANN401 (a number, or an array)
+        """Return a number without dimensions, or an array of them, in these units."""
+        return value * self.w0**power
+
+    def bare(self, value: Any, power: float) -> Any:  # noqa: ANN401 (likewise)
+        """Return a number in these units without dimensions."""
+        return value / self.w0**power
+
+    @property
+    def name(self) -> str:
+        """``SI`` or ``nondimensional``: the attribute ``units`` of a dataset."""
+        return "SI" if self.si else "nondimensional"
+
+    @property
+    def of_time(self) -> str:
+        """The unit of time."""
+        return "s" if self.si else "1 / w0"
+
+    @property
+    def of_velocity(self) -> str:
+        """The unit of velocity."""
+        return "rad/s" if self.si else "1"
+
+    @property
+    def of_rate(self) -> str:
+        """The unit of exponents."""
+        return "1/s" if self.si else "1 per tau"
+
+    @property
+    def derivative(self) -> str:
+        """The velocity as a derivative."""
+        return "dtheta/dt" if self.si else "dtheta/dtau"
+
+    @property
+    def clock(self) -> str:
+        """The symbol of time."""
+        return "t" if self.si else "tau"
+
+    def spoken(self, velocity: str) -> str:
+        """Return the text of a velocity with its unit, where it has one."""
+        return f"{velocity} rad/s" if self.si else velocity
+
+    def at(self, time: str) -> str:
+        """Return ``tau = 5`` or ``t = 5 s``."""
+        return f"{self.clock} = {self.seconds(time)}"
+
+    def seconds(self, time: str) -> str:
+        """Return the text of a time with its unit, where it has one."""
+        return f"{time} s" if self.si else time
+
+    @property
+    def per_time(self) -> str:
+        """What an exponent counts, in words."""
+        return "per second" if self.si else "per unit of tau"
+
+    @property
+    def own_period(self) -> str:
+        """What a period is where there is no drive: that of small swings."""
+        return "2 pi / w0" if self.si else "2 pi"
+
+    @property
+    def section(self) -> str:
+        """Where the stroboscopic section lies."""
+        period = f"2 pi / {'Omega' if self.si else 'omega'} ({self.own_period} without drive)"
+        return f"{self.clock} = 0 mod T, T = {period}, at the drive's phase"
+
+    @classmethod
+    def of(cls, attributes: Mapping[Any, Any]) -> Units:
+        """Return the units of a dataset with these attributes."""
+        if attributes.get("units") == SI:
+            return cls(float(attributes["w0"]), si=True)
+        return NONDIMENSIONAL
+
+
+SI: Final = Units(si=True).name
+NONDIMENSIONAL: Final = Units()
+"""Those of :class:`pendmap.Pendulum`."""

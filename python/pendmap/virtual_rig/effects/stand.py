@@ -1,0 +1,252 @@
+"""Effects of what the pivot stands on, and of the drive."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendmap.virtual_rig.effects.base import Effect, Motion, shape, size
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.virtual_rig.effects.base import Drive
+
+    Floats = NDArray[np.float64]
+
+
+def _recoil(motion: Motion, own: Floats, mode: tuple[float, float, float]) -> Floats:
+    """Acceleration of a lateral mode but for the part with th'', rad/s^2, shape (L, K).
+
+    ``x'' = -2 z wx x' - wx^2 x + mu v^2 sin th - mu th'' cos th``, lengths over that of the
+    pendulum; ``own`` holds ``x, x'``.
+    """
+    mu, wx, z = mode
+    x, rate = own[..., 0], own[..., 1]
+    return np.asarray(-2 * z * wx * rate - wx**2 * x + mu * motion.velocity**2 * motion.sin)
+
+
+@dataclass(frozen=True)
+class PivotCompliance(Effect):
+    """A pivot that gives way sideways, with a mode of its own, driven by the pendulum's pull."""
+
+    name = "pivot_compliance"
+    group = "stand"
+    formula = "-x'' cos th, x'' + 2 z wx x' + wx^2 x = -mu (th'' cos th - v^2 sin th)"
+    states = 2
+
+    mu: float = size(0.008, 0.03, "", most=0.3)
+    wx: float = shape(40.0, 80.0, "rad/s", least=1.0, most=1000.0)
+    z: float = shape(0.01, 0.05, "", least=0.0, most=2.0)
+
+    def _modes(self) -> list[tuple[float, float, float]]:
+        return [(self.mu, self.wx, self.z)]
+
+    def begin(self, motion: Motion) -> Floats:
+        # Pulled aside by the rod, and at rest.
+        pull = motion.sin * (motion.w0**2 * (1 + motion.vertical) * motion.cos + motion.velocity**2)
+        own = np.zeros((*motion.theta.shape, self.states))
+        for k, (mu, wx, _) in enumerate(self._modes()):
+            own[..., 2 * k] = mu * pull / wx**2
+        return own
+
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        total = np.zeros_like(motion.theta)
+        for k, mode in enumerate(self._modes()):
+            total -= _recoil(motion, own[..., 2 * k : 2 * k + 2], mode) * motion.cos
+        return total
+
+    def inertia(self, motion: Motion) -> Floats:
+        return -sum(mode[0] for mode in self._modes()) * motion.cos**2
+
+    def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
+        result = np.empty_like(own)
+        for k, mode in enumerate(self._modes()):
+            pair = own[..., 2 * k : 2 * k + 2]
+            pull = mode[0] * acceleration * motion.cos
+            result[..., 2 * k] = pair[..., 1]
+            result[..., 2 * k + 1] = _recoil(motion, pair, mode) - pull
+        return result
+
+
+@dataclass(frozen=True)
+class TwoModePivot(PivotCompliance):
+    """The same with two modes: the pivot's post, and the table under it."""
+
+    variant = "two_modes"
+    formula = "-(x1 + x2)'' cos th, each as in pivot_compliance, mu2 = share mu"
+    states = 4
+
+    share: float = shape(0.05, 0.2, "", least=0.0, most=1.0)
+    wx2: float = shape(28.0, 38.0, "rad/s", least=1.0, most=1000.0)
+    z2: float = shape(0.02, 0.08, "", least=0.0, most=2.0)
+
+    def _modes(self) -> list[tuple[float, float, float]]:
+        return [(self.mu, self.wx, self.z), (self.share * self.mu, self.wx2, self.z2)]
+
+
+@dataclass(frozen=True)
+class BaseSway(Effect):
+    """The floor sways sideways, steadily, whatever the pendulum does."""
+
+    name = "base_sway"
+    group = "stand"
+    formula = "-w0^2 amplitude cos(ws t + psi) cos th, t lab time"
+
+    amplitude: float = size(0.00017, 0.0007, "g")
+    ws: float = shape(2.0, 10.0, "rad/s", least=0.0, most=100.0)
+    psi: float = shape(-np.pi, np.pi, "rad")
+
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        sway = self.amplitude * np.cos(self.ws * motion.lab + self.psi)
+        return np.asarray(-(motion.w0**2) * sway * motion.cos)
+
+
+@dataclass(frozen=True)
+class Impulses(Effect):
+    """A knock against the rig: a jump of the velocity at a lab time."""
+
+    name = "impulses"
+    group = "stand"
+    formula = "v jumps by J at lab time t0"
+
+    J: float = size(0.01, 0.04, "rad/s")
+    t0: float = shape(3.0, 12.0, "s", least=0.0)
+
+    def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
+        return [(self.t0, self.J)] if begin < self.t0 < end else []
+
+
+@dataclass(frozen=True)
+class ImpulseTrain(Effect):
+    """Knocks about every ``every`` seconds of lab time, in either sense."""
+
+    name = "impulses"
+    variant = "train"
+    group = "stand"
+    formula = "v jumps by +J or -J at lab times t_k"
+
+    J: float = size(0.01, 0.04, "rad/s")
+    every: float = shape(10.0, 25.0, "s", least=0.1)
+    pattern: float = shape(0, 999_999, "", whole=True, least=0)
+
+    def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
+        # The pattern is a stream of its own, the same for every part of a run.
+        rng = np.random.default_rng(int(self.pattern))
+        found, time = [], 0.0
+        while time < end:
+            time += self.every * float(rng.uniform(0.3, 1.7))
+            jump = self.J * float(rng.choice((-1.0, 1.0)))
+            if begin < time < end:
+                found.append((time, jump))
+        return found
+
+
+class _DriveEffect(Effect):
+    group = "drive"
+    needs = "forced"
+    signed = True
+
+
+@dataclass(frozen=True)
+class DriveAmplitude(_DriveEffect):
+    """The drive's amplitude is not what the experiment says."""
+
+    name = "drive_amplitude"
+    formula = "p (1 + e)"
+
+    e: float = size(0.0015, 0.006, "", most=0.9)
+
+    def alter(self, drive: Drive, lab: Floats) -> Drive:
+        return dataclasses.replace(drive, p=drive.p * (1 + self.e))
+
+
+@dataclass(frozen=True)
+class DrivePhase(_DriveEffect):
+    """The drive is late or early, by the same phase in all runs."""
+
+    name = "drive_phase"
+    formula = "phi + d"
+
+    d: float = size(0.001, 0.004, "rad")
+
+    def alter(self, drive: Drive, lab: Floats) -> Drive:
+        return dataclasses.replace(drive, phase=drive.phase + self.d)
+
+
+@dataclass(frozen=True)
+class DriveFrequency(_DriveEffect):
+    """The drive's frequency is not what the experiment says."""
+
+    name = "drive_frequency"
+    formula = "Omega (1 + e)"
+
+    e: float = size(1e-05, 4e-05, "", most=0.9)
+
+    def alter(self, drive: Drive, lab: Floats) -> Drive:
+        return dataclasses.replace(drive, frequency=drive.frequency * (1 + self.e))
+
+
+@dataclass(frozen=True)
+class DriveChirp(_DriveEffect):
+    """The drive's frequency creeps during a run."""
+
+    name = "drive_chirp"
+    formula = "phase Omega t + r t^2/2 + phi"
+
+    r: float = size(1.5e-05, 6e-05, "rad/s^2")
+
+    def alter(self, drive: Drive, lab: Floats) -> Drive:
+        return dataclasses.replace(drive, chirp=np.full_like(drive.p, self.r))
+
+
+@dataclass(frozen=True)
+class DriveSecondHarmonic(_DriveEffect):
+    """A shaker that distorts: twice the frequency as well."""
+
+    name = "drive_second_harmonic"
+    formula = "a(t) + e p cos(2 (Omega t + phi) + phase)"
+    signed = False
+
+    e: float = size(0.0027, 0.011, "", most=10.0)
+    phase: float = shape(-math.pi, math.pi, "rad")
+
+    def alter(self, drive: Drive, lab: Floats) -> Drive:
+        phi = np.full_like(drive.p, self.phase)
+        return dataclasses.replace(drive, p_second=self.e * drive.p, phi_second=phi)
+
+
+@dataclass(frozen=True)
+class LateralDrive(_DriveEffect):
+    """A shaker that does not move straight: sideways as well."""
+
+    name = "lateral_drive"
+    formula = "-w0^2 e p cos(Omega t + phi + phase) cos th"
+    signed = False
+
+    e: float = size(0.0007, 0.003, "", most=10.0)
+    phase: float = shape(-math.pi, math.pi, "rad")
+
+    def alter(self, drive: Drive, lab: Floats) -> Drive:
+        phi = np.full_like(drive.p, self.phase)
+        return dataclasses.replace(drive, p_lateral=self.e * drive.p, phi_lateral=phi)
+
+
+STANDS: tuple[type[Effect], ...] = (
+    PivotCompliance,
+    TwoModePivot,
+    BaseSway,
+    Impulses,
+    ImpulseTrain,
+    DriveAmplitude,
+    DrivePhase,
+    DriveFrequency,
+    DriveChirp,
+    DriveSecondHarmonic,
+    LateralDrive,
+)
+"""All effects of this file, as they are listed."""
