@@ -26,6 +26,7 @@ from pendmap.diagnosis import diagnose
 from pendmap.figures import style
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
+from pendmap.paper.draw import draw_motions
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)
@@ -129,7 +130,7 @@ def planes() -> None:
 def forced() -> None:
     """A rig's runs that tumble beside the ensemble of the model that its decay gives."""
     model = paper_figures.report().methods["combined_repaired"].rig
-    figures.draw_motions(
+    draw_motions(
         paper_motions.tumbling(model),
         HERE / "tumbling.png",
         steady=False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 import html
 import math
 from typing import TYPE_CHECKING, Final
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     Table = tuple[Sequence[str], Sequence[Sequence[str]]]
-    from pendmap.identification.methods.base import Estimate
+    from collections.abc import Sequence
 
 
 DIGITS: Final = 5
@@ -137,3 +138,22 @@ def _estimate_text(estimate: Estimate) -> str:
     if places <= 0 or places > 15:  # noqa: PLR2004 (no digits left, or none needed)
         return f"{value:.5g} +- {error:.2g}"
     return f"{value:.{places}f}({round(error * 10**places)})"
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A number with its uncertainty.
+
+    Parameters
+    ----------
+    value : float
+        In SI.
+    stderr : float or None
+        Its standard error, where the method gives one.
+    ci95 : tuple of float or None
+        Its 95 % interval, where the method gives one; it need not be symmetric.
+    """
+
+    value: float
+    stderr: float | None = None
+    ci95: tuple[float, float] | None = None

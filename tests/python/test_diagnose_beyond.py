@@ -13,7 +13,7 @@ import pendmap.diagnosis
 from hidden import once
 from pendmap import InputError, _core, figures, viewer
 from pendmap.cli.show import plain
-from pendmap.diagnosis import Discrepancy, diagnosed_model, summary
+from pendmap.diagnosis import Discrepancy, diagnosed_model, result, summary
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -66,7 +66,7 @@ def test_what_cannot_be_computed_is_null_with_its_reason(
     if share == 1.0:
         assert told["next_experiment"] is None
         assert {name.partition(".")[0] for name in unknown} >= {"forecast", "cycles", "proposals"}
-    text = "\n".join(summary.as_text(found))
+    text = "\n".join(result.as_text(found))
     assert "Verdict: named" in text
     for name in unknown:
         assert f"Not computed: {name}: " in text
@@ -113,6 +113,6 @@ def test_what_differs_from_run_to_run_is_said_and_widens_intervals(tmp_path: Pat
     found = pendmap.diagnosis.diagnose(pendmap.read_experiment(tmp_path))
     assert found.verdict in {"unknown", "partial"}
     assert found.runs.between("w0") == pytest.approx(w0.std(ddof=1), rel=0.2)
-    assert any(line.startswith("w0 differs from run to run by ") for line in summary.as_text(found))
+    assert any(line.startswith("w0 differs from run to run by ") for line in result.as_text(found))
     between = diagnosed_model(found).notes["covariance"]["between_runs"]
     assert between["w0"] == found.runs.between("w0")

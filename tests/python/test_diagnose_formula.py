@@ -14,7 +14,7 @@ from bumpy import BUMP, FILE, experiment, torque
 from pendmap import Formula, InputError, Rig, load_formulas, load_model
 from pendmap.diagnosis import TorqueFunction, diagnose
 from pendmap.diagnosis.functions import call_once
-from pendmap.diagnosis.summary import as_text
+from pendmap.diagnosis.result import as_text
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:

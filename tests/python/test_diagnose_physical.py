@@ -17,7 +17,8 @@ from pendmap.diagnosis import diagnose, diagnosed_model
 from pendmap.diagnosis.candidates import Candidate
 from pendmap.diagnosis.fitted_model import Trial, fitted
 from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.summary import as_json, as_text
+from pendmap.diagnosis.result import as_text
+from pendmap.diagnosis.summary import as_json
 from pendmap.errors import InputError
 from pendmap.model import Effect, Rig, save_model
 from pendmap.records import Experiment, Run, read_experiment

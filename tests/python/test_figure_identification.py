@@ -22,10 +22,11 @@ from pendmap.figures import style
 from pendmap.figures.decrements import triplets_of
 from pendmap.figures.half_cycles import course_of
 from pendmap.figures.sides import signed_log_axis
+from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
 from pendmap.identification.methods.decrement import recursion
-from pendmap.identification.summary import with_error
 from pendmap.paper import drawings
+from pendmap.paper.draw import draw_pendulum
 from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ def test_files_are_whole(tmp_path: Path) -> None:
 
 
 def test_the_pendulum(tmp_path: Path) -> None:
-    assert figures.draw_pendulum(tmp_path / "a.png").stat().st_size > 5000
+    assert draw_pendulum(tmp_path / "a.png").stat().st_size > 5000
     for size in (None, (9.0, 5.6), (5.6, 8.0)):
         with rc_context(style.RC):
             figure = drawings.figure(size=size, dpi=100.0)
@@ -212,7 +213,7 @@ def test_the_table_says_what_was_found() -> None:
     assert [len(row) for row in rows] == [len(identification.columns(found))] * len(rows)
     assert rows[0][0] == "trajectory"
     assert float(rows[0][1].partition("(")[0]) == pytest.approx(6.2, abs=1e-3)
-    said = with_error(Estimate(-0.0123456, 0.00123), minus=identification.MINUS)
+    said = estimate_text(Estimate(-0.0123456, 0.00123), minus=identification.MINUS)
     assert said == "\u22120.0123(12)"
 
 

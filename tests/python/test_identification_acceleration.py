@@ -15,7 +15,7 @@ from pendmap import InputError, figures
 from pendmap.comparison.data import evidence_of
 from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify, identify_experiment
-from pendmap.identification.summary import as_json, as_text
+from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment
 
 if TYPE_CHECKING:

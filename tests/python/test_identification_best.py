@@ -12,7 +12,7 @@ from decays import decay, record
 from pendmap import InputError
 from pendmap.formatting import interval
 from pendmap.identification import Estimate, identified_model, identify_experiment
-from pendmap.identification.summary import as_json, as_text
+from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment, Run
 
 

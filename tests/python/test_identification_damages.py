@@ -10,7 +10,7 @@ import pytest
 import pendmap
 from damages import DAMAGES
 from pendmap.identification import identified_model, identify_experiment
-from pendmap.identification.summary import as_json, as_text, methods_table, table1_table
+from pendmap.identification.report import as_json, as_text, methods_table, table1_table
 from test_records_damaged import one_line, sound
 
 if TYPE_CHECKING:

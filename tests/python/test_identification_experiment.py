@@ -14,7 +14,7 @@ from driven_decays import motion
 from pendmap import InputError
 from pendmap.diagnosis import diagnose
 from pendmap.identification import find_peaks, identify, identify_experiment
-from pendmap.identification.experiment import left_out
+from pendmap.identification.report import left_out
 from pendmap.records import Experiment, Run
 
 WIDE = decay()

@@ -12,11 +12,11 @@ import pytest
 from click.testing import CliRunner
 
 import pendmap
-from pendmap import figures, virtual_rig
+from pendmap import virtual_rig
 from pendmap.cli.paper import command
+from pendmap.paper import draw as tumbling
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
-from pendmap.paper import tumbling
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -164,7 +164,7 @@ def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
         assert one.steady.reached[0].share == 1.0
         assert abs(one.steady.overestimate) < 0.01
         assert one.steady.rms < 0.02
-    figures.draw_motions(runs, tmp_path / "8.svg", steady=True, title="Steady", subtitle="rig")
+    tumbling.draw_motions(runs, tmp_path / "8.svg", steady=True, title="Steady", subtitle="rig")
     drawn = (tmp_path / "8.svg").read_text()
     assert drawn.count("rotation 1:1") == 2
     assert "identified model" in drawn
@@ -188,7 +188,7 @@ def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path
         assert 10 < settled.median < 250
         assert np.isinf(settled.ensemble).mean() < 0.05
         assert 10 < settled.measured < 300
-    figures.draw_motions(runs, tmp_path / "9.svg", steady=False, title="Tumbling", subtitle="rig")
+    tumbling.draw_motions(runs, tmp_path / "9.svg", steady=False, title="Tumbling", subtitle="rig")
     drawn = (tmp_path / "9.svg").read_text()
     assert drawn.count("record (95 % of the ensemble)") == 2
     assert drawn.count("a member") >= 4

@@ -15,8 +15,8 @@ from pendmap import virtual_rig
 from pendmap.comparison.data import evidence_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
+from pendmap.diagnosis.diagnose import diagnosed_model
 from pendmap.diagnosis.fitted_model import with_candidates
-from pendmap.diagnosis.named import diagnosed_model
 from pendmap.identification.fit import FitRun, fit_runs, score
 from pendmap.identification.sensitivity import sensitivities, window_slopes
 from pendmap.model import Formula, Rig, load_model, save_model

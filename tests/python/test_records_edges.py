@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import pendmap
 from decays import Decay, decay
 from pendmap.identification import identify_experiment
-from pendmap.identification.summary import as_json
+from pendmap.identification.report import as_json
 from recorded import clean, found, read, text
 
 if TYPE_CHECKING:

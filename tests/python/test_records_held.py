@@ -13,7 +13,8 @@ from accelerations import GRAVITY, SENSORS, TRUTH, column, experiment, handled, 
 from pendmap import InputError
 from pendmap.comparison import compare
 from pendmap.comparison import free as compared
-from pendmap.identification import identify_experiment, summary
+from pendmap.identification import identify_experiment
+from pendmap.identification import report as summary
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -18,7 +18,7 @@ from pendmap.comparison.free import as_text as compared_text
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.methods.joint import as_fit_run
 from pendmap.identification.readings import reading_of
-from pendmap.identification.summary import as_json, as_text
+from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment, Run
 from recorded import TR, W0, C, clean, experiment, found, motion, noisy, text
 from released import Released, released

@@ -213,17 +213,20 @@ def in_picture(
 # few harmonics that matter, and those which are not resonant are eliminated: what the methods of
 # Struble, of averaging and of multiple scales give at the same order.
 #
-# **First tongue**, about ``omega = 2``: ``th = A cos(omega tau/2) + B sin(omega tau/2)`` alone gives
+# **First tongue**, about ``omega = 2``: ``th = A cos(omega tau/2) + B sin(omega tau/2)`` alone
+# gives
 #
 # ``a^2 + c^2 = p^2/4``, ``a = 1 - omega^2/4``, ``c = gamma omega/2``: first order.
 #
-# The third harmonic answers with ``C = (p/2) A / (9 omega^2/4 - 1)`` and acts back with ``(p/2) C``,
+# The third harmonic answers with ``C = (p/2) A / (9 omega^2/4 - 1)`` and acts back with ``(p/2)
+# C``,
 # which adds ``k p^2``, ``k = 1/(9 omega^2 - 4)``, to ``a``: second order,
 #
 # ``(a + k p^2)^2 + c^2 = p^2/4``.
 #
 # **Second tongue**, about ``omega = 1``: ``th = C0 + A cos(omega tau) + B sin(omega tau)`` and the
-# second harmonic. ``C0 = -(p/2) A`` takes ``p^2/2`` off the stiffness of the cosine alone, the second
+# second harmonic. ``C0 = -(p/2) A`` takes ``p^2/2`` off the stiffness of the cosine alone, the
+# second
 # harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
 #
 # ``(a - (1/2 - s) p^2)(a + s p^2) + c^2 = 0``, ``a = 1 - omega^2``, ``c = gamma omega``: second

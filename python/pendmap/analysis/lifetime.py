@@ -92,7 +92,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Draws the starts.
     draws : int, optional
         How many models are drawn from the model's ``[covariance]``, each computed too: the
-        interval of the mean lifetime (:func:`pendmap.analysis.draws.lifetime.lifetime_over`). ``seed``
+        interval of the mean lifetime (``analysis.draws.lifetime``). ``seed``
         draws them.
     progress : callable, optional
         Called now and then with what is done and in all.

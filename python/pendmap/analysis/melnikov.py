@@ -64,7 +64,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
 
     *A torque that keeps up a rotation*, as it gives more in a turn than the losses take, belongs to
     the pendulum without losses: in the tilted potential the orbit is the loop from upright rest
-    ``pi - asin(torque)`` into the well and back (:func:`pendmap.analysis.melnikov.loop`). The formula
+    ``pi - asin(torque)`` into the well and back (:func:`loop`). The formula
     above stands beside it: there manifolds of neighbouring upright rests cross (heteroclinic), to
     first order in the torque too. Under damping the limit of a small torque is that formula. The
     loop has no limit: its two ways interfere with a phase that grows as ``omega ln(1/torque)``.

@@ -106,7 +106,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
         How many models are drawn from the model's ``[covariance]``, each computed too: how
-        probable each regime is in each cell (:func:`pendmap.analysis.draws.parameter_map.regimes_over`). ``seed``
+        probable each regime is in each cell (``analysis.draws.parameter_map``). ``seed``
         draws them.
     progress : callable, optional
         Called now and then with the number of cells done and in all.

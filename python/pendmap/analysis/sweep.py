@@ -22,8 +22,8 @@ from pendmap.errors import (
     short_repr,
 )
 from pendmap.model import without_dimensions
-from pendmap.model.quantities import check
-from pendmap.model.rig import COUNTERPARTS, Rig
+from pendmap.model.quantities import COUNTERPARTS, check
+from pendmap.model.rig import Rig
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:

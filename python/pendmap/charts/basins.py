@@ -12,7 +12,7 @@ from pendmap.charts import names
 from pendmap.errors import InputError
 from pendmap.formatting import counted, with_error
 from pendmap.model import effects_of
-from pendmap.model.rig import COUNTERPARTS
+from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
 
 if TYPE_CHECKING:

@@ -206,7 +206,7 @@ def _files(
 
 
 def _say(found: Discrepancy) -> None:
-    from pendmap.diagnosis.summary import as_text, ranking_table
+    from pendmap.diagnosis.result import as_text, ranking_table
 
     for line in as_text(found):
         click.echo(line)

@@ -100,7 +100,7 @@ def _files(
 
 def _show(report: IdentificationReport, outputs: Outputs, model: str | None = None) -> None:
     if outputs.as_json:
-        from pendmap.identification.summary import as_json
+        from pendmap.identification.report import as_json
 
         fields = as_json(report) | {"model": model, "simd": instruction_set()}
         click.echo(json.dumps(plain(fields), allow_nan=False))
@@ -109,7 +109,7 @@ def _show(report: IdentificationReport, outputs: Outputs, model: str | None = No
 
 
 def _say(report: IdentificationReport) -> None:
-    from pendmap.identification.summary import as_text, foremost, methods_table, table1_table
+    from pendmap.identification.report import as_text, foremost, methods_table, table1_table
 
     doubts = [f"Warning: {text}" for text in foremost(report)]
     for line in doubts:

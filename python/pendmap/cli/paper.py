@@ -104,7 +104,7 @@ def _write_table(seed: int, path: Path) -> Path:
 def _say(found: IdentificationReport) -> None:
     """Print what each method finds, what its simulation misses, and the paper's table."""
     from pendmap.cli.show import write_table
-    from pendmap.identification.summary import methods_table, table1_table
+    from pendmap.identification.report import methods_table, table1_table
     from pendmap.paper import figures
 
     for head, rows in (methods_table(found), table1_table(found), figures.printed_table()):

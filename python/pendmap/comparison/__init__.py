@@ -1,4 +1,4 @@
-"""A model against records that it was not fitted to: decays, forced runs, forecasts, periods, peaks.
+"""A model against records that it was not fitted to: decays, forced runs, forecasts, peaks.
 
 ``free`` and ``forced`` compare a model file with an experiment.
 

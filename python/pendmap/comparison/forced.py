@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
-    from pendmap.identification.methods.base import Estimate
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig

@@ -16,9 +16,9 @@ from pendmap.errors import (
     check_type,
     check_whole,
 )
-from pendmap.formatting import Readable, counted
+from pendmap.formatting import Estimate, Readable, counted
 from pendmap.identification.fit import TrajectoryFit, fit_runs
-from pendmap.identification.methods.base import Estimate, Identification
+from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.joint import as_fit_run, reading_of_run
 from pendmap.identification.methods.trajectory import OFFSET
 from pendmap.identification.peaks import Peaks, find_peaks

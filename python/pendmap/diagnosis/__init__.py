@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from pendmap.diagnosis.diagnose import Discrepancy, diagnose
+from pendmap.diagnosis.diagnose import diagnose, diagnosed_model
 from pendmap.diagnosis.functions import FunctionScore, TorqueFunction
-from pendmap.diagnosis.named import NamedEffect, diagnosed_model
+from pendmap.diagnosis.named import NamedEffect
+from pendmap.diagnosis.result import Discrepancy
 
 __all__ = [
     "Discrepancy",

@@ -14,7 +14,7 @@ from pendmap.diagnosis.refit import best_of
 from pendmap.diagnosis.refit import without as leave_out
 from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fit import fit_runs
-from pendmap.identification.start import starting_values
+from pendmap.identification.methods.start import starting_values
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.rig import own_name

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
-from pendmap.identification.experiment import DRAG
+from pendmap.identification.report import DRAG
 from pendmap.model.effects import Effect, definition, is_shape, library, middle
 from pendmap.model.formula import Formula
 from pendmap.model.rig import own_name

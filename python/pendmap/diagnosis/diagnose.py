@@ -4,176 +4,38 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import functools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
-from pendmap.comparison.cycles import Cycles, cycles_of
-from pendmap.comparison.data import Evidence, evidence_of
-from pendmap.comparison.forecast import Forecast, Gap, forecasts_of, gap_of
+import numpy as np
+
+from pendmap.comparison.data import evidence_of
+from pendmap.comparison.forecast import gap_of
 from pendmap.comparison.further import Reasons, attempted
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import checked_own
-from pendmap.diagnosis.functions import FunctionScore, call_once, divided, function_scores
-from pendmap.diagnosis.named import NamedEffect, named_effects
-from pendmap.diagnosis.next_experiment.limits import Advice, advice_of
+from pendmap.diagnosis.functions import call_once, divided, function_scores
+from pendmap.diagnosis.named import named_effects
 from pendmap.diagnosis.physical import within_physics
+from pendmap.diagnosis.result import MOST_EFFECTS, Discrepancy
 from pendmap.diagnosis.scores import Scores
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.diagnosis.verdict import Judgement, judge
+from pendmap.diagnosis.verdict import judge
 from pendmap.errors import FitDiverged, InputError
-from pendmap.formatting import Readable
+from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
-from pendmap.model.effects import definition
+from pendmap.model.rig import own_name
 from pendmap.records.summary import unit_wrong
-from pendmap.residuals.by_run import RunByRun, run_by_run
+from pendmap.residuals.by_run import run_by_run
 from pendmap.residuals.torque import Torque, residual_torque, standing_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
 
     from pendmap.diagnosis.functions import TorqueFunction
-    from pendmap.diagnosis.search import Attempt
-    from pendmap.diagnosis.state import Found
-    from pendmap.model import Formula, Rig
+    from pendmap.model import Effect, Formula, Rig
     from pendmap.records import Experiment
-
-MOST_EFFECTS: Final = 3
-"""So many effects are added at most."""
-
-
-@dataclasses.dataclass(frozen=True, repr=False)
-class Discrepancy(Readable):
-    """Where model and records disagree, and why.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        The records: fitted and held back.
-    base, best : Found
-        The model to begin with and the best one; of verdicts ``none`` and ``unknown`` the best one
-        claims no effect.
-    nearest : Found
-        The best that candidates can do, claimed or not.
-    judgement : Judgement
-        Verdict and what it rests on.
-    effects : tuple of NamedEffect
-        The effects that are named.
-    gap : Gap
-        Before and after.
-    torque_before, torque_after : Torque
-        What the models lack.
-    where : list of dict
-        Bins in which the torque that the baseline lacks stands out.
-    runs : RunByRun
-        Parameters run by run.
-    scores : Scores
-        Of all candidates at the baseline.
-    attempts : tuple of Attempt
-        Candidates that were refitted.
-    beside : Scores
-        Of all others at the best model.
-    level : float
-        Of the noise: by what sums of squares are divided.
-    without : tuple of str
-        Effects that were no candidates.
-    most : int
-        How many effects could be added.
-    own : tuple of Formula
-        Candidates of the user's own beside the library's.
-    functions : tuple of FunctionScore
-        What Python functions of the user explain, to first order.
-    reasons : dict of str to str
-        Why a part beside the verdict could not be computed, by its field in the JSON object; see
-        :attr:`not_computed`.
-    """
-
-    evidence: Evidence
-    base: Found
-    best: Found
-    nearest: Found
-    judgement: Judgement
-    effects: tuple[NamedEffect, ...]
-    gap: Gap
-    torque_before: Torque
-    torque_after: Torque
-    where: list[dict[str, Any]]
-    runs: RunByRun
-    scores: Scores
-    attempts: tuple[Attempt, ...]
-    beside: Scores
-    level: float
-    without: tuple[str, ...] = ()
-    most: int = MOST_EFFECTS
-    own: tuple[Formula, ...] = ()
-    functions: tuple[FunctionScore, ...] = ()
-    reasons: Reasons = dataclasses.field(default_factory=dict)
-
-    def definition(self, name: str) -> dict[str, Any]:
-        """What the library, or the user's formula, says about a candidate."""
-        return next((f.entry for f in self.own if f.name == name), None) or definition(name)
-
-    def __repr__(self) -> str:
-        names = ", ".join(effect.name for effect in self.effects)
-        gap = f"rms {self.gap.before:.3g} to {self.gap.after:.3g} rad"
-        said = f"{self.verdict}: {names}" if names else self.verdict
-        path = self.evidence.experiment.path.name
-        return f"<Discrepancy {path}: {said}; {gap}, noise {self.gap.noise_floor:.3g}>"
-
-    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
-        """Return the table and the lines that ``pendmap diagnose`` prints."""
-        from pendmap.diagnosis import summary  # noqa: PLC0415 (it is of diagnoses)
-
-        return [summary.ranking_table(self)], list(summary.as_text(self))
-
-    @property
-    def verdict(self) -> str:
-        """``none``, ``named``, ``partial``, ``ambiguous`` or ``unknown``."""
-        return self.judgement.verdict
-
-    @property
-    def equivalent(self) -> list[list[str]]:
-        """Classes of effects that these records do not tell apart, of those that are named."""
-        if not self.effects:
-            return []
-        classes = (standing.equivalent for standing in self.judgement.standings)
-        return [names for names in classes if len(names) > 1]
-
-    @property
-    def adds(self) -> bool:
-        """Whether the best model is another than the baseline."""
-        return self.best is not self.base
-
-    @functools.cached_property
-    def not_computed(self) -> Reasons:
-        """Why a part beside the verdict could not be computed, by its field in the JSON object."""
-        for part in (self.forecasts, self.advice, self.cycles):
-            del part
-        return self.reasons
-
-    @functools.cached_property
-    def forecasts(self) -> tuple[Forecast, ...]:
-        """How the error of both models grows with the horizon, on what was held back."""
-        return forecasts_of(self.evidence, self.base.fits, self.best.fits, self.reasons)
-
-    @functools.cached_property
-    def advice(self) -> Advice:
-        """What to record next, and what these records would have shown."""
-        return advice_of(
-            self.evidence,
-            self.best,
-            self.nearest,
-            self.judgement,
-            self.beside,
-            self.level,
-            self.reasons,
-        )
-
-    @functools.cached_property
-    def cycles(self) -> tuple[Cycles, ...]:
-        """Periods and peaks of each free run against those of both models."""
-        return cycles_of(self.evidence, self.base.fits, self.best.fits, self.reasons)
 
 
 def diagnose(  # noqa: PLR0913 (each is asked for by name)
@@ -295,3 +157,64 @@ def _followed(experiment: Experiment) -> Iterator[None]:
             f"{experiment.path}: no model follows these records: {error}. A run under a drive "
             'must have the drive, in an experiment.toml: kind = "forced"'
         ) from None
+
+
+def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
+    """Return the model of a diagnosis with the notes of its file.
+
+    Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
+    fitted, widened as those intervals are, and ``between_runs`` in it the standard deviation of
+    each parameter that differs between runs by more than its error; ``[provenance]`` the records
+    with their SHA-256, the version, the command, the verdict and which coefficients are held at 0.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        As of :func:`pendmap.diagnosis.diagnose`.
+    command : str
+        How it was called.
+    """
+    fit = found.best.trial.fit
+    model = fit.model
+    covariance = found.best.trial.widening * fit.covariance
+    named = {effect.name: effect.effect for effect in found.effects}
+    own = {own_name(name) for name in named} - {None}
+    kept = tuple(e for e in model.effects if e.name not in named)
+    runs = [found.evidence.runs[k] for k in dict.fromkeys(found.evidence.fitted_of)]
+    sha256 = found.evidence.experiment.sha256
+    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
+    notes: dict[str, Any] = {
+        "covariance": {
+            "names": [_called(name, named) for name in fit.names],
+            "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
+            "between_runs": {
+                _called(name, named): between
+                for name in fit.names
+                if "[" not in name and (between := found.runs.between(name)) > 0
+            },
+        },
+        "provenance": provenance(files, command, rms=found.gap.after, noise=found.gap.noise_floor)
+        | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
+    }
+    if found.best.trial.zeroed:
+        notes["provenance"]["set_to_zero"] = list(found.best.trial.zeroed)
+    return dataclasses.replace(
+        model,
+        **{name: 0.0 for name in own if name is not None},
+        effects=(*kept, *named.values()),
+        Omega=0.0
+        if model.p == 0 and not any(e.drives for e in (*kept, *named.values()))
+        else (model.Omega or 1.0),
+        notes=notes,
+    )
+
+
+def _called(name: str, named: dict[str, Effect]) -> str:
+    for effect in named.values():
+        if own_name(effect.name) == name:
+            return f"{effect.name}.{next(iter(effect.parameters))}"
+    return name
+
+
+def _held(found: Discrepancy) -> list[str]:
+    return list(dict.fromkeys(run.name for run in found.evidence.held))

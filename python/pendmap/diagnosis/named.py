@@ -6,11 +6,8 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from pendmap.comparison.further import Reasons, attempted
 from pendmap.diagnosis.refit import Z95, elsewhere, profiles
-from pendmap.identification.experiment import provenance
 from pendmap.identification.parameters import interval
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
@@ -18,12 +15,11 @@ from pendmap.records.summary import doubted
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.diagnose import Discrepancy
     from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.scores import Score
     from pendmap.diagnosis.state import Found, State
     from pendmap.diagnosis.verdict import Judgement
-    from pendmap.model import Formula, Rig
+    from pendmap.model import Formula
     from pendmap.residuals.by_run import RunByRun
 
 
@@ -144,64 +140,3 @@ def values_of(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict
     if candidate.phase is not None:
         values[candidate.phase] = math.remainder(values[candidate.phase], math.tau)
     return values, errors
-
-
-def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
-    """Return the model of a diagnosis with the notes of its file.
-
-    Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
-    fitted, widened as those intervals are, and ``between_runs`` in it the standard deviation of
-    each parameter that differs between runs by more than its error; ``[provenance]`` the records
-    with their SHA-256, the version, the command, the verdict and which coefficients are held at 0.
-
-    Parameters
-    ----------
-    found : Discrepancy
-        As of :func:`pendmap.diagnosis.diagnose`.
-    command : str
-        How it was called.
-    """
-    fit = found.best.trial.fit
-    model = fit.model
-    covariance = found.best.trial.widening * fit.covariance
-    named = {effect.name: effect.effect for effect in found.effects}
-    own = {own_name(name) for name in named} - {None}
-    kept = tuple(e for e in model.effects if e.name not in named)
-    runs = [found.evidence.runs[k] for k in dict.fromkeys(found.evidence.fitted_of)]
-    sha256 = found.evidence.experiment.sha256
-    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
-    notes: dict[str, Any] = {
-        "covariance": {
-            "names": [_called(name, named) for name in fit.names],
-            "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
-            "between_runs": {
-                _called(name, named): between
-                for name in fit.names
-                if "[" not in name and (between := found.runs.between(name)) > 0
-            },
-        },
-        "provenance": provenance(files, command, rms=found.gap.after, noise=found.gap.noise_floor)
-        | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
-    }
-    if found.best.trial.zeroed:
-        notes["provenance"]["set_to_zero"] = list(found.best.trial.zeroed)
-    return dataclasses.replace(
-        model,
-        **{name: 0.0 for name in own if name is not None},
-        effects=(*kept, *named.values()),
-        Omega=0.0
-        if model.p == 0 and not any(e.drives for e in (*kept, *named.values()))
-        else (model.Omega or 1.0),
-        notes=notes,
-    )
-
-
-def _called(name: str, named: dict[str, Effect]) -> str:
-    for effect in named.values():
-        if own_name(effect.name) == name:
-            return f"{effect.name}.{next(iter(effect.parameters))}"
-    return name
-
-
-def _held(found: Discrepancy) -> list[str]:
-    return list(dict.fromkeys(run.name for run in found.evidence.held))

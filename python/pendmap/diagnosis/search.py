@@ -18,13 +18,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING
 
 from pendmap.diagnosis.baseline import follows
 from pendmap.diagnosis.prune import pruned
 from pendmap.diagnosis.refit import key_of
+from pendmap.diagnosis.state import Attempt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -123,21 +123,6 @@ def _promising(state: State, rest: Trial) -> tuple[list[list[int]], list[list[in
 
 
 # What a search has tried.
-
-
-@dataclasses.dataclass(frozen=True)
-class Attempt:
-    """Candidates that were fitted, and whether they were accepted."""
-
-    names: tuple[str, ...]  # The effects
-    shape: dict[str, float]  # Of the first, without dimensions
-    score: float  # Gain that the score promises, in independent readings
-    # Fall of the cost: of the sum of squares in independent readings with Schwarz's penalty.
-    gain: float
-    # Least fall on a held-out set, in independent readings; none where it was not asked for.
-    held_gain: float | None
-    accepted: bool  # Whether the search went on from there
-    stage: int  # Number of effects of the model without them
 
 
 def core_attempt(state: State, core: Trial, *, accepted: bool) -> Attempt:

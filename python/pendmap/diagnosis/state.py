@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     from pendmap.comparison.data import Evidence
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Trial
-    from pendmap.diagnosis.search import Attempt
+    from pendmap.diagnosis.refit import Key
     from pendmap.diagnosis.thresholds import Thresholds
     from pendmap.model import Formula
+
 
 SAME: Final = 0.2
 """Part of a standard error by which an error of the model may change and readings keep their
@@ -307,3 +308,18 @@ class State:
         pairs = zip(self.sets(best), self.sets(other), strict=False)
         most = self.thresholds.alike * max(best.level, self.level)
         return all(more - less <= most for less, more in pairs)
+
+
+@dataclasses.dataclass(frozen=True)
+class Attempt:
+    """Candidates that were fitted, and whether they were accepted."""
+
+    names: tuple[str, ...]  # The effects
+    shape: dict[str, float]  # Of the first, without dimensions
+    score: float  # Gain that the score promises, in independent readings
+    # Fall of the cost: of the sum of squares in independent readings with Schwarz's penalty.
+    gain: float
+    # Least fall on a held-out set, in independent readings; none where it was not asked for.
+    held_gain: float | None
+    accepted: bool  # Whether the search went on from there
+    stage: int  # Number of effects of the model without them

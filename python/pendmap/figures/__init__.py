@@ -31,7 +31,6 @@ from pendmap.figures.of_records import (
 )
 from pendmap.figures.runs import RunPanel
 from pendmap.figures.written import SUFFIXES, written
-from pendmap.paper.tumbling import draw_motions, draw_pendulum, draw_tongues, draw_tumbling
 
 if TYPE_CHECKING:
     import os
@@ -46,12 +45,8 @@ __all__ = [
     "draw_comparison",
     "draw_discrepancy",
     "draw_identification",
-    "draw_motions",
-    "draw_pendulum",
     "draw_record",
     "draw_runs",
-    "draw_tongues",
-    "draw_tumbling",
     "write_report",
 ]
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pendmap.identification.experiment import (
-    IdentificationReport,
-    identified_model,
-    identify_experiment,
-)
-from pendmap.identification.methods.base import Estimate, Identification
+from pendmap.formatting import Estimate
+from pendmap.identification.experiment import identified_model, identify_experiment
+from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.registry import METHODS, Method, identify
+from pendmap.identification.methods.start import StartingValues, global_start, starting_values
 from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.identification.start import StartingValues, global_start, starting_values
+from pendmap.identification.report import IdentificationReport
 from pendmap.identification.table1 import PeakErrors, Row, Table1, table1
 
 __all__ = [

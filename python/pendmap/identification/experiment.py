@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, check_callable, check_type, instruction_set
-from pendmap.formatting import Readable, counted
+from pendmap.formatting import counted
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.joint import JointFit, as_fit_run, fit_together
@@ -18,7 +18,8 @@ from pendmap.identification.methods.trajectory import METHOD as BEST
 from pendmap.identification.methods.trajectory import OFFSET, TooShortError, identification_of
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.identification.table1 import Table1, table_of, table_of_run
+from pendmap.identification.report import DRAG, IdentificationReport
+from pendmap.identification.table1 import table_of, table_of_run
 from pendmap.model import Rig
 from pendmap.model.effects import definition
 from pendmap.records import Experiment
@@ -32,99 +33,8 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
 
-DRAG: Final = "quadratic_drag"
-"""The effect that is tried unasked where viscous damping and friction leave more than the noise."""
-
 MISSES: Final = 1.2
 """Residual over noise above which the drag is tried."""
-
-
-@dataclasses.dataclass(frozen=True, repr=False)
-class IdentificationReport(Readable):
-    """What every method says of an experiment.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        The records.
-    run : Run
-        The free decay that the methods of peaks read, and that is drawn.
-    peaks : Peaks
-        Its peaks.
-    methods : mapping of str to Identification
-        By method, the best one first.
-    joint : JointFit or None
-        What stands behind the best one; none where it was not asked for or cannot be applied.
-    table : Table1
-        Table 1 and figure 7 of the decay.
-    with_drag : JointFit or None
-        The same with quadratic drag, where the best one leaves more than the noise and no effect
-        was asked for.
-    """
-
-    experiment: Experiment
-    run: Run
-    peaks: Peaks
-    methods: dict[str, Identification]
-    joint: JointFit | None
-    table: Table1
-    with_drag: JointFit | None = None
-
-    def __repr__(self) -> str:
-        sound = (found.short for found in self.methods.values() if found.sound)
-        best = next(sound, "no method gives a model")
-        more = f"; {counted(len(self.methods), 'method')}, {counted(len(self.runs), 'run')}"
-        return f"<IdentificationReport {self.run.name}: {best}{more}>"
-
-    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
-        """Return the tables and lines that ``pendmap identify`` prints."""
-        from pendmap.identification import summary  # noqa: PLC0415 (summaries are of reports)
-
-        tables = [summary.methods_table(self), summary.table1_table(self)]
-        return tables, list(summary.as_text(self))
-
-    @property
-    def best(self) -> Identification:
-        """The first method that could be applied and whose search converged.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
-        for found in self.methods.values():
-            if found.sound:
-                return found
-        lost = [name for name, found in self.methods.items() if not found.converged]
-        if lost:
-            raise InputError(
-                f"{self.run.name}: no model: {lost[0]} did not converge, and no other method can "
-                "be applied"
-            )
-        reasons = "; ".join(self.methods[next(iter(self.methods))].warnings)
-        raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
-
-    @property
-    def runs(self) -> tuple[Run, ...]:
-        """Every run that a method read."""
-        return (self.run,) if self.joint is None else self.joint.runs
-
-    @property
-    def passed_over(self) -> str:
-        """Which better method the best one stands in for, and why, in words; empty if for none."""
-        first = next(iter(self.methods.values()))
-        if first.sound or not any(found.sound for found in self.methods.values()):
-            return ""
-        why = "cannot be applied" if first.converged else "did not converge"
-        return f"{first.method} {why}: the model is that of {self.best.method}"
-
-    @property
-    def model(self) -> Rig:
-        """The pendulum that the best method found, with its effects."""
-        best = self.best
-        if best.model is not None:
-            return best.model
-        return dataclasses.replace(best.rig, gravity=self.experiment.gravity)
 
 
 def decay_of(experiment: Experiment) -> Run:
@@ -266,53 +176,6 @@ def _best(
 
 
 # Which runs of an experiment were read, and which were left out and why.
-
-
-STILL: Final = "in which nothing moves"
-"""What a run is that shows no motion."""
-
-COPY: Final = "that copies another"
-"""What a run is whose readings count in another one."""
-
-
-def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
-    """Return how many runs were read and which were not, in words; empty if all were.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        All of its runs.
-    read : sequence of Run
-        Those of them that were read.
-    """
-    reasons: dict[str, int] = {}
-    for run in experiment.runs:
-        if any(run is each for each in read):
-            continue
-        # Where runs held out are read all the same, that is no reason for a forced one.
-        held = run.hold_out and (run.kind == "free" or not any(each.hold_out for each in read))
-        why = "held out" if held else "forced"
-        if run.kind == "free" and not run.hold_out:
-            why = "of peaks alone" if run.peaks_only else "shorter" if run.moves else STILL
-        elif run.kind == "free" and not run.moves:
-            why = STILL
-        elif run.kind == "free" and run.peaks_only and any(each.hold_out for each in read):
-            why = "of peaks alone"
-        if run.copied:
-            why = COPY
-        reasons[why] = reasons.get(why, 0) + 1
-    if not reasons:
-        return ""
-    first, *others = (
-        f"{counted(n, 'run')} {why}"
-        if why in {"held out", "of peaks alone", STILL, COPY}
-        else counted(n, f"{why} run")
-        for why, n in reasons.items()
-    )
-    last = f" and {others.pop()}" if others else ""
-    words = ", ".join([first, *others]) + last
-    verb = "is" if sum(reasons.values()) == 1 else "are"
-    return f"{counted(len(read), 'run')} read; {words} {verb} not used"
 
 
 # The model that was identified, as a model file: with its covariance and where it comes from.

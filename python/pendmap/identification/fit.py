@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, core_errors
-from pendmap.identification.methods.base import Estimate
+from pendmap.formatting import Estimate
 from pendmap.identification.parameters import PER_RUN, PLACES, Conversion, free_quantities, interval
 from pendmap.identification.runs import (
     FitRun,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
-from pendmap.model.rig import COUNTERPARTS
+from pendmap.model.quantities import COUNTERPARTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -177,12 +177,14 @@ def _value_of(quantity: Quantity, rigs: Sequence[Rig]) -> float:
 
 # Free parameters as the core counts them, and in SI.
 #
-# The core counts time in ``1 / w_ref`` of a fixed ``w_ref``, and ``w0`` is a factor ``xi`` on gravity
+# The core counts time in ``1 / w_ref`` of a fixed ``w_ref``, and ``w0`` is a factor ``xi`` on
+# gravity
 # there. In SI
 #
 # ``w0 = w_ref sqrt(xi)``, ``x = u w_ref^k xi`` of all others.
 #
-# The power ``k`` of a size whose unit depends on an exponent ``n`` is ``2 - n``. Where both are free
+# The power ``k`` of a size whose unit depends on an exponent ``n`` is ``2 - n``. Where both are
+# free
 # the Jacobian ``dx / dxi`` has ``dq / dn = -ln(w_ref) q`` beside its diagonal.
 
 

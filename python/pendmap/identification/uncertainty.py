@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from pendmap.identification.methods.base import Estimate
+from pendmap.formatting import Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

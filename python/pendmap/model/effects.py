@@ -7,17 +7,42 @@ import difflib
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pendmap.errors import InputError, check_flag, check_number, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from pendmap.model.formula import Formula, FormulaKey
     from pendmap.units import Units
 
 _NO_SHAPE: Final = ("size", "phase")
+
+
+_Bounds = tuple[float, float]
+ParameterKey = tuple[str, float, int | None, str, _Bounds, _Bounds, str, str | None]
+FormulaKey = tuple[str, str, str, tuple[ParameterKey, ...]]
+"""A formula as the kernel takes it: name, term, revealed_by, parameters."""
+
+
+class Described(Protocol):
+    """A formula as an effect knows it; :class:`pendmap.Formula` is one."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def key(self) -> FormulaKey:
+        """What the kernel takes."""
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """Formula, parameters and the rest, as of the library's effects."""
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """Its table in a model file."""
 
 
 @functools.cache
@@ -103,7 +128,7 @@ class Effect:
     ci95: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     probability: float | None = None
     approximate: bool | None = None
-    formula: Formula | None = None
+    formula: Described | None = None
 
     def __post_init__(self) -> None:
         if self.formula is not None and self.formula.name != self.name:

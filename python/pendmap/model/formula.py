@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.files import read_toml
+from pendmap.model.effects import Effect, FormulaKey, ParameterKey
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from pendmap.model.effects import Effect
 
 _DAMPING: Final = ("c_over_m", "zeta", "gamma", "Tr", "theta_r")
 _DRIVE: Final = ("p", "Omega", "omega", "phi", "phase")
@@ -27,11 +27,6 @@ _PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
 _TYPICAL: Final = (1e-4, 0.3)
 """Values of interest where none are said: as of the library's sizes."""
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
-
-_Bounds = tuple[float, float]
-_ParameterKey = tuple[str, float, int | None, str, _Bounds, _Bounds, str, str | None]
-FormulaKey = tuple[str, str, str, tuple[_ParameterKey, ...]]
-"""A formula as the kernel takes it: name, term, revealed_by, parameters."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,8 +136,6 @@ class Formula:
 
     def __call__(self, **parameters: float) -> Effect:
         """Return the effect with values for its parameters."""
-        from pendmap.model.effects import Effect  # noqa: PLC0415 (effects may be formulas)
-
         return Effect(self.name, parameters, formula=self)
 
     @classmethod
@@ -254,7 +247,7 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
         raise InputError(f"{shown}: {error}") from None
 
 
-def _parameter(name: object, given: object, names: list[Any]) -> _ParameterKey:
+def _parameter(name: object, given: object, names: list[Any]) -> ParameterKey:
     if not isinstance(name, str):
         raise InputError(f"parameter must be a name, got {short_repr(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
@@ -328,7 +321,7 @@ def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
     return low, high
 
 
-def _said(part: _ParameterKey, names: list[str]) -> dict[str, Any]:
+def _said(part: ParameterKey, names: list[str]) -> dict[str, Any]:
     """Return a parameter as a table says it; what is as by default is left out."""
     _, power, less, unit, allowed, typical, meaning, role = part
     said: dict[str, Any] = {"power": power if less is None else f"2 - {names[less]}"}

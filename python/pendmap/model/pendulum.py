@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
 from pendmap.model.covariance import said_of
-from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula, FormulaKey
+from pendmap.model.effects import Effect, FormulaKey
+from pendmap.model.formula import Formula
+from pendmap.model.tables import in_file, read_arguments
 from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
@@ -180,15 +181,14 @@ class Pendulum:
         OSError
             If it cannot be read.
         """
-        from pendmap.model.files import load_model  # noqa: PLC0415 (files are made of models)
-
-        model = load_model(path)
-        if not isinstance(model, cls):
+        arguments = read_arguments(path)
+        if arguments.si:
             raise InputError(
                 f"{path}: is in SI: Rig.from_toml reads it, and its property pendulum has no "
                 "dimensions"
             )
-        return model
+        with in_file(path):
+            return cls(**arguments.values)
 
 
 def checked_effects(

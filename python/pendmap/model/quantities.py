@@ -10,6 +10,7 @@ from pendmap.errors import InputError, check_number
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+
 GRAVITY: Final = 9.81
 """Acceleration of gravity where nothing is said, m/s^2."""
 
@@ -158,3 +159,16 @@ def one(name: str, ways: Mapping[str, float]) -> float:
                 "out"
             )
     return value
+
+
+COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
+    "gamma": ("c_over_m", 1),
+    "p": ("p", 0),
+    "omega": ("Omega", 1),
+    "phase": ("phi", 0),
+    "torque": ("torque", 2),
+    "theta_r": ("Tr", 2),
+    "lab_time": ("lab_time_s", -1),
+}
+"""For each parameter of a :class:`Pendulum` its name in a :class:`Rig`, and the power of ``w0``
+that makes the one the other."""

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError, check_number, check_type
 from pendmap.model import quantities
 from pendmap.model.covariance import said_of
 from pendmap.model.effects import definition, library
 from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
+from pendmap.model.quantities import COUNTERPARTS
+from pendmap.model.tables import in_file, read_arguments
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -18,18 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from pendmap.model.effects import Effect
-
-COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
-    "gamma": ("c_over_m", 1),
-    "p": ("p", 0),
-    "omega": ("Omega", 1),
-    "phase": ("phi", 0),
-    "torque": ("torque", 2),
-    "theta_r": ("Tr", 2),
-    "lab_time": ("lab_time_s", -1),
-}
-"""For each parameter of a :class:`Pendulum` its name in a :class:`Rig`, and the power of ``w0``
-that makes the one the other."""
 
 
 def own_name(effect: str) -> str | None:
@@ -271,15 +261,14 @@ class Rig:
         OSError
             If it cannot be read.
         """
-        from pendmap.model.files import load_model  # noqa: PLC0415 (files are made of models)
-
-        model = load_model(path)
-        if not isinstance(model, cls):
+        arguments = read_arguments(path)
+        if not arguments.si:
             raise InputError(
                 f"{path}: has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum "
                 "puts it in SI with its w0"
             )
-        return model
+        with in_file(path):
+            return cls.of(**arguments.values)
 
 
 def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:

@@ -126,7 +126,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         If the file cannot be written.
     """
     from pendmap import figures  # noqa: PLC0415
-    from pendmap.paper import motions  # noqa: PLC0415
+    from pendmap.paper import draw, motions  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:
@@ -134,18 +134,18 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":
-        return figures.draw_tongues(_critical(), path, title=title, marks=_strange())
+        return draw.draw_tongues(_critical(), path, title=title, marks=_strange())
     if key == "2":
-        return figures.draw_tumbling(tumbling(), path, title=title)
+        return draw.draw_tumbling(tumbling(), path, title=title)
     if key == "3":
-        return figures.draw_pendulum(path, title=title)
+        return draw.draw_pendulum(path, title=title)
     if key in _MOTIONS:
         runs = getattr(motions, _MOTIONS[key])(report(seed).methods["combined_repaired"].rig, seed)
         steady, subtitle = (
             key == "8",
             f"{_RIG};   model by the combined method, repaired; seed {seed}",
         )
-        return figures.draw_motions(runs, path, steady=steady, title=title, subtitle=subtitle)
+        return draw.draw_motions(runs, path, steady=steady, title=title, subtitle=subtitle)
     found = report(seed)
     return figures.draw_identification(
         found,

@@ -13,7 +13,7 @@ from pendmap.errors import InputError, short_repr
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.experiment import Finding
 from pendmap.records.other_angles import position_of
-from pendmap.records.rod_sensors import Accelerometer, accelerometer_of
+from pendmap.records.rod_sensors import Accelerometer, Place, accelerometer_of
 from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain
 from pendmap.records.unused import ask, changes, head_of
 
@@ -125,7 +125,9 @@ def channels_of(  # noqa: C901 (a step each)
         heading, read_in = name_and_unit(table.names[k])
         gravity = float(description.known.get("gravity", GRAVITY))
         given_in = said.unit if said and said.unit else read_in
-        sensor, missing = accelerometer_of(said, given_in, heading, gravity)
+        spot = said.place if said else Place()
+        scaled = said is not None and said.scale is not None
+        sensor, missing = accelerometer_of(spot, given_in, heading, gravity, scaled=scaled)
     edges = asked.get("trigger")
     return Channels(
         values,

@@ -293,7 +293,8 @@ def _spacing(work: Work) -> None:
 
 # Slips of time: readings that are lost while the stamps go on as if nothing were missing.
 #
-# A controller that misses a reading now and then and counts the stamps itself writes, from there on,
+# A controller that misses a reading now and then and counts the stamps itself writes, from there
+# on,
 # what the pendulum does an interval later. The reading jumps by the velocity times the interval. An
 # encoder that misses counts jumps by their size, however quick the motion is.
 #

@@ -29,7 +29,7 @@ from pendmap.records.channels import Channels, channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
 from pendmap.records.rod_sensors import gyroscope_of
-from pendmap.records.text import read_table
+from pendmap.records.table import read_table
 from pendmap.records.work import Work
 
 if TYPE_CHECKING:

@@ -131,10 +131,14 @@ def levels_shared(theta: Floats, step: float) -> float:
 
 # The noise of a sensor that shows a few counts of one angle.
 #
-# At rest a sensor whose noise is less than a count goes to and fro between two or three. How often it
-# shows each depends on where between two edges the angle is, ``x``, and on the noise ``s`` before the
-# rounding: ``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. The root mean square
-# of such readings is anything from 0 to half a count. Three counts tell ``x`` and ``s``; two leave a
+# At rest a sensor whose noise is less than a count goes to and fro between two or three. How often
+# it
+# shows each depends on where between two edges the angle is, ``x``, and on the noise ``s`` before
+# the
+# rounding: ``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. The root mean
+# square
+# of such readings is anything from 0 to half a count. Three counts tell ``x`` and ``s``; two leave
+# a
 # range of both, over which is averaged, all ``x`` and all ``log s`` being as likely before.
 
 

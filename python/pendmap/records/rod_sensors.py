@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.records.description import Column
-
     Floats = NDArray[np.float64]
 
 
@@ -122,13 +120,13 @@ def place_of(table: Mapping[str, object], where: str) -> Place:
 
 
 def accelerometer_of(
-    column: Column | None, unit: str | None, heading: str, gravity: float
+    place: Place, unit: str | None, heading: str, gravity: float, *, scaled: bool
 ) -> tuple[Accelerometer | None, str]:
     """Return the accelerometer of a column, or why its place is not known.
 
     Parameters
     ----------
-    column : Column or None
+    place : Place
         What [columns] says.
     unit : str or None
         Of the readings, as [columns] or the heading has it.
@@ -136,10 +134,10 @@ def accelerometer_of(
         Of the column: a "linear acceleration" is one without gravity.
     gravity : float
         m/s^2.
+    scaled : bool
+        Whether [columns] gives a scale.
     """
-    place = column.place if column else Place()
     direction = place.direction
-    scaled = column is not None and column.scale is not None
     if direction is None and not scaled and unit and spelling(unit) in ANGULAR_ACCELERATIONS:
         direction = "angular"
     if direction == "angular":

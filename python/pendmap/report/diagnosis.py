@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.comparison.further import Reasons, attempted
 from pendmap.comparison.replay import strength_of
-from pendmap.diagnosis.summary import zeroed
+from pendmap.diagnosis.result import zeroed
 from pendmap.model.labels import unit_of
 from pendmap.report.document import (
     Document,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.diagnosis.summary import PLACES
+from pendmap.diagnosis.result import PLACES
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
 from pendmap.report.wording import chance, compared, joined, mrad, number, stated, values

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.diagnosis.next_experiment.limits import MARGIN, SURELY
 from pendmap.formatting import counted
-from pendmap.identification.experiment import left_out
+from pendmap.identification.report import left_out
 from pendmap.model.labels import unit_of
 from pendmap.report.document import Items, Name, Paragraph, Section, Strong, Table
 from pendmap.report.wording import chance, gained, joined, number

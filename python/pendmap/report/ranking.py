@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.summary import ranking_table
+from pendmap.diagnosis.result import ranking_table
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Name, Paragraph, Picture, Section, Table
 from pendmap.report.wording import gained, number, stated

@@ -81,7 +81,8 @@ class Path:
 #
 # Within a step of length ``h`` from ``t0``, ``s = (t - t0) / h`` in [0, 1], the acceleration is the
 # polynomial of degree ``NODES - 1`` through its values at the Gauss-Legendre points. Velocity and
-# angle are its exact integrals. This is the Gauss method of order ``2 NODES`` at the step's end, and
+# angle are its exact integrals. This is the Gauss method of order ``2 NODES`` at the step's end,
+# and
 # of order ``NODES + 2`` in the angle within.
 #
 # Polynomials are rows of coefficients of the Legendre polynomials ``P_k(2 s - 1)``.

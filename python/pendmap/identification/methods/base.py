@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.formatting import counted, estimate_text
+from pendmap.formatting import Estimate, counted, estimate_text
 from pendmap.model import Rig
 
 if TYPE_CHECKING:
@@ -18,25 +18,6 @@ if TYPE_CHECKING:
 
 _Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Estimate:
-    """A number with its uncertainty.
-
-    Parameters
-    ----------
-    value : float
-        In SI.
-    stderr : float or None
-        Its standard error, where the method gives one.
-    ci95 : tuple of float or None
-        Its 95 % interval, where the method gives one; it need not be symmetric.
-    """
-
-    value: float
-    stderr: float | None = None
-    ci95: tuple[float, float] | None = None
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

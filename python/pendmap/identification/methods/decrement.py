@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 Reading = Literal["all", "odd_ends", "odd_triplets"]
-"""Which peaks the printed method uses; see :func:`pendmap.identification.methods.combined.identify`."""
+"""Which peaks the printed method uses; see ``methods.combined``."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.formatting import Estimate
 from pendmap.identification.methods import (
     combined,
     de_paula,
@@ -17,7 +18,7 @@ from pendmap.identification.methods import (
     repaired,
     trajectory,
 )
-from pendmap.identification.methods.base import Estimate, Identification
+from pendmap.identification.methods.base import Identification
 from pendmap.identification.peaks import find_peaks, samples
 from pendmap.signal.robust import from_first, normal_scale
 

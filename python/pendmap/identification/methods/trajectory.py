@@ -15,11 +15,11 @@ import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, check_number
 from pendmap.identification.fit import TrajectoryFit, fit_runs
-from pendmap.identification.methods.base import Estimate, Identification
+from pendmap.identification.methods.base import Identification
+from pendmap.identification.methods.start import starting_values
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.readings import Reading, reading_of
 from pendmap.identification.runs import FitRun
-from pendmap.identification.start import starting_values
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect, opposes
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
 

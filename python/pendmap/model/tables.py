@@ -1,0 +1,219 @@
+"""The tables of model files: what they may hold, as the arguments of a model."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import difflib
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap.errors import InputError, check_number, check_whole, short_repr
+from pendmap.files import read_toml
+from pendmap.model import quantities
+from pendmap.model.covariance import without
+from pendmap.model.effects import Effect
+from pendmap.model.formula import Formula, formulas_of
+from pendmap.model.quantities import COUNTERPARTS
+from pendmap.units import Units
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+FORMAT: Final = 1
+"""Version of the layout of model files, in their key ``format_version``."""
+NOTES: Final = ("covariance", "provenance")
+EFFECT: Final = ("name", "parameters", "ci95", "probability", "approximate")
+
+_SI: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *quantities.OPTIONAL)
+_BARE: Final = (*COUNTERPARTS, "zeta")
+_ONLY_SI: Final = tuple(name for name in _SI if name not in _BARE)
+_ONLY_BARE: Final = tuple(name for name in _BARE if name not in _SI)
+
+
+@dataclasses.dataclass(frozen=True)
+class ModelArguments:
+    """Arguments of a model: of ``Rig.of`` where they are in SI, of ``Pendulum`` otherwise."""
+
+    si: bool
+    values: Mapping[str, Any]
+
+
+@contextlib.contextmanager
+def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the name of a file before what is refused of it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{os.fspath(path)}: {error}") from None
+
+
+def read_arguments(
+    path: str | os.PathLike[str], typed: Mapping[str, float] | None = None
+) -> ModelArguments:
+    """Read a model file; see :func:`pendmap.load_model` for its arguments and errors."""
+    content = read_toml(path)
+    typed = dict(typed or {})
+    with in_file(path):
+        _check_top(content)
+        table = _pendulum_table(content)
+        effects = _effects(content.get("effect", []), formulas_of(content.get("formula", [])))
+        notes: dict[str, Any] = {name: content[name] for name in NOTES if name in content}
+        if _is_si(table):
+            exact = [_own_name(name) for name in typed]
+            numbers = _typed_over(table, typed)
+            return ModelArguments(
+                si=True, values={**numbers, "effects": effects, "notes": without(notes, exact)}
+            )
+        numbers = _bare_numbers(table, typed, effects)
+        return ModelArguments(
+            si=False, values={**numbers, "effects": effects, "notes": without(notes, typed)}
+        )
+
+
+def _pendulum_table(content: dict[str, Any]) -> dict[str, Any]:
+    table = content.get("pendulum")
+    if not isinstance(table, dict):
+        raise InputError("has no table [pendulum]")
+    return table
+
+
+def _check_top(content: dict[str, Any]) -> None:
+    known = ("pendulum", "formula", "effect", *NOTES, "format_version")
+    unknown = [key for key in content if key not in known]
+    if unknown:
+        shown = f"[{unknown[0]}]" if isinstance(content[unknown[0]], dict) else unknown[0]
+        tables = "[pendulum], [[formula]], [[effect]], [covariance], [provenance]"
+        raise InputError(f"{shown} is not known: it must be one of {tables} and format_version")
+    version = content.get("format_version", FORMAT)
+    check_whole("format_version", version, 1, FORMAT)
+    check_notes({name: content[name] for name in NOTES if name in content})
+
+
+def check_notes(notes: object) -> None:
+    """Refuse what are no notes of a model.
+
+    Raises
+    ------
+    InputError
+        If they are no mapping, or have names or values that no model file has.
+    """
+    if not isinstance(notes, Mapping):
+        raise InputError(f"notes must be a mapping, got {short_repr(notes)}")
+    for name, table in notes.items():
+        if name not in NOTES:
+            raise InputError(
+                f"{short_repr(name)} is not known: it must be one of {', '.join(NOTES)}"
+            )
+        if not isinstance(table, Mapping):
+            raise InputError(f"{name} must be a table [{name}], got {short_repr(table)}")
+
+
+def _is_si(table: dict[str, Any]) -> bool:
+    """Whether a table is in SI; all its keys are checked."""
+    for key in table:
+        if key not in _SI and key not in _BARE:
+            raise InputError(f"{_shown(key)} is not known{_instead(key)}")
+    si = [key for key in table if key in _ONLY_SI]
+    bare = [key for key in table if key in _ONLY_BARE]
+    if si and bare:
+        raise InputError(
+            f"{bare[0]} has no dimensions and {si[0]} is in SI: both must be of one kind; "
+            f"{bare[0]} is {COUNTERPARTS[bare[0]][0]} in SI"
+        )
+    return bool(si)
+
+
+def _shown(key: str) -> str:
+    return key if key.isidentifier() else short_repr(key)
+
+
+def _instead(key: str) -> str:
+    """Return the end of the sentence that a key is not known: what may stand in its place."""
+    stem = key.rsplit("_", 1)[0]
+    for known, unit in quantities.SI_UNITS.items():
+        if known.rsplit("_", 1)[0] in (key, stem) or known == stem:
+            return f": it must be {known}, in {unit}"
+    near = difflib.get_close_matches(key, (*_BARE, *_SI), n=1, cutoff=0.7)
+    nearest = f", perhaps {near[0]} is meant" if near else ""
+    without = ", ".join(_BARE)
+    return f"{nearest}: it must be one of {without}, or in SI {', '.join(_SI)}"
+
+
+def _own_name(name: str) -> str:
+    """Return what a :class:`Rig` calls a quantity that is typed."""
+    if name in COUNTERPARTS:
+        return COUNTERPARTS[name][0]
+    return next((own for own, ways in quantities.GROUPS.items() if name in ways), name)
+
+
+def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:
+    """Return the quantities of a table in SI with those that were typed in their places."""
+    units = Units(quantities.natural_frequency(table), si=True)
+    numbers = dict(table)
+    for name, value in typed.items():
+        bare = COUNTERPARTS.get(name)
+        si, number = (bare[0], units.given(value, bare[1])) if bare else (name, value)
+        group = next((ways for ways in quantities.GROUPS.values() if si in ways), (si,))
+        for other in group:
+            if other not in typed:
+                numbers.pop(other, None)
+        numbers[si] = number
+    return numbers
+
+
+def _bare_numbers(
+    table: dict[str, Any], typed: Mapping[str, float], effects: tuple[Effect, ...]
+) -> dict[str, float]:
+    for name in typed:
+        if name not in COUNTERPARTS:
+            raise InputError(
+                f"has no dimensions: {name} must be given with a model in SI; here it is p or omega"
+            )
+    numbers = {name: check_number(name, value) for name, value in table.items()}
+    zeta = numbers.pop("zeta", None)
+    if zeta is not None and "gamma" not in typed:
+        gamma = 2 * quantities.check("zeta", zeta)
+        given = numbers.setdefault("gamma", gamma)
+        quantities.one("gamma", {"gamma": given, f"2 zeta of zeta = {zeta:g}": gamma})
+    numbers |= typed
+    driven = numbers.get("p", 0) != 0 or any(effect.drives for effect in effects)
+    if driven and "omega" not in numbers:
+        raise InputError("p without omega: a drive needs a frequency above 0")
+    zeros = {name: float(name == "omega") for name in COUNTERPARTS}
+    return zeros | numbers
+
+
+def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, ...]:
+    if not isinstance(tables, list):
+        raise InputError(f"effect must be [[effect]], one table each, got {short_repr(tables)}")
+    effects = []
+    for count, table in enumerate(tables, 1):
+        try:
+            effects.append(_effect(table, formulas))
+        except InputError as error:
+            raise InputError(f"[[effect]] {count}: {error}") from None
+    return tuple(effects)
+
+
+def _effect(table: object, formulas: Mapping[str, Formula]) -> Effect:
+    if not isinstance(table, dict):
+        raise InputError(f"must be a table, got {short_repr(table)}")
+    unknown = [key for key in table if key not in EFFECT]
+    if unknown:
+        raise InputError(
+            f"{_shown(unknown[0])} is not known: it must be one of {', '.join(EFFECT)}"
+        )
+    for key, example in (("name", '"quadratic_drag"'), ("parameters", "{ q = 0.01 }")):
+        if key not in table:
+            raise InputError(f"{key} must be given, like {key} = {example}")
+    name = table["name"]
+    formula = formulas.get(name) if isinstance(name, str) else None
+    try:
+        return Effect(**table, formula=formula)
+    except InputError as error:
+        own = ", ".join(formulas)
+        if formula is None and formulas and str(error).startswith("name must be"):
+            raise InputError(f"{error}, and this file's [[formula]] are {own}") from None
+        raise
