@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test fuzz lint bench clean develop
+.PHONY: demo test test-all fuzz lint bench clean develop
 
 demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -13,12 +13,17 @@ develop: $(VENV)/.develop ## set up everything for work on pendmap itself
 
 # The modules of tests/rust that ask for the instruction set themselves: what the lanes compute.
 LANES := $(patsubst tests/rust/%.rs,%::,$(filter-out %/support.rs,$(shell grep -l '\bpath()' tests/rust/*.rs)))
+PYTEST := $(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
 
-test: $(VENV)/.develop ## set up everything and run all tests, those of the lanes on every instruction set
+test: $(VENV)/.develop ## set up everything and run the tests, all but the thorough ones
+	cargo test --locked --quiet
+	$(PYTEST) -m 'not thorough'
+
+test-all: $(VENV)/.develop ## set up everything and run all tests, those of the lanes on every instruction set
 	cargo test --locked --quiet
 	for path in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
 		PENDMAP_SIMD=$$path cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
-	$(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
+	$(PYTEST)
 
 SEED ?= 1
 COUNT ?= 1000

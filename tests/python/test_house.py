@@ -1,0 +1,147 @@
+"""The layout of the package: sizes, directions of imports, names and places of things.
+
+The limits marked as ratchets are what the package has; a change may lower them, never raise them.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+from pathlib import Path
+
+import pytest
+
+from pendmap import _core
+from pendmap.cli.main import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "python" / "pendmap"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+LINES = 52_900
+"""Ratchet: lines of Python in python/pendmap."""
+DIRECT = 700
+"""Ratchet: format specifications of numbers outside formatting.py."""
+INTERNAL = 95
+"""Ratchet: modules that tests import past the front of a package."""
+
+
+@functools.cache
+def tree(path: Path) -> ast.Module:
+    """The syntax of a file."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def name_of(path: Path) -> str:
+    """The dotted name of a module."""
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported(path: Path) -> set[str]:
+    """The modules of the package that a file imports, anywhere in it, for type checking too."""
+    known = {name_of(module) for module in MODULES}
+    found = set()
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("pendmap"):
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                found.add(full if full in known else node.module)
+    return found
+
+
+def test_six_files_stand_at_the_root() -> None:
+    names = {path.name for path in PACKAGE.glob("*.py")}
+    assert names <= {
+        "__init__.py",
+        "__main__.py",
+        "errors.py",
+        "files.py",
+        "formatting.py",
+        "units.py",
+    }
+
+
+def test_no_package_has_more_than_30_files() -> None:
+    folders = {path.parent for path in MODULES}
+    assert not [folder.name for folder in folders if len(list(folder.glob("*.py"))) > 30]
+
+
+def test_no_file_has_more_than_450_lines() -> None:
+    sizes = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
+    assert not {str(path.relative_to(PACKAGE)): n for path, n in sizes.items() if n > 450}
+    assert sum(sizes.values()) <= LINES
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    edges = {name_of(path): imported(path) - {"pendmap"} for path in MODULES}
+    done: set[str] = set()
+
+    def visit(module: str, way: list[str]) -> None:
+        assert module not in way, " -> ".join([*way, module])
+        if module not in done:
+            for other in sorted(edges.get(module, set()) - {module}):
+                visit(other, [*way, module])
+            done.add(module)
+
+    for module in edges:
+        visit(module, [])
+
+
+def test_only_fronts_say_what_they_export() -> None:
+    listed = {
+        path
+        for path in MODULES
+        for node in tree(path).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+    }
+    assert not [str(path) for path in listed if path.name != "__init__.py"]
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_a_command_is_a_module_of_its_name(command: str) -> None:
+    assert (PACKAGE / "cli" / f"{command}.py").exists()
+
+
+def test_every_parameter_of_an_effect_has_a_role_and_a_unit() -> None:
+    for effect in _core.effects():
+        assert effect["family"], effect["name"]
+        for parameter in effect["parameters"]:
+            assert parameter["role"], parameter
+            assert parameter["unit"], parameter
+
+
+def test_effects_are_named_in_the_library_alone() -> None:
+    """A name of an effect in Python decides something that the library should say."""
+    names = {effect["name"] for effect in _core.effects()}
+    found = {
+        (path.relative_to(PACKAGE).as_posix(), node.value)
+        for path in MODULES
+        if "virtual_rig" not in path.parts
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.Constant) and node.value in names
+    }
+    assert {name for _, name in found} <= {
+        "bias_torque",  # the torque that a pendulum has of its own
+        "coulomb_friction",  # likewise its friction
+        "drive_phase",
+        "encoder_gain",
+        "encoder_offset",  # the zero of the sensor, fitted by every method
+        "quadratic_drag",  # tried by identify unasked
+        "stribeck_friction",
+        "viscous_damping",
+    }
+
+
+def test_numbers_become_text_in_one_place() -> None:
+    spec = re.compile(r"\{[^{}]*:[+-]?\.?\d*\.\d*[gfe]\}")
+    texts = {p: p.read_text(encoding="utf-8") for p in MODULES if p.name != "formatting.py"}
+    assert sum(len(spec.findall(text)) for text in texts.values()) <= DIRECT
+
+
+def test_tests_import_the_fronts_of_packages() -> None:
+    fronts = {name_of(path) for path in MODULES if path.name == "__init__.py"}
+    tests = sorted((ROOT / "tests" / "python").glob("*.py"))
+    inner = {module for path in tests for module in imported(path) if module not in fronts}
+    assert len(inner) <= INTERNAL, sorted(inner)
