@@ -150,7 +150,8 @@ def features(every: Iterable[States], rig: Parameters) -> list[tuple[Candidate, 
     pool = candidates({"viscous_damping", "coulomb_friction"}, driven=forced)
     found = []
     for candidate in (c for shapes in pool for c in shapes):
-        if EFFECTS[candidate.name].needs == "forced" and not forced:
+        kind = EFFECTS[candidate.name]
+        if (kind.needs == "forced" and not forced) or kind.states:  # a memory is no feature
             continue
         shape = tuple(candidate.effect(Rig(rig.w0).units).parameters.items())
         kept = tuple((n, v) for n, v in shape if n in candidate.shape)
