@@ -5,8 +5,9 @@ from __future__ import annotations
 import datetime as dt
 import json
 import math
+import subprocess
+import sys
 import tomllib
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -328,8 +329,9 @@ def test_only_models_are_written_and_only_as_toml(tmp_path: Path) -> None:
 
 
 def test_the_schema_for_editors_is_that_of_the_tables_that_check_files(tmp_path: Path) -> None:
-    text = resources.files("pendmap.model").joinpath("model.schema.json").read_text("utf-8")
-    assert json.loads(text) == json.loads(json.dumps(schema()))  # python -m pendmap.model.schema
+    call = [sys.executable, "-m", "pendmap.model.schema"]
+    printed = subprocess.run(call, capture_output=True, check=True).stdout
+    assert json.loads(printed) == json.loads(json.dumps(schema()))
     top = schema()["properties"]
     assert tomllib.loads(EXAMPLE).keys() <= top.keys()
     for kind, need in zip(top["pendulum"]["anyOf"], ({"w0": 6.2}, {}), strict=True):

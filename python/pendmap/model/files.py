@@ -29,8 +29,8 @@ def load_model(
     ``name`` and ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``; each
     ``[[formula]]`` is a :class:`Formula`, which effects may name; ``[covariance]`` and
     ``[provenance]`` are kept in the model's ``notes``; typed parameters are known exactly and are
-    no part of the covariance. Editors complete the keys from ``model.schema.json`` beside this
-    module.
+    no part of the covariance. Editors complete keys from the JSON Schema that
+    ``python -m pendmap.model.schema`` prints.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
-"""The JSON Schema of model files, from the tables that check them; editors complete keys with it.
+"""The JSON Schema of model files, from the tables that check them.
 
-``python -m pendmap.model.schema`` prints it, as ``model.schema.json`` in this folder has it.
+Editors complete keys with it: ``python -m pendmap.model.schema > model.schema.json`` writes it, and
+a file names it in its first line, ``#:schema ./model.schema.json``.
 """
 
 from __future__ import annotations
@@ -94,4 +95,4 @@ def _formula() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps(schema(), indent=1) + "\n")
+    sys.stdout.write(json.dumps(schema(), indent=2) + "\n")
