@@ -32,7 +32,7 @@ CLEAR = 25.0
 """Separation times score from which names are told apart nearly always."""
 
 REFITTED, WORTH = 3, 0.5
-"""So many impostors are fitted, of those whose score is this part of what is to be explained."""
+"""Largest number of impostors that are fitted, and their least gain as a share of chi-square."""
 
 CONTAINED = 1e-3
 """A special case leaves no more than this of what is to be explained: rounding and steps."""

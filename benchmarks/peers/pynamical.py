@@ -150,7 +150,7 @@ class Pynamical:
 
 
 class PynamicalLoop(Pynamical):
-    """The same as its manual has it: a loop of Python over its class."""
+    """A loop of Python over its class, as its manual has it."""
 
     label = "pynamicalsys"
 

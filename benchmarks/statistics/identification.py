@@ -99,7 +99,7 @@ def true_peaks(path: Motion) -> Peaks:
 
 
 def with_period(found: Identification, period: float, name: str) -> Identification:
-    """The same zeta and theta_r with another average period."""
+    """Return an identification with its zeta and theta_r and another average period."""
     zeta = found.derived["zeta"].value
     w0 = 2 * math.pi / (period * math.sqrt(1 - zeta**2))
     made = {"w0": Estimate(w0), "c_over_m": Estimate(2 * zeta * w0)}

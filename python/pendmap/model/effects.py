@@ -37,7 +37,7 @@ class Described(Protocol):
 
     @property
     def entry(self) -> dict[str, Any]:
-        """Definition, as of an effect of the library."""
+        """Definition, like that of an effect of the library."""
 
     @property
     def table(self) -> dict[str, Any]:

@@ -150,7 +150,7 @@ class Pendulum:
 
     @property
     def attributes(self) -> dict[str, float | str]:
-        """The parameters as a dataset's attributes, as of a :class:`pendmap.Rig`."""
+        """The parameters as a dataset's attributes, like those of a :class:`pendmap.Rig`."""
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
         effects = {"effects": effects_json(self.effects)}
         own = effects | self.angle_attributes | said_of(self.notes)

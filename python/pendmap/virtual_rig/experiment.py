@@ -35,33 +35,35 @@ _RIG, _RUNS, _EFFECTS, _SENSOR, _MESS = range(5)
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """What a user asks of the rig; ``None`` leaves it to the preset and the seed.
+    """Request for an experiment; ``None`` leaves a value to the preset and the seed.
 
     Parameters
     ----------
     preset : str
         A name of ``PRESETS``.
     seed : int
-        All draws come from it; 0 or more.
+        Seed of all draws; 0 or more.
     effects : tuple of str
-        Effects to hide; :func:`pendmap.virtual_rig.catalogue.draw` says how they are written.
+        Effects to hide: ``name``, ``name:variant`` or ``any``, with parameters as in
+        ``quadratic_drag,q=0.01``; or ``none`` alone.
     size : float
         Multiplies the size of every effect that is drawn; above 0, and 1 where none is.
     w0, c_over_m, friction : float
         The rig in SI, rad/s, 1/s, rad/s^2.
     free, forced : int
-        How many runs of each kind, at most 99 together.
+        Numbers of runs of each kind, at most 99 together.
     duration : float
         Length of every run, s, at most 3600.
     noise : float
         Noise of the sensor, degrees.
-    rate, counts, correlation, dropouts, outliers, jitter
-        As in :class:`Sensor`.
+    rate, counts, jitter : float, int, float
+        Samples a second, Hz; counts a turn, 0 without steps; rms of the sampling instants, s.
+    correlation, dropouts, outliers : float
+        AR(1) coefficient of the noise; shares of the samples that are lost, and that are false.
     mess : float
         Size of weak disturbances that no effect describes, in multiples of the noise, at most 100.
     plans : tuple of RunPlan
-        The runs, instead of those that the preset draws; then neither their number nor their
-        duration is asked for. Runs that come first are the same whatever follows them.
+        The runs, instead of those that the preset draws, their number and their duration.
 
     Raises
     ------
@@ -148,7 +150,7 @@ class Request:
 
     @property
     def runs(self) -> tuple[int, int]:
-        """How many free and forced runs."""
+        """Numbers of free and forced runs."""
         if self.plans:
             free = sum(plan.kind == "free" for plan in self.plans)
             return free, len(self.plans) - free
@@ -157,18 +159,18 @@ class Request:
         return free, preset.forced if self.forced is None else self.forced
 
     def stream(self, *path: int) -> np.random.Generator:
-        """A stream of random numbers of its own for each part of the experiment."""
+        """Return the stream of random numbers of a part of the experiment."""
         return np.random.default_rng([self.seed, *path])
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One run: what was meant, what happened, what was recorded.
+    """One run: its plan, its motion and its record.
 
     Parameters
     ----------
     plan : RunPlan
-        What was meant.
+        The planned run.
     path : Path
         The clean motion.
     time, angle : array, shape (N,)
@@ -176,7 +178,7 @@ class Run:
     lost : int
         Samples that the record lacks.
     gap : float
-        What the effects change in the reading within a second, rad rms; no parameter is adapted.
+        Change of the reading by the effects within a second, rad rms; no parameter is adapted.
     """
 
     plan: RunPlan
@@ -200,7 +202,7 @@ class Experiment:
 
     @property
     def gap(self) -> float:
-        """What the effects change in the reading within a second, rad rms over all samples."""
+        """Change of the reading by the effects within a second, rad rms over all samples."""
         weights = [run.time.size for run in self.runs]
         return math.sqrt(float(np.average([run.gap**2 for run in self.runs], weights=weights)))
 
@@ -376,7 +378,7 @@ def paper_decay(seed: int = 0) -> tuple[Floats, Floats]:
     Parameters
     ----------
     seed : int
-        Of the noise; 0 or more.
+        Seed of the noise; 0 or more.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Which runs an experiment has, drawn from its seed."""
+"""The runs of an experiment, drawn from its seed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """What is meant to happen in one run.
+    """The plan of one run.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Preset:
         return Parameters(w0, rng.uniform(*self.c_over_m), rng.uniform(*self.friction))
 
     def plan(self, rng: Generator, w0: float, counts: tuple[int, int]) -> list[RunPlan]:
-        """Draw so many free and forced runs, in turn, one after another in lab time."""
+        """Draw free and forced runs in turn, one after another in lab time."""
         free = [(_free(rng, k, w0, alone=self.until_rest)) for k in range(counts[0])]
         forced = [_FORCED[k % len(_FORCED)](rng, w0) for k in range(counts[1])]
         mixed = []

@@ -32,7 +32,7 @@ def check_ranges(owner: object, **ranges: tuple[float, float, str]) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Sensor:
-    """How the angle is read and written down.
+    """The reading and the record of the angle.
 
     ``theta_rad = count round((reading + noise) / count)`` with ``count = 2 pi / counts``.
     """

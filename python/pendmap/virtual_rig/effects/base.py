@@ -1,4 +1,4 @@
-"""What an effect is: parameters with their ranges, and what it adds to the equation or the reading.
+"""An effect: parameters with their ranges, and its terms in the equation or the reading.
 
 The equation of the virtual rig, in SI and per unit of inertia:
 
@@ -30,22 +30,6 @@ MOST: Final = 1e4
 
 class Motion:
     """The state of L lanes at K times each; a lane is one run that is being integrated."""
-
-    __slots__ = (
-        "cos",
-        "direction",
-        "lab",
-        "lateral",
-        "run",
-        "side",
-        "sin",
-        "speed",
-        "theta",
-        "time",
-        "velocity",
-        "vertical",
-        "w0",
-    )
 
     run: NDArray[np.intp]  # the lane's run, shape (L, 1)
     time: Floats  # since the run began, s, shape (L, K) as all below
@@ -105,9 +89,9 @@ class Effect:
     formula: ClassVar[str]
     variant: ClassVar[str] = ""
     signed: ClassVar[bool] = False
-    """Whether either sign of the size makes sense."""
+    """Whether the size may have either sign."""
     states: ClassVar[int] = 0
-    """How many variables of its own the effect integrates."""
+    """Number of variables of its own that the effect integrates."""
     drawn: ClassVar[bool] = True
     """Whether a draw may choose it."""
     needs: ClassVar[str] = ""
@@ -160,31 +144,31 @@ class Effect:
         return float(rng.uniform(low, high))
 
     def least_friction(self) -> float:
-        """The least that the effect ever adds to the dry friction, rad/s^2."""
+        """Return the least that the effect adds to the dry friction, rad/s^2."""
         return 0.0
 
     def least_damping(self) -> float:
-        """The least that the effect ever adds to c/m, 1/s."""
+        """Return the least that the effect adds to c/m, 1/s."""
         return 0.0
 
     def acceleration(self, motion: Motion, own: Floats) -> Floats | float:
-        """Acceleration that the effect adds, rad/s^2, shape (L, K)."""
+        """Return the acceleration by the effect, rad/s^2, shape (L, K)."""
         return 0.0
 
     def friction(self, motion: Motion, direction: Floats) -> Floats | float:
-        """What the effect adds to the dry friction in a direction, rad/s^2, shape (L, K)."""
+        """Return the dry friction by the effect in a direction, rad/s^2, shape (L, K)."""
         return 0.0
 
     def inertia(self, motion: Motion) -> Floats | float:
-        """What the effect adds to the inertia, as a share of it, shape (L, K)."""
+        """Return the inertia by the effect, as a share of the rig's, shape (L, K)."""
         return 0.0
 
     def begin(self, motion: Motion) -> Floats:
-        """The effect's own variables where a motion begins, shape (L, K, states)."""
+        """Return the effect's own variables where a motion begins, shape (L, K, states)."""
         return np.zeros((*motion.theta.shape, self.states))
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
-        """Time derivatives of the effect's own variables ``own``, shape (L, K, states)."""
+        """Return the time derivatives of the effect's own variables, shape (L, K, states)."""
         return own[..., :0]
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
@@ -192,7 +176,7 @@ class Effect:
         return drive
 
     def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
-        """Lab times in s, and jumps of the velocity in rad/s, between two lab times."""
+        """Return the lab times, s, and sizes, rad/s, of jumps of the velocity between two times."""
         return []
 
 

@@ -151,7 +151,7 @@ class SensorLag(ReadingEffect):
         d = (velocity[:-1] + velocity[1:] - 2 * rise) / step**2
 
         def settled(k: NDArray[np.intp], t: Floats) -> Floats:
-            """What the lag reads of the cubic alone: P - tau P' + tau^2 P'' - tau^3 P'''."""
+            """Return the settled reading of a cubic: P - tau P' + tau^2 P'' - tau^3 P'''."""
             p = theta[k] + t * (velocity[k] + t * (c[k] + t * d[k]))
             first = velocity[k] + t * (2 * c[k] + 3 * t * d[k])
             second = 2 * c[k] + 6 * t * d[k]
