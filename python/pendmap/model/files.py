@@ -53,11 +53,9 @@ def load_model(
     OSError
         If it cannot be read.
     """
-    arguments = read_arguments(path, typed)
+    si, arguments = read_arguments(path, typed)
     with in_file(path):
-        if arguments.si:
-            return Rig.of(**arguments.values)
-        return Pendulum(**arguments.values)
+        return Rig.of(**arguments) if si else Pendulum(**arguments)
 
 
 def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:

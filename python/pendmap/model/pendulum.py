@@ -173,14 +173,14 @@ class Pendulum:
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:
         """Read a model file without dimensions, by :func:`pendmap.load_model`; refuse one in SI."""
-        arguments = read_arguments(path)
-        if arguments.si:
+        si, arguments = read_arguments(path)
+        if si:
             raise InputError(
                 f"{path}: is in SI: Rig.from_toml reads it, and its property pendulum has no "
                 "dimensions"
             )
         with in_file(path):
-            return cls(**arguments.values)
+            return cls(**arguments)
 
 
 def checked_effects(

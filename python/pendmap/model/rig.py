@@ -240,14 +240,14 @@ class Rig:
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Rig:
         """Read a model file in SI, by :func:`pendmap.load_model`; refuse one without dimensions."""
-        arguments = read_arguments(path)
-        if not arguments.si:
+        si, arguments = read_arguments(path)
+        if not si:
             raise InputError(
                 f"{path}: has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum "
                 "puts it in SI with its w0"
             )
         with in_file(path):
-            return cls.of(**arguments.values)
+            return cls.of(**arguments)
 
 
 def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import difflib
 import os
 from collections.abc import Mapping
@@ -34,14 +33,6 @@ _ONLY_SI: Final = tuple(name for name in SI_KEYS if name not in BARE_KEYS)
 _ONLY_BARE: Final = tuple(name for name in BARE_KEYS if name not in SI_KEYS)
 
 
-@dataclasses.dataclass(frozen=True)
-class ModelArguments:
-    """Arguments of a model: of ``Rig.of`` where they are in SI, of ``Pendulum`` otherwise."""
-
-    si: bool
-    values: Mapping[str, Any]
-
-
 @contextlib.contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
     """Put the name of a file before the message of an error in it."""
@@ -53,8 +44,8 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
 def read_arguments(
     path: str | os.PathLike[str], typed: Mapping[str, float] | None = None
-) -> ModelArguments:
-    """Read a model file; see :func:`pendmap.load_model` for its arguments and errors."""
+) -> tuple[bool, dict[str, Any]]:
+    """Return whether a model file is in SI, and the arguments of ``Rig.of`` or ``Pendulum``."""
     content = read_toml(path)
     typed = dict(typed or {})
     with in_file(path):
@@ -67,7 +58,7 @@ def read_arguments(
         si = _is_si(table)
         numbers = _typed_over(table, typed) if si else _bare_numbers(table, typed, effects)
         exact = [_own_name(name) for name in typed] if si else typed
-        return ModelArguments(si, {**numbers, "effects": effects, "notes": without(notes, exact)})
+        return si, {**numbers, "effects": effects, "notes": without(notes, exact)}
 
 
 def _check_top(content: dict[str, Any]) -> None:
