@@ -46,8 +46,9 @@ lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of impor
 bench: $(VENV)/.develop ## criterion, then the comparisons with other tools
 	$(BIN)/pip install --quiet -r benchmarks/requirements.txt
 	cargo bench --locked
-	for script in integration friction exponents parameters maps autonomous threads_memory rig coverage; do \
-		$(BIN)/python benchmarks/$$script.py || exit 1; done
+	for script in speed.integration speed.friction speed.exponents speed.parameters speed.maps speed.autonomous \
+			speed.threads_memory speed.rig statistics.coverage; do \
+		$(BIN)/python -m benchmarks.$$script || exit 1; done
 
 $(VENV)/bin/maturin:
 	$(PYTHON) -m venv $(VENV)

@@ -1,4 +1,4 @@
-"""Write the JSON of 80 commands to a folder, to compare two versions of pendmap bit by bit.
+"""Write the JSON of 94 commands to a folder, to compare two versions of pendmap bit by bit.
 
 Run it once with each version, then compare: ``diff -r before after``.
 

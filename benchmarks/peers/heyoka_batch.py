@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import heyoka as hy  # type: ignore[import-untyped]
 import numpy as np
 
-from peers.common import Case, Regular, clock, loosest
-from peers.report import has_avx512
+from benchmarks.peers.common import Case, Regular, clock, loosest
+from benchmarks.peers.report import has_avx512
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from peers.common import Case
+    from benchmarks.peers.common import Case
 
     Floats = NDArray[np.float64]
 

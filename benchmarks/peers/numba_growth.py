@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numba
 import numpy as np
 
-from peers.common import Case, Regular, loosest
-from peers.numba_rk4 import BLOCK, LADDER
+from benchmarks.peers.common import Case, Regular, loosest
+from benchmarks.peers.numba_rk4 import BLOCK, LADDER
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numba
 import numpy as np
 
-from peers.common import Case, Regular, loosest
+from benchmarks.peers.common import Case, Regular, loosest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from peers.common import Case, Regular, loosest
+from benchmarks.peers.common import Case, Regular, loosest
 
 if TYPE_CHECKING:
     import numpy as np

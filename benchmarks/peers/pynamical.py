@@ -17,7 +17,7 @@ from pynamicalsys.continuous_time.lyapunov import maximum_lyapunov_exponent
 from pynamicalsys.continuous_time.step import evolve_system
 from pynamicalsys.continuous_time.step_methods import rk4_step_wrapped
 
-from peers.common import Case, Regular, loosest
+from benchmarks.peers.common import Case, Regular, loosest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -150,7 +150,7 @@ class Pynamical:
 
 
 class PynamicalLoop(Pynamical):
-    """The same as its manual has it: a loop of Python over its class."""
+    """A loop of Python over its class, as its manual has it."""
 
     label = "pynamicalsys"
 

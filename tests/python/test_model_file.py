@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
 import math
+import subprocess
+import sys
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import pendmap
 from models import EXAMPLE, written
 from pendmap import Effect, InputError, Pendulum, Rig, load_model, save_model
+from pendmap.model.schema import schema
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -321,3 +326,25 @@ def test_only_models_are_written_and_only_as_toml(tmp_path: Path) -> None:
         save_model(Pendulum(), tmp_path / "model.json")
     with pytest.raises(FileNotFoundError):
         save_model(Pendulum(), tmp_path / "no" / "model.toml")
+
+
+def test_the_schema_for_editors_is_that_of_the_tables_that_check_files(tmp_path: Path) -> None:
+    call = [sys.executable, "-m", "pendmap.model.schema"]
+    printed = subprocess.run(call, capture_output=True, check=True).stdout
+    assert json.loads(printed) == json.loads(json.dumps(schema()))
+    top = schema()["properties"]
+    assert tomllib.loads(EXAMPLE).keys() <= top.keys()
+    for kind, need in zip(top["pendulum"]["anyOf"], ({"w0": 6.2}, {}), strict=True):
+        for key in kind["properties"].keys() - need.keys():
+            drive = {"Omega": 7.0} if need else {"omega": 2.0}
+            table = need | (drive if key in ("p", "Y", "stroke_mm") else {})
+            table[key] = 0.2552107 if key == "length_m" else 7.0
+            load_model(
+                written(tmp_path, "[pendulum]\n" + "".join(f"{k} = {table[k]}\n" for k in table))
+            )
+    *library, own = top["effect"]["items"]["anyOf"]
+    assert own["properties"]["name"]["not"]["enum"] == [d.name for d in pendmap.effects()]
+    for found, definition in zip(library, pendmap.effects(), strict=True):
+        assert found["properties"]["name"] == {"const": definition.name}
+        parameters = found["properties"]["parameters"]
+        assert parameters["required"] == [p.name for p in definition.parameters]

@@ -33,6 +33,16 @@ SHAPES = {
     "stribeck_friction": {"vs": "width"},
     "viscous_warm_up": {"tau": "time constant"},
 }
+UNITS = {
+    "width": {"rad", "rad/s"},
+    "place": {"rad"},
+    "power": {"1"},
+    "order": {"1"},
+    "time constant": {"s"},
+    "frequency": {"rad/s"},
+    "instant": {"s"},
+    "mode": {"rad/s", "1"},
+}
 BARE = Units(1.0, si=False)
 
 
@@ -42,7 +52,8 @@ def test_every_parameter_has_a_role_and_every_effect_one_size() -> None:
         assert set(roles.values()) <= ROLES, effect.name
         assert list(roles.values()).count("size") == 1, effect.name
         shapes = {n: r for n, r in roles.items() if r not in {"size", "phase"}}
-        assert shapes == SHAPES.get(effect.name, {}), effect.name
+        assert shapes == SHAPES.get(effect.name, shapes), effect.name
+        assert all(p.unit in UNITS[p.role] for p in effect.parameters if p.name in shapes)
         turn = [p for p in effect.parameters if p.role == "phase"]
         assert all(p.unit == "rad" and p.typical[1] - p.typical[0] > 6 for p in turn), effect.name
 

@@ -37,9 +37,9 @@ FAINT = 1e-5
 
 @pytest.fixture(scope="module")
 def sindy() -> ModuleType:
-    """``benchmarks/sindy_features.py``."""
-    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-    return importlib.import_module("sindy_features")
+    """``benchmarks/blind/sindy_features.py``."""
+    sys.path.insert(0, str(Path(__file__).parents[2]))
+    return importlib.import_module("benchmarks.blind.sindy_features")
 
 
 class Motion(NamedTuple):

@@ -9,7 +9,7 @@ import dataclasses
 class Thresholds:
     """Numbers that decide a diagnosis.
 
-    ``benchmarks/thresholds.py`` halves and doubles each of them and counts how many verdicts
+    ``benchmarks/blind/thresholds.py`` halves and doubles each of them and counts how many verdicts
     change; the table is in ``docs/diagnose.md``.
 
     Parameters

@@ -209,7 +209,7 @@ def probabilities(chance: float, gains: Sequence[float]) -> tuple[float, ...]:
 
     ``P = 1 / (1 + exp(-z))``, ``z = b0 + b1 log10(chance) + b2 (effects - 1)
     + b3 log10(gain / strongest) + b4 log10(strongest / 100)``, fitted to right and wrong names of
-    blind experiments (``benchmarks/blind_calibration.py``), in a part of which the true effect was
+    blind experiments (``benchmarks/blind/calibration.py``), in a part of which the true effect was
     withheld: then the nearest one takes its place, or two or three together.
     """
     rows = features(chance, gains)

@@ -1,9 +1,4 @@
-"""The models: a pendulum without dimensions, a rig in SI, their effects and their files.
-
-``effects`` reads the library, ``library`` shows it, ``formula`` is an effect of the user's own,
-``units`` holds the one formula of conversion, ``pendulum`` and ``rig`` are the two kinds of model,
-``quantities`` finds a rig's numbers from what was given, ``files`` reads and writes TOML.
-"""
+"""The models: a pendulum without dimensions, a rig in SI, their effects and their files."""
 
 from pendmap.model.effects import Effect
 from pendmap.model.files import load_model, save_model

@@ -1,4 +1,4 @@
-"""The table ``[covariance]`` of a model's notes: what was fitted, and how well it is known."""
+"""The table ``[covariance]`` of a model's notes: uncertainty of the fitted parameters."""
 
 from __future__ import annotations
 
@@ -17,35 +17,20 @@ if TYPE_CHECKING:
 
 MISSES: Final = 1.5
 """Residual over noise above which a model misses its record."""
-
 _ROUNDING: Final = 1e-9
-"""Negative eigenvalues of a correlation that are no more than rounding."""
+"""Largest negative eigenvalue of a correlation per parameter that is rounding."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Covariance:
-    """What was fitted, and how well it is known.
+    """Uncertainty of the fitted parameters, in the model's own units."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        The parameters, in the model's own units: ``w0``, ``EFFECT.PARAMETER``, ...
-    matrix : ndarray of float, shape (K, K)
-        Their covariance, the variance between runs included.
-    """
-
-    names: tuple[str, ...]
-    matrix: NDArray[np.float64]
+    names: tuple[str, ...]  # w0, EFFECT.PARAMETER, ...
+    matrix: NDArray[np.float64]  # the variance between runs included, shape (K, K)
 
     @property
     def root(self) -> NDArray[np.float64]:
-        """Return ``A``, shape (K, K), with ``A A^T`` the matrix.
-
-        Raises
-        ------
-        InputError
-            If there is none: a variance is negative, or a correlation impossible.
-        """
+        """Return ``A``, shape (K, K), with ``A A^T`` the matrix."""
         size = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
         scale = np.where(size > 0, size, 1.0)
         values, vectors = np.linalg.eigh(self.matrix / np.outer(scale, scale))
@@ -58,21 +43,10 @@ class Covariance:
 
 
 def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
-    """Return what the notes of a model hold of its uncertainty; none where they hold nothing.
+    """Return the uncertainty in a model's notes, if any, without that of single runs and sensors.
 
     ``[covariance]`` has ``names`` and ``matrix``, and may have ``between_runs``, standard
-    deviations between runs by name, whose squares are added to the diagonal. What belongs to
-    single runs (``phi[2]``) or to a sensor is left out: the rest is the marginal distribution.
-
-    Parameters
-    ----------
-    notes : mapping
-        As of :class:`pendmap.Rig`.
-
-    Raises
-    ------
-    InputError
-        If the table is not of that form.
+    deviations between runs by name, whose squares are added to the diagonal.
     """
     if "covariance" not in notes:
         return None
@@ -102,10 +76,10 @@ def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
 
 
 def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
-    """Return notes whose covariance has no more of the parameters that are known exactly."""
+    """Return notes whose covariance lacks the parameters that are known exactly."""
     try:
         known = covariance_of(notes)
-    except InputError:  # said where it is drawn from
+    except InputError:  # refused where draws are made of it
         known = None
     if known is None or not set(known.names) & set(exact):
         return dict(notes)
@@ -124,10 +98,7 @@ def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
 
 
 def misses(notes: Mapping[str, Any]) -> float:
-    """Return residual over noise where a model misses the record it was fitted to; else nan.
-
-    ``[provenance]`` has both: ``rms`` and ``noise``, rad. It misses where ``rms > 1.5 noise``.
-    """
+    """Return ``rms / noise`` of ``[provenance]`` where a model misses its record; else nan."""
     table = notes.get("provenance", {})
     rms, noise = (table.get(name) for name in ("rms", "noise"))
     if not all(isinstance(x, int | float) and x > 0 for x in (rms, noise)):
@@ -137,6 +108,6 @@ def misses(notes: Mapping[str, Any]) -> float:
 
 
 def said_of(notes: Mapping[str, Any]) -> dict[str, float | str]:
-    """Return the attribute ``misses_record`` of a dataset, where a model misses its record."""
+    """Return the attribute ``misses_record`` of a dataset where a model misses its record."""
     ratio = misses(notes)
     return {"misses_record": ratio} if math.isfinite(ratio) else {}

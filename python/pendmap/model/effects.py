@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 _NO_SHAPE: Final = ("size", "phase")
 
-
 _Bounds = tuple[float, float]
 ParameterKey = tuple[str, float, int | None, str, _Bounds, _Bounds, str, str | None]
 FormulaKey = tuple[str, str, str, tuple[ParameterKey, ...]]
@@ -34,11 +33,11 @@ class Described(Protocol):
 
     @property
     def key(self) -> FormulaKey:
-        """What the kernel takes."""
+        """The argument of the kernel."""
 
     @property
     def entry(self) -> dict[str, Any]:
-        """Formula, parameters and the rest, as of the library's effects."""
+        """Definition, like that of an effect of the library."""
 
     @property
     def table(self) -> dict[str, Any]:
@@ -47,41 +46,32 @@ class Described(Protocol):
 
 @functools.cache
 def library() -> dict[str, dict[str, Any]]:
-    """Return the library's effects by name: formula, group, parameters and the rest.
-
-    It is written in Rust; nothing about an effect is written here.
-    """
+    """Return the library's effects by name, as they are written in Rust."""
     from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
 
     return {entry["name"]: entry for entry in _core.effects()}
 
 
 def is_shape(entry: Mapping[str, Any]) -> bool:
-    """Whether a parameter says how an effect acts, not how strongly or at which phase."""
+    """Return whether a parameter is neither the strength of an effect nor its phase."""
     return entry["role"] not in _NO_SHAPE
 
 
 def opposes(definition: Mapping[str, Any]) -> bool:
-    """Whether an effect of this definition is damping whose size is 0 or more."""
+    """Return whether an effect of this definition is damping whose size is 0 or more."""
     entries = (entry for entry in definition["parameters"] if entry["role"] == "size")
     return definition["group"] == "damping" and all(e["typical"][0] >= 0 for e in entries)
 
 
 def middle(entry: Mapping[str, Any]) -> float:
-    """Return a usual value of a shape: in the middle of what is typical, by ratio if positive."""
+    """Return the middle of a shape's typical range, by ratio if it is positive."""
     low, high = entry["typical"]
     value: float = math.sqrt(low * high) if low > 0 else 0.5 * (low + high)
     return float(round(value)) if entry["role"] == "order" else value
 
 
 def definition(name: object) -> dict[str, Any]:
-    """Return what the library says about an effect.
-
-    Raises
-    ------
-    InputError
-        If it has none of that name.
-    """
+    """Return what the library states about an effect; raise InputError if it has none."""
     known = library()
     if not isinstance(name, str) or name not in known:
         near = difflib.get_close_matches(str(name), known, n=1)
@@ -108,19 +98,24 @@ class Effect:
     parameters : mapping of str to float
         A value for each of its parameters.
     ci95 : mapping of str to (float, float), optional
-        Where they were fitted, their intervals of 95 %.
+        95 % intervals of fitted parameters.
     probability : float, optional
-        Where it was diagnosed, the probability that its name is right.
+        Probability that the name of a diagnosed effect is right.
     approximate : bool, optional
         Whether its form is only nearly right.
     formula : Formula, optional
-        Where the library has none of that name: the user's own.
+        The user's own formula, if the library has none of that name.
 
     Raises
     ------
     InputError
         If the library has no such effect, a parameter is missing, not known or not finite, or an
         interval is none.
+
+    Examples
+    --------
+    >>> Effect("quadratic_drag", {"q": 0.01}).sizes
+    ['q']
     """
 
     name: str
@@ -137,9 +132,9 @@ class Effect:
         given = _mapping(f"{self.name}: parameters", self.parameters, names)
         missing = [name for name in names if name not in given]
         if missing:
-            raise InputError(
-                f"{self.name}: {missing[0]} is missing: it needs {', '.join(self.described())}"
-            )
+            entries = self.definition["parameters"]
+            needed = ", ".join(f"{entry['name']} ({entry['unit']})" for entry in entries)
+            raise InputError(f"{self.name}: {missing[0]} is missing: it needs {needed}")
         values = {name: check_number(f"{self.name}: {name}", given[name]) for name in names}
         object.__setattr__(self, "parameters", values)
         given = _mapping(f"{self.name}: ci95", self.ci95, names)
@@ -160,43 +155,27 @@ class Effect:
 
     @property
     def definition(self) -> dict[str, Any]:
-        """What the library, or the formula, says about it."""
+        """The definition by the library, or by the formula."""
         return definition(self.name) if self.formula is None else self.formula.entry
 
     @property
     def kernel(self) -> tuple[str | FormulaKey, list[float]]:
-        """It as the kernel takes it."""
+        """The arguments of the kernel."""
         return (self.name if self.formula is None else self.formula.key), self.values
 
     @classmethod
     def blank(cls, name: str, units: Units) -> Effect:
-        """Return an effect where a search may begin: as weak as is of interest, of a usual shape.
-
-        Parameters
-        ----------
-        name : str
-            One of the library.
-        units : Units
-            Those that its parameters are wanted in.
-        """
-        entry = definition(name)
-        values = {}
-        for parameter in entry["parameters"]:
-            if is_shape(parameter):
-                values[parameter["name"]] = float(f"{middle(parameter):.1g}")
-            else:
-                values[parameter["name"]] = parameter["typical"][0]
-        return cls(entry["name"], values).given(units)
+        """Return an effect of the library where a search may begin: weak, of a usual shape."""
+        values = {
+            entry["name"]: float(f"{middle(entry):.1g}") if is_shape(entry) else entry["typical"][0]
+            for entry in definition(name)["parameters"]
+        }
+        return cls(name, values).given(units)
 
     @property
     def sizes(self) -> list[str]:
-        """The names of its parameters that say how strong it is, and at which phase it acts."""
+        """Names of the parameters that are its strength or the phase at which it acts."""
         return [entry["name"] for entry in self.definition["parameters"] if not is_shape(entry)]
-
-    def described(self) -> list[str]:
-        """Return the names of its parameters with their SI units."""
-        entries = self.definition["parameters"]
-        return [f"{entry['name']} ({entry['unit']})" for entry in entries]
 
     @property
     def values(self) -> list[float]:
@@ -205,36 +184,30 @@ class Effect:
 
     @property
     def drives(self) -> bool:
-        """Whether it moves the pivot, or pushes with the phase of what does."""
+        """Whether it moves the pivot, or pushes with the phase of the drive."""
         return bool(self.definition["group"] == "drive")
 
     @property
     def brakes(self) -> bool:
-        """Whether it is a kind of damping or friction."""
+        """Whether it is damping or friction."""
         return bool(self.definition["group"] == "damping")
 
     @property
     def reads(self) -> bool:
-        """Whether it changes the sensor's reading alone, not the motion."""
+        """Whether it changes the sensor's reading alone."""
         return bool(self.definition["group"] == "reading")
 
     @property
     def drifts(self) -> bool:
-        """Whether it changes with the time in the laboratory; maps hold that still."""
+        """Whether it changes with the time in the laboratory, which maps hold."""
         return bool(self.definition["mappable"] == "frozen")
 
     def title(self, units: Units, without: Collection[str] = ()) -> str:
-        """Return name and parameters, short: with their units in SI, else with those of angles.
-
-        Parameters ``EFFECT.PARAMETER`` of ``without``, which vary, are left out.
-        """
-        entries = [
-            entry
-            for entry in self.definition["parameters"]
-            if f"{self.name}.{entry['name']}" not in without
-        ]
+        """Return name and parameters, those of ``without`` (``EFFECT.PARAMETER``) left out."""
         shown = []
-        for entry in entries:
+        for entry in self.definition["parameters"]:
+            if f"{self.name}.{entry['name']}" in without:
+                continue
             said = units.si or (entry["power_of_w0"] == 0 and entry["power_of_w0_less"] is None)
             unit = entry["unit"] if said and entry["unit"] != "1" else ""
             shown.append(f"{entry['name']} = {self.parameters[entry['name']]:.4g} {unit}".rstrip())
@@ -252,7 +225,7 @@ class Effect:
         def power(entry: dict[str, Any]) -> float:
             less = entry["power_of_w0_less"]
             own: float = entry["power_of_w0"]
-            # The exponents have the power 0: they are the same in all units.
+            # Exponents have the power 0: they are the same in all units.
             return own if less is None else own - self.parameters[less]
 
         powers = {entry["name"]: power(entry) for entry in self.definition["parameters"]}

@@ -28,36 +28,34 @@ def load_model(
     may stand for ``gamma`` = 2 zeta. A key that is left out is 0. Each ``[[effect]]`` has a
     ``name`` and ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``; each
     ``[[formula]]`` is a :class:`Formula`, which effects may name; ``[covariance]`` and
-    ``[provenance]`` are kept as they are in the model's ``notes``; what is typed is known exactly,
-    and no longer part of the covariance.
+    ``[provenance]`` are kept in the model's ``notes``; typed parameters are known exactly and are
+    no part of the covariance. Editors complete keys from the JSON Schema that
+    ``python -m pendmap.model.schema`` prints.
 
     Parameters
     ----------
     path : str or path
         The file.
     typed : mapping of str to float, optional
-        Parameters that count instead of the file's: those of a pendulum without dimensions, also
-        where the file is in SI, and there ``stroke_mm`` and ``frequency_hz``.
+        Parameters that replace the file's: those of a pendulum without dimensions, also where the
+        file is in SI, and there ``stroke_mm`` and ``frequency_hz``.
 
     Returns
     -------
     Pendulum or Rig
-        Whichever the file's keys say.
+        By the file's keys.
 
     Raises
     ------
     InputError
-        If the file is not TOML, has keys that are not known, keys of both kinds, values that are
-        no numbers or outside their ranges, or numbers that contradict; on one line that names the
-        file.
+        If the file is not TOML, has unknown keys, keys of both kinds, values outside their ranges,
+        or numbers that contradict; on one line that names the file.
     OSError
         If it cannot be read.
     """
-    arguments = read_arguments(path, typed)
+    si, arguments = read_arguments(path, typed)
     with in_file(path):
-        if arguments.si:
-            return Rig.of(**arguments.values)
-        return Pendulum(**arguments.values)
+        return Rig.of(**arguments) if si else Pendulum(**arguments)
 
 
 def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
@@ -81,6 +79,12 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
         If it is no model, the suffix is not .toml, or the notes are no tables for TOML.
     OSError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> path = save_model(Pendulum(gamma=0.2, p=0.6), "model.toml")
+    >>> load_model(path).gamma
+    0.2
     """
     if not isinstance(model, Rig):
         check_type("model", model, Pendulum, "Pendulum(p=0.6)")
@@ -104,7 +108,7 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
 
 
 def _table(effect: Effect) -> dict[str, Any]:
-    """Return an effect as a table; what it does not say is left out."""
+    """Return an effect as a table without empty keys."""
     said = {key: getattr(effect, key) for key in EFFECT}
     said["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
     return {key: value for key, value in said.items() if value is not None}

@@ -22,10 +22,10 @@ _DRIVE: Final = ("p", "Omega", "omega", "phi", "phase")
 _TAKEN: Final = frozenset(("w0", "length_m", "gravity", "torque", *_DAMPING, *_DRIVE))
 """Names of a pendulum's own parameters."""
 
-_FORMULA: Final = ("name", "term", "parameters", "revealed_by")
-_PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
+FORMULA: Final = ("name", "term", "parameters", "revealed_by")
+PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
 _TYPICAL: Final = (1e-4, 0.3)
-"""Values of interest where none are said: as of the library's sizes."""
+"""Default values of interest: those of the library's sizes."""
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
 
 
@@ -33,9 +33,8 @@ _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
 class Formula:
     """An effect of your own, written as a formula.
 
-    It joins whatever effects of the library do: models, trajectories, maps, fits, the candidates of
-    a diagnosis. Called with values for its parameters it makes an
-    :class:`~pendmap.Effect`.
+    Models, trajectories, maps, fits and a diagnosis take it like an effect of the library. Called
+    with values for its parameters it returns an :class:`~pendmap.Effect`.
 
     Parameters
     ----------
@@ -53,20 +52,19 @@ class Formula:
 
         - ``power``: its value in SI is the one without dimensions times this power of ``w0``; or
           ``"2 - n"``, with another parameter ``n``;
-        - ``role``: what it does: ``size``, ``width``, ``place``, ``power``, ``order`` (how many
-          times in a turn, a whole number), ``time constant``, ``phase``, ``frequency``,
-          ``instant`` (when it happens) or ``mode`` (frequency or damping ratio of a mode of the
-          rig); by default as the term and the power of ``w0`` show it;
-        - ``typical``: the smallest and the largest value of interest, without dimensions, where a
-          search looks; by default 1e-4 and 0.3;
+        - ``role``: ``size``, ``width``, ``place``, ``power``, ``order`` (times in a turn, a whole
+          number), ``time constant``, ``phase``, ``frequency``, ``instant`` or ``mode`` (frequency
+          or damping ratio of a mode of the rig); by default by the term and the power of ``w0``;
+        - ``typical``: the smallest and the largest value of interest, without dimensions, that a
+          search covers; by default 1e-4 and 0.3;
         - ``range``: the least and the greatest value allowed, without dimensions; by default any;
-        - ``unit``, in SI, and ``meaning``: for those who read.
+        - ``unit``, in SI, and ``meaning``.
 
-        The first one is the size; a diagnosis wants a term that is proportional to it. A further
-        one in which the term repeats every turn is a phase; all others are shapes, of which a
-        diagnosis scans the first.
+        The first one is the size; a diagnosis needs a term proportional to it. A further one in
+        which the term repeats every turn is a phase; all others are shapes, of which a diagnosis
+        scans the first.
     revealed_by : str
-        Which data show it, for the advice of a diagnosis.
+        Data that show it, for the advice of a diagnosis.
 
     Raises
     ------
@@ -76,16 +74,15 @@ class Formula:
 
     Notes
     -----
-    ``sign(v)`` times what does not vanish at rest is dry friction and sticks as exactly as the
-    library's. Where the argument of one ``abs``, ``min`` or ``max`` passes zero steps end, so that
-    precision is kept; with several such arguments it falls to a low order there, and more steps are
-    taken.
+    ``sign(v)`` times a factor that does not vanish at rest is dry friction and sticks exactly.
+    Steps end where the argument of one ``abs``, ``min`` or ``max`` passes zero; with several such
+    arguments the order is low there, and more steps are taken.
 
     Examples
     --------
     >>> drag = Formula("root_drag", "-k*sqrt(abs(v))*sign(v)", {"k": 1.5})
-    >>> drag(k=0.02).title
-    'root_drag (k = 0.02)'
+    >>> drag(k=0.02).parameters
+    {'k': 0.02}
     """
 
     name: str
@@ -123,12 +120,8 @@ class Formula:
         with core_errors():
             entry, proportional = _core.formula(key)
         kept = {part[0]: _said(part, names) for part in parts}
-        for what, value in (
-            ("parameters", kept),
-            ("key", key),
-            ("entry", entry),
-            ("proportional", proportional),
-        ):
+        found = {"parameters": kept, "key": key, "entry": entry, "proportional": proportional}
+        for what, value in found.items():
             object.__setattr__(self, what, value)
 
     def __hash__(self) -> int:
@@ -144,8 +137,8 @@ class Formula:
     ) -> Formula:
         """Return the formula that a Python function computes.
 
-        The function is called once, with names in place of numbers: what it computes becomes the
-        term, which then runs compiled, in maps too. The function itself is not kept.
+        The function is called once, with names in place of numbers; the term that it computes runs
+        compiled, in maps too.
 
         Parameters
         ----------
@@ -161,10 +154,11 @@ class Formula:
         ------
         InputError
             If the function branches on values, looks up a table, or does something else that no
-            formula can say; or as :class:`Formula`.
+            formula has; or as :class:`Formula`.
 
         Examples
         --------
+        >>> import numpy as np
         >>> def root_drag(theta, v, t, phase, parameters):
         ...     return -parameters["k"] * np.sqrt(np.abs(v)) * np.sign(v)
         >>> Formula.of(root_drag, {"k": 1.5}).term
@@ -177,24 +171,18 @@ class Formula:
             shown = short_repr(function)
             raise InputError(f"function must be a function of five arguments, got {shown}")
         if not isinstance(parameters, Mapping):
-            return cls(called, "0", parameters)  # which says what is wrong with them
+            return cls(called, "0", parameters)  # which raises
         return cls(called, term_of(function, parameters, called), parameters)
 
     @property
     def table(self) -> dict[str, Any]:
-        """It as a table ``[[formula]]`` of a file."""
+        """The table ``[[formula]]`` of a file."""
         table = {"name": self.name, "term": self.term, "parameters": dict(self.parameters)}
         return table | ({"revealed_by": self.revealed_by} if self.revealed_by else {})
 
 
 def formulas_of(tables: object) -> dict[str, Formula]:
-    """Return the formulas of a file's ``[[formula]]`` by name.
-
-    Raises
-    ------
-    InputError
-        If one is not as :class:`Formula` wants it, or a name is there twice.
-    """
+    """Return the formulas of a file's tables ``[[formula]]`` by name, each name once."""
     if not isinstance(tables, list):
         raise InputError(f"formula must be [[formula]], one table each, got {short_repr(tables)}")
     found: dict[str, Formula] = {}
@@ -202,11 +190,11 @@ def formulas_of(tables: object) -> dict[str, Formula]:
         where = f"[[formula]] {count}"
         if not isinstance(table, dict):
             raise InputError(f"{where} must be a table, got {short_repr(table)}")
-        unknown = [key for key in table if key not in _FORMULA]
+        unknown = [key for key in table if key not in FORMULA]
         if unknown:
-            known = ", ".join(_FORMULA)
+            known = ", ".join(FORMULA)
             raise InputError(f"{where}: {unknown[0]} is not known: it must be one of {known}")
-        missing = [key for key in _FORMULA[:3] if key not in table]
+        missing = [key for key in FORMULA[:3] if key not in table]
         if missing:
             raise InputError(f"{where}: {missing[0]} is missing: a formula needs it")
         formula = Formula(**table)
@@ -219,7 +207,7 @@ def formulas_of(tables: object) -> dict[str, Formula]:
 
 
 def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
-    """Read the formulas of a file: its tables ``[[formula]]``.
+    """Read the tables ``[[formula]]`` of a file.
 
     Parameters
     ----------
@@ -229,7 +217,7 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
     Raises
     ------
     InputError
-        If it is not TOML, has no formulas, or one that is not as :class:`Formula` wants it.
+        If it is not TOML, has no formulas, or one that :class:`Formula` refuses.
     OSError
         If it cannot be read.
     """
@@ -251,17 +239,16 @@ def _parameter(name: object, given: object, names: list[Any]) -> ParameterKey:
     if not isinstance(name, str):
         raise InputError(f"parameter must be a name, got {short_repr(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
-    unknown = [key for key in said if key not in _PARAMETER]
+    unknown = [key for key in said if key not in PARAMETER]
     if unknown:
         raise InputError(
             f"parameter '{name}': {short_repr(unknown[0])} is not known: it must be one "
-            f"of {', '.join(_PARAMETER)}"
+            f"of {', '.join(PARAMETER)}"
         )
     if "power" not in said:
         raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
     power, less = _power(name, said["power"], names)
-    plain = "1" if power == 0 and less is None else _unit(power, less, names)
-    unit = _text(name, "unit", said.get("unit", plain))
+    unit = _text(name, "unit", said.get("unit", _unit(power, less, names)))
     meaning = _text(name, "meaning", said.get("meaning", ""))
     typical = _bounds(name, "typical", said.get("typical", _TYPICAL))
     allowed = _bounds(name, "range", said.get("range", (-math.inf, math.inf)))
@@ -302,35 +289,33 @@ def _role(name: str, value: object, *, first: bool) -> str:
 
 
 def _unit(power: float, less: int | None, names: list[Any]) -> str:
-    return f"s^({names[less]}-2)" if less is not None else f"s^{-power:g}"
+    if less is not None:
+        return f"s^({names[less]}-2)"
+    return f"s^{-power:g}" if power != 0 else "1"
 
 
 def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
         shown = short_repr(value)
         raise InputError(f"parameter '{name}': {what} must be [low, high], got {shown}")
-    low, high = value
-    infinite = what == "range"
-    ends = (
-        float(end)
-        if infinite and isinstance(end, float) and math.isinf(end)
+    low, high = (
+        end
+        if what == "range" and isinstance(end, float) and math.isinf(end)
         else check_number(f"parameter '{name}': {what}", end)
-        for end in (low, high)
+        for end in value
     )
-    low, high = ends
     return low, high
 
 
 def _said(part: ParameterKey, names: list[str]) -> dict[str, Any]:
-    """Return a parameter as a table says it; what is as by default is left out."""
+    """Return a parameter as a table, without defaults."""
     _, power, less, unit, allowed, typical, meaning, role = part
     said: dict[str, Any] = {"power": power if less is None else f"2 - {names[less]}"}
     if typical != _TYPICAL:
         said["typical"] = list(typical)
     if allowed != (-math.inf, math.inf):
         said["range"] = list(allowed)
-    plain = "1" if power == 0 and less is None else _unit(power, less, names)
-    if unit != plain:
+    if unit != _unit(power, less, names):
         said["unit"] = unit
     if meaning:
         said["meaning"] = meaning

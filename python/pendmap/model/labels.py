@@ -1,41 +1,63 @@
-"""Units of what a fit finds, as people write them."""
+"""Symbol, unit and meaning of every parameter of a pendulum, once."""
 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from pendmap.model import effects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-
 _RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
-_UNITS: Final = {
-    "w0": "rad/s",
-    "c_over_m": "1/s",
-    "Tr": "rad/s\N{SUPERSCRIPT TWO}",
-    "torque": "rad/s\N{SUPERSCRIPT TWO}",
-    "offset": "rad",
-    "tilt": "rad",
-    "phi": "rad",
-    "Omega": "rad/s",
+
+class Label(NamedTuple):
+    """A parameter as pictures, tables and messages name it."""
+
+    symbol: str
+    unit: str  # in plain characters; empty of a pure number
+    meaning: str
+
+
+LABELS: Final[Mapping[str, Label]] = {
+    "w0": Label("w0", "rad/s", "natural frequency sqrt(g / l) of small swings"),
+    "length_m": Label("l", "m", "equivalent length g / w0^2"),
+    "c_over_m": Label("c/m", "1/s", "viscous damping c / m"),
+    "zeta": Label("zeta", "", "damping ratio c / (2 m w0)"),
+    "Omega": Label("\N{GREEK CAPITAL LETTER OMEGA}", "rad/s", "angular frequency of the drive"),
+    "frequency_hz": Label("f", "Hz", "frequency of the drive"),
+    "p": Label("p", "", "amplitude Y Omega^2 / g of the pivot's vertical acceleration"),
+    "Y": Label("Y", "m", "amplitude of the pivot's vertical motion"),
+    "stroke_mm": Label("Y", "mm", "amplitude of the pivot's vertical motion"),
+    "Tr": Label("Tr", "rad/s^2", "Coulomb friction over the moment of inertia"),
+    "torque": Label("torque", "rad/s^2", "constant torque over the moment of inertia"),
+    "phi": Label("\N{GREEK SMALL LETTER PHI}", "rad", "phase of the drive at t = 0"),
+    "lab_time_s": Label("lab time", "s", "time in the laboratory at t = 0"),
+    "gravity": Label("g", "m/s^2", "acceleration of gravity"),
+    "offset": Label("offset", "rad", "reading of the sensor at the lowest point"),
+    "tilt": Label("tilt", "rad", "inclination of the rig"),
+    "gamma": Label("\N{GREEK SMALL LETTER GAMMA}", "", "viscous damping c / (m w0)"),
+    "omega": Label("\N{GREEK SMALL LETTER OMEGA}", "", "frequency Omega / w0 of the drive"),
+    "phase": Label("\N{GREEK SMALL LETTER PHI}", "rad", "phase of the drive at tau = 0"),
+    "theta_r": Label("\N{GREEK SMALL LETTER THETA}r", "", "Coulomb friction Tr / w0^2"),
+    "lab_time": Label("lab time", "", "time in the laboratory at tau = 0, times w0"),
 }
-"""Units of what is fitted, in SI."""
+"""Parameters of a :class:`pendmap.Rig` in SI, of a sensor, and of a :class:`pendmap.Pendulum`.
+
+``p`` and ``torque`` have one name in both; without dimensions ``torque`` is a pure number.
+"""
 
 
 def unit_of(
     parameter: str, definition: Callable[[str], Mapping[str, Any]] = effects.definition
 ) -> str:
-    """Return the unit in SI of what a fit calls this, as ``w0`` or ``quadratic_drag.q``.
-
-    ``definition`` tells what is said of an effect, where there are others than the library's.
-    """
+    """Return the SI unit, with raised digits, of ``w0``, ``phi[2]`` or ``EFFECT.PARAMETER``."""
     effect, _, own = parameter.partition("[")[0].rpartition(".")
-    if not effect:
-        return _UNITS.get(own, "")
-    entries = definition(effect)["parameters"]
-    unit = str(next(entry["unit"] for entry in entries if entry["name"] == own))
+    if effect:
+        entries = definition(effect)["parameters"]
+        unit = str(next(entry["unit"] for entry in entries if entry["name"] == own))
+    else:
+        unit = LABELS[own].unit if own in LABELS else "1"
     return "" if unit == "1" else re.sub(r"\^(\d)", lambda m: m[1].translate(_RAISED), unit)

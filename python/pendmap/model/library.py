@@ -1,4 +1,4 @@
-"""The library of effects, for reading: what ``pendmap.effects()`` returns."""
+"""The library of effects as ``pendmap.effects()`` returns it."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ class EffectParameter:
     name : str
         Its key in model files.
     role : str
-        What it does: ``size``, ``width``, ``place``, ``power``, ``order`` (how many times in a
-        turn), ``time constant``, ``phase`` or ``mode`` (the frequency of a mode of the rig).
+        ``size``, ``width``, ``place``, ``power``, ``order`` (times in a turn), ``time constant``,
+        ``phase``, ``frequency``, ``instant`` or ``mode`` (of a mode of the rig).
     unit : str
         Its unit in SI.
     power_of_w0 : float
-        Its value in SI is the one without dimensions times this power of ``w0``;
+        Its value in SI is the one without dimensions times this power of ``w0``.
     power_of_w0_less : str or None
-        where it names another parameter of the effect, the power is that much less.
+        Another parameter of the effect, whose value is subtracted from that power.
     range : (float, float)
         The least and the greatest value allowed, without dimensions.
     typical : (float, float)
         The smallest and the largest value of interest, without dimensions.
     meaning : str
-        What it is.
+        Description in words.
     """
 
     name: str
@@ -50,7 +50,7 @@ class EffectParameter:
 
 @dataclasses.dataclass(frozen=True)
 class EffectDefinition:
-    """What the library says about an effect.
+    """Definition of an effect by the library.
 
     Attributes
     ----------
@@ -59,18 +59,18 @@ class EffectDefinition:
     group : str
         Where it acts: ``damping``, ``torque``, ``drive`` or ``reading``.
     family : str
-        What it is mistaken for first: ``damping``, ``dry friction``, ``position torque``,
+        Effects that it is confused with: ``damping``, ``dry friction``, ``position torque``,
         ``drive`` or ``reading``.
     formula : str
         Its term on the right of ``th'' = ...``, per moment of inertia, with ``v = th'``; of a drive
-        what the pivot does, of a reading what the sensor shows.
+        the motion of the pivot, of a reading that of the sensor.
     parameters : tuple of EffectParameter
         Its parameters, in order.
     mappable : str
         Whether a map over initial conditions can have it: ``yes``, ``frozen`` (with the time in the
         laboratory held) or ``no``.
     revealed_by : str
-        Which data show it.
+        Data that show it.
     """
 
     name: str
@@ -83,10 +83,10 @@ class EffectDefinition:
 
 
 def effects() -> list[EffectDefinition]:
-    """Return the library of effects, in the order in which it is shown.
+    """Return the definitions of the library's effects, which are written in Rust.
 
-    It is written in Rust, one file for each effect; nothing about one is written here.
-
+    Examples
+    --------
     >>> import pendmap
     >>> [effect.formula for effect in pendmap.effects() if effect.name == "quadratic_drag"]
     ['-q v |v|']
@@ -95,7 +95,7 @@ def effects() -> list[EffectDefinition]:
 
 
 def of_formulas(formulas: Iterable[Formula]) -> list[EffectDefinition]:
-    """Return the same about effects of a user's own."""
+    """Return the definitions of formulas of the user's own."""
     return [_effect(formula.entry) for formula in formulas]
 
 

@@ -11,6 +11,7 @@ from pendmap.errors import InputError, check_number, check_type, core_errors, sh
 from pendmap.model.covariance import said_of
 from pendmap.model.effects import Effect, FormulaKey
 from pendmap.model.formula import Formula
+from pendmap.model.labels import LABELS
 from pendmap.model.tables import in_file, read_arguments
 from pendmap.units import NONDIMENSIONAL, Units
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 Kernel = tuple[
     float, float, float, float, float, float, float, list[tuple[str | FormulaKey, list[float]]]
 ]
-"""What the kernel takes: the six of eq. 1.2 and 2.1, time in the laboratory, effects."""
+"""Arguments of the kernel: the six of eqs. 1.2 and 2.1, time in the laboratory, effects."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,8 +34,7 @@ class Pendulum:
     load, ``torque`` less the term with ``sin th``, is no greater than ``theta_r``.
 
     ``effects`` of the library, and of your own (:class:`pendmap.Formula`), add further terms.
-
-    Any real number will do for a parameter, numpy's too; a float is kept.
+    A parameter may be any real number; a float is kept.
 
     Parameters
     ----------
@@ -53,10 +53,10 @@ class Pendulum:
     lab_time : float
         Time in the laboratory at ``tau = 0``, times ``w0``, for effects that drift.
     effects : sequence of Effect
-        Whatever else acts, parameters without dimensions; kept as a tuple.
+        Further terms, parameters without dimensions; kept as a tuple.
     notes : mapping
-        ``covariance`` and ``provenance`` of the model file that it comes from; they are written
-        back unchanged, and no part of what is compared.
+        ``covariance`` and ``provenance`` of its model file, written back unchanged and not
+        compared.
 
     Raises
     ------
@@ -68,6 +68,11 @@ class Pendulum:
     References
     ----------
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eqs. 1.2 and 2.1.
+
+    Examples
+    --------
+    >>> Pendulum(gamma=0.2, p=0.6, omega=2.0).zeta
+    0.1
     """
 
     gamma: float = 0.1
@@ -93,7 +98,7 @@ class Pendulum:
         own = {name: (name, getattr(self, name)) for name in self.numbers()}
         object.__setattr__(self, "effects", checked_effects(self.effects, own))
         if self.effects:
-            _ = self.period  # the core refuses what is there twice, or outside its range
+            _ = self.period  # the core refuses effects that are there twice or outside their range
 
     @classmethod
     def numbers(cls) -> tuple[str, ...]:
@@ -102,12 +107,12 @@ class Pendulum:
 
     @property
     def units(self) -> Units:
-        """What results are counted in."""
+        """The units of results."""
         return NONDIMENSIONAL
 
     @property
     def zeta(self) -> float:
-        """The damping ratio ``gamma / 2``; the paper's section 2 writes gamma for it."""
+        """The damping ratio ``gamma / 2``, gamma in the paper's section 2."""
         return self.gamma / 2
 
     @property
@@ -125,18 +130,18 @@ class Pendulum:
 
     @property
     def parameters(self) -> Kernel:
-        """All that the kernel takes."""
+        """The arguments of the kernel."""
         own = (self.gamma, self.p, self.omega, self.phase, self.torque, self.theta_r)
         return (*own, self.lab_time, [effect.kernel for effect in self.effects])
 
     @property
     def angle_attributes(self) -> dict[str, float | str]:
-        """The attribute ``angle = "line"``, where an effect counts turns."""
+        """The attribute ``angle = "line"`` where an effect counts turns."""
         return {"angle": "line"} if self.counts_turns else {}
 
     @property
     def counts_turns(self) -> bool:
-        """Whether a turn makes a difference, as with an elastic torque: angles are not wrapped."""
+        """Whether the torque differs after a turn, so that angles are not wrapped."""
         if not self.effects:
             return False
         from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
@@ -145,7 +150,7 @@ class Pendulum:
 
     @property
     def attributes(self) -> dict[str, float | str]:
-        """The parameters as a dataset's attributes, as of a :class:`pendmap.Rig`."""
+        """The parameters as a dataset's attributes, like those of a :class:`pendmap.Rig`."""
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
         effects = {"effects": effects_json(self.effects)}
         own = effects | self.angle_attributes | said_of(self.notes)
@@ -153,62 +158,37 @@ class Pendulum:
 
     @property
     def title(self) -> str:
-        """The parameters in one line, zeros left out, a time that effects drift from not."""
-        shown = [("\N{GREEK SMALL LETTER GAMMA}", self.gamma), ("p", self.p)]
-        if is_driven(self.p, self.effects):
-            shown.append(("\N{GREEK SMALL LETTER OMEGA}", self.omega))
-        others = (
-            ("\N{GREEK SMALL LETTER PHI}", self.phase),
-            ("torque", self.torque),
-            ("\N{GREEK SMALL LETTER THETA}r", self.theta_r),
-            ("lab time", self.lab_time),
-        )
-        drifting = "lab time" if any(effect.drifts for effect in self.effects) else ""
-        shown += [(name, value) for name, value in others if value != 0 or name == drifting]
-        parts = [f"{name} = {value:g}" for name, value in shown]
+        """The parameters in one line, without zeros unless effects depend on them."""
+        shown = {"gamma", "p"} | {name for name in self.numbers() if getattr(self, name) != 0}
+        if not is_driven(self.p, self.effects):
+            shown.discard("omega")
+        if any(effect.drifts for effect in self.effects):
+            shown.add("lab_time")
+        named = [
+            (LABELS[name].symbol, getattr(self, name)) for name in self.numbers() if name in shown
+        ]
+        parts = [f"{symbol} = {value:g}" for symbol, value in named]
         return ", ".join([*parts, *(effect.title(self.units) for effect in self.effects)])
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:
-        """Read a model file without dimensions; see :func:`pendmap.load_model`.
-
-        A key that the file leaves out is 0 (``omega``: 1, which has no effect without ``p``).
-
-        Raises
-        ------
-        InputError
-            If it is no model file, or one in SI.
-        OSError
-            If it cannot be read.
-        """
-        arguments = read_arguments(path)
-        if arguments.si:
+        """Read a model file without dimensions, by :func:`pendmap.load_model`; refuse one in SI."""
+        si, arguments = read_arguments(path)
+        if si:
             raise InputError(
                 f"{path}: is in SI: Rig.from_toml reads it, and its property pendulum has no "
                 "dimensions"
             )
         with in_file(path):
-            return cls(**arguments.values)
+            return cls(**arguments)
 
 
 def checked_effects(
     effects: object, own: Mapping[str, tuple[str, float]], what: str = "effects"
 ) -> tuple[Effect, ...]:
-    """Return effects as a tuple.
+    """Return effects as a tuple; refuse one that repeats a parameter of a model.
 
-    Parameters
-    ----------
-    effects : sequence of Effect
-        As given.
-    own : mapping
-        For each parameter of a :class:`Pendulum` what the model calls it, and its value there.
-    what : str
-        What they are, for messages.
-
-    Raises
-    ------
-    InputError
-        If one is no effect, or says what a parameter says already.
+    ``own`` has the model's name and value of each parameter of a :class:`Pendulum`.
     """
     if not isinstance(effects, list | tuple):
         raise InputError(f"{what} must be a tuple of Effect, got {short_repr(effects)}")
@@ -216,7 +196,7 @@ def checked_effects(
         check_type(what, effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
         if effect.formula is not None:
             continue
-        # The library names the only parameter of such an effect as the paper names it.
+        # The library gives the only parameter of such an effect the paper's name.
         names = [entry["name"] for entry in effect.definition["parameters"]]
         if len(names) == 1 and names[0] in own:
             called, value = own[names[0]]
@@ -240,12 +220,18 @@ def effects_json(effects: tuple[Effect, ...]) -> str:
 
 
 def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:
-    """Return whether the equation depends on time, by the pivot's motion or by an effect."""
-    return p != 0 or any(effect.definition["group"] == "drive" for effect in effects)
+    """Return whether the pivot's motion or an effect drives the pendulum."""
+    return p != 0 or any(effect.drives for effect in effects)
 
 
 def effects_of(attributes: Mapping[Any, Any]) -> tuple[Effect, ...]:
-    """Return the effects that a result's attributes name, formulas included."""
+    """Return the effects that a result's attributes name, formulas included.
+
+    Examples
+    --------
+    >>> effects_of(Pendulum(effects=(Effect("quadratic_drag", {"q": 0.01}),)).attributes)[0].values
+    [0.01]
+    """
     found = []
     for entry in json.loads(attributes.get("effects", "[]")):
         table = entry.get("formula")

@@ -1,4 +1,4 @@
-"""A rig's numbers from whatever was given: natural frequency or length, stroke or p, and so on."""
+"""A rig's numbers from any of the ways to write them: natural frequency or length, stroke or p."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 GRAVITY: Final = 9.81
-"""Acceleration of gravity where nothing is said, m/s^2."""
+"""Acceleration of gravity where none is given, m/s^2."""
 
 GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
     "w0": ("w0", "length_m"),
@@ -20,43 +20,20 @@ GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
     "Omega": ("Omega", "frequency_hz"),
     "p": ("p", "Y", "stroke_mm"),
 }
-"""Ways to write one quantity, under the name that a :class:`pendmap.Rig` has for it."""
+"""Ways to write a quantity, by the name that a :class:`pendmap.Rig` has for it."""
 
 OPTIONAL: Final = ("Tr", "torque", "phi", "lab_time_s", "gravity")
-"""What has one way only."""
-
-SI_UNITS: Final[Mapping[str, str]] = {
-    "w0": "rad/s",
-    "length_m": "m",
-    "c_over_m": "1/s",
-    "zeta": "parts of critical damping",
-    "Omega": "rad/s",
-    "frequency_hz": "Hz",
-    "Y": "m",
-    "stroke_mm": "mm",
-    "Tr": "rad/s^2",
-    "torque": "rad/s^2",
-    "phi": "rad",
-    "lab_time_s": "s",
-    "gravity": "m/s^2",
-}
-"""What each is counted in; ``p`` is a share of gravity."""
+"""Quantities with one way to write them."""
 
 _POSITIVE: Final = ("length_m", "gravity", "Omega", "frequency_hz")
 _W0: Final = (1e-6, 1e6)
 _NOT_NEGATIVE: Final = ("c_over_m", "zeta", "Tr", "Y", "stroke_mm")
 _AGREE: Final = 1e-3
-"""Relative difference up to which two numbers for one quantity mean the same: rounded digits."""
+"""Largest relative difference of two numbers for one quantity: rounded digits."""
 
 
 def check(name: str, value: object) -> float:
-    """Return a quantity as a float, if it is one.
-
-    Raises
-    ------
-    InputError
-        If it is no finite number, or outside its range.
-    """
+    """Return a quantity as a float; raise InputError if it is outside its range."""
     number = check_number(name, value)
     low, high = _W0
     if name == "w0" and not low <= number <= high:
@@ -69,13 +46,7 @@ def check(name: str, value: object) -> float:
 
 
 def natural_frequency(given: Mapping[str, float]) -> float:
-    """Return ``w0`` in rad/s, given itself or as ``sqrt(gravity / length_m)``.
-
-    Raises
-    ------
-    InputError
-        If it is not there, or both are and contradict.
-    """
+    """Return ``w0`` in rad/s, given itself or as ``sqrt(gravity / length_m)``."""
     ways = {}
     gravity = check("gravity", given.get("gravity", GRAVITY))
     if "w0" in given:
@@ -95,30 +66,29 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
 
     ``w0 = sqrt(gravity / length_m)``, ``c_over_m = 2 zeta w0``, ``Omega = 2 pi frequency_hz``,
     ``p = Y Omega**2 / gravity`` with ``Y = stroke_mm / 1000`` the amplitude of the pivot's motion.
-    Two ways to write one quantity must agree to a thousandth, as rounded digits do; then the one
-    that the rig has a name for counts.
-
-    Raises
-    ------
-    InputError
-        If one is outside its range, two contradict, or one that is needed is missing.
+    Two ways to write one quantity must agree to a thousandth; the rig's own name takes precedence.
     """
     checked = {name: check(name, value) for name, value in given.items()}
     w0 = check("w0", natural_frequency(checked))
     result = {"w0": w0} | {name: checked[name] for name in OPTIONAL if name in checked}
 
-    ways = _given(checked, "c_over_m")
+    def settle(name: str, others: dict[str, float]) -> None:
+        own = {name: checked[name]} if name in checked else {}
+        if own or others:
+            result[name] = one(name, own | others)
+
+    ways = {}
     if "zeta" in checked:
         ways[f"2 zeta w0 of zeta = {checked['zeta']:g}"] = 2 * checked["zeta"] * w0
-    result |= _settled("c_over_m", ways)
+    settle("c_over_m", ways)
 
-    ways = _given(checked, "Omega")
+    ways = {}
     if "frequency_hz" in checked:
         hertz = checked["frequency_hz"]
         ways[f"2 pi f of frequency_hz = {hertz:g}"] = math.tau * hertz
-    result |= _settled("Omega", ways)
+    settle("Omega", ways)
 
-    ways = _given(checked, "p")
+    ways = {}
     gravity = checked.get("gravity", GRAVITY)
     for name, metre in (("Y", 1.0), ("stroke_mm", 1e-3)):
         if name not in checked:
@@ -129,27 +99,12 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
             )
         said = f"{name} = {checked[name]:g}, Omega = {result['Omega']:g} and gravity = {gravity:g}"
         ways[f"Y Omega^2/g of {said}"] = checked[name] * metre * result["Omega"] ** 2 / gravity
-    return result | _settled("p", ways)
-
-
-def _given(checked: Mapping[str, float], name: str) -> dict[str, float]:
-    """Return the first way to write a quantity, under its own name."""
-    return {name: checked[name]} if name in checked else {}
-
-
-def _settled(name: str, ways: Mapping[str, float]) -> dict[str, float]:
-    """Return a quantity under its name, where there is any way to it."""
-    return {name: one(name, ways)} if ways else {}
+    settle("p", ways)
+    return result
 
 
 def one(name: str, ways: Mapping[str, float]) -> float:
-    """Return the first of several values for one quantity; their keys say where each is from.
-
-    Raises
-    ------
-    InputError
-        If one differs from it by more than a thousandth.
-    """
+    """Return the first of several values for one quantity, by their sources; refuse others."""
     (first, value), *others = ways.items()
     for other, second in others:
         if abs(second - value) > _AGREE * max(abs(value), abs(second)):
@@ -170,5 +125,4 @@ COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
     "theta_r": ("Tr", 2),
     "lab_time": ("lab_time_s", -1),
 }
-"""For each parameter of a :class:`Pendulum` its name in a :class:`Rig`, and the power of ``w0``
-that makes the one the other."""
+"""Name in a :class:`Rig` of each parameter of a :class:`Pendulum`, and its power of ``w0``."""

@@ -10,9 +10,10 @@ from pendmap.errors import InputError, check_number, check_type
 from pendmap.model import quantities
 from pendmap.model.covariance import said_of
 from pendmap.model.effects import definition, library
+from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
 from pendmap.model.quantities import COUNTERPARTS
-from pendmap.model.tables import in_file, read_arguments
+from pendmap.model.tables import SI_KEYS, in_file, read_arguments
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def own_name(effect: str) -> str | None:
-    """Return the parameter of a :class:`Rig` that says the same as an effect, if any."""
+    """Return the parameter of a :class:`Rig` that is the same term as an effect, if any."""
     if effect not in library():
         return None
     entries = definition(effect)["parameters"]
@@ -60,9 +61,9 @@ class Rig:
     lab_time_s : float
         Time in the laboratory at ``t = 0``, s, for effects that drift.
     gravity : float
-        Acceleration of gravity, m/s^2; above 0. It matters for stroke and length alone.
+        Acceleration of gravity, m/s^2; above 0. Only stroke and length depend on it.
     effects : sequence of Effect
-        Whatever else acts, parameters in SI; kept as a tuple.
+        Further terms, parameters in SI; kept as a tuple.
     notes : mapping
         As of :class:`Pendulum`.
 
@@ -148,29 +149,21 @@ class Rig:
         >>> round(rig.w0, 4), round(rig.p, 4), round(rig.pendulum.gamma, 4)
         (6.2642, 0.2906, 0.02)
         """
-        known = [*(name for ways in quantities.GROUPS.values() for name in ways)]
-        known += quantities.OPTIONAL
-        unknown = [name for name in given if name not in known]
+        unknown = [name for name in given if name not in SI_KEYS]
         if unknown:
-            raise InputError(f"{unknown[0]} is not known: it must be one of {', '.join(known)}")
+            raise InputError(f"{unknown[0]} is not known: it must be one of {', '.join(SI_KEYS)}")
         return cls(**quantities.resolve(given), effects=effects, notes=notes or {})
 
     @classmethod
     def from_pendulum(
         cls, pendulum: Pendulum, w0: float, *, gravity: float = quantities.GRAVITY
     ) -> Rig:
-        """Return a pendulum without dimensions in SI.
+        """Return a pendulum without dimensions in SI, ``w0`` in rad/s; its covariance is dropped.
 
-        Of its notes the provenance is kept; a covariance was one of other numbers.
-
-        Parameters
-        ----------
-        pendulum : Pendulum
-            Without dimensions.
-        w0 : float
-            Natural frequency, rad/s; above 0.
-        gravity : float
-            As of :class:`Rig`.
+        Examples
+        --------
+        >>> Rig.from_pendulum(Pendulum(gamma=0.1, p=0.6, omega=2.0), 6.0).Omega
+        12.0
         """
         check_type("pendulum", pendulum, Pendulum, "Pendulum(p=0.6)")
         units = Units(quantities.check("w0", w0), si=True)
@@ -184,12 +177,12 @@ class Rig:
 
     @property
     def units(self) -> Units:
-        """What results are counted in."""
+        """The units of results."""
         return Units(self.w0, si=True)
 
     @functools.cached_property
     def pendulum(self) -> Pendulum:
-        """The same without dimensions; ``omega`` is 1 where nothing is driven."""
+        """The pendulum without dimensions; ``omega`` is 1 where nothing is driven."""
         units = self.units
         numbers = {
             bare: units.bare(getattr(self, si), power) for bare, (si, power) in COUNTERPARTS.items()
@@ -222,9 +215,8 @@ class Rig:
     def attributes(self) -> dict[str, float | str]:
         """The parameters as a dataset's attributes, in SI; effects as JSON.
 
-        ``gamma``, ``omega``, ``phase`` and ``theta_r``, which have no dimensions whatever the
-        units, stand there too, and ``misses_record``, residual over noise, of a model that misses
-        the record it was fitted to.
+        ``gamma``, ``omega``, ``phase`` and ``theta_r`` are among them, and ``misses_record``,
+        residual over noise, of a model that misses the record it was fitted to.
         """
         numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
         pendulum = self.pendulum
@@ -234,50 +226,43 @@ class Rig:
 
     @property
     def title(self) -> str:
-        """The parameters in one line, zeros left out, a time that effects drift from not."""
-        shown = [f"w0 = {self.w0:g} rad/s", f"c/m = {self.c_over_m:g} 1/s", f"p = {self.p:g}"]
-        if self.Omega != 0:
-            shown.append(f"\N{GREEK CAPITAL LETTER OMEGA} = {self.Omega:g} rad/s")
-        others = (
-            (f"\N{GREEK SMALL LETTER PHI} = {self.phi:g}", self.phi),
-            (f"torque = {self.torque:g} rad/s\N{SUPERSCRIPT TWO}", self.torque),
-            (f"Tr = {self.Tr:g} rad/s\N{SUPERSCRIPT TWO}", self.Tr),
-            (
-                f"lab time = {self.lab_time_s:g} s",
-                self.lab_time_s or any(effect.drifts for effect in self.effects),
-            ),
-        )
-        shown += [text for text, value in others if value != 0]
+        """The parameters in one line, without zeros unless effects depend on them."""
+        always = {"w0", "c_over_m", "p"}
+        if any(effect.drifts for effect in self.effects):
+            always.add("lab_time_s")
+        shown = []
+        for name in ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s"):
+            if getattr(self, name) != 0 or name in always:
+                unit = "" if name == "phi" else unit_of(name)
+                shown.append(f"{LABELS[name].symbol} = {getattr(self, name):g} {unit}".rstrip())
         return ", ".join([*shown, *(effect.title(self.units) for effect in self.effects)])
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Rig:
-        """Read a model file in SI; see :func:`pendmap.load_model`.
-
-        Raises
-        ------
-        InputError
-            If it is no model file, or one without dimensions.
-        OSError
-            If it cannot be read.
-        """
-        arguments = read_arguments(path)
-        if not arguments.si:
+        """Read a model file in SI, by :func:`pendmap.load_model`; refuse one without dimensions."""
+        si, arguments = read_arguments(path)
+        if not si:
             raise InputError(
                 f"{path}: has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum "
                 "puts it in SI with its w0"
             )
         with in_file(path):
-            return cls.of(**arguments.values)
+            return cls.of(**arguments)
 
 
 def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:
-    """Return a model as the kernel takes it, and the units that its results are wanted in.
+    """Return a model without dimensions, and the units of its results.
 
     Raises
     ------
     InputError
         If it is no model.
+
+    Examples
+    --------
+    >>> pendulum, units = without_dimensions(Rig(w0=6.0, c_over_m=0.6))
+    >>> round(pendulum.gamma, 3), units.name
+    (0.1, 'SI')
     """
     if isinstance(model, Rig):
         return model.pendulum, model.units
@@ -286,5 +271,5 @@ def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:
 
 
 def _kept(notes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what of a file's notes holds in other units too."""
+    """Return the notes that hold in other units too."""
     return {name: table for name, table in notes.items() if name != "covariance"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import difflib
 import os
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula, formulas_of
+from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
 
@@ -23,26 +23,19 @@ if TYPE_CHECKING:
 
 FORMAT: Final = 1
 """Version of the layout of model files, in their key ``format_version``."""
+TOP: Final = ("pendulum", "formula", "effect", "covariance", "provenance", "format_version")
 NOTES: Final = ("covariance", "provenance")
 EFFECT: Final = ("name", "parameters", "ci95", "probability", "approximate")
 
-_SI: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *quantities.OPTIONAL)
-_BARE: Final = (*COUNTERPARTS, "zeta")
-_ONLY_SI: Final = tuple(name for name in _SI if name not in _BARE)
-_ONLY_BARE: Final = tuple(name for name in _BARE if name not in _SI)
-
-
-@dataclasses.dataclass(frozen=True)
-class ModelArguments:
-    """Arguments of a model: of ``Rig.of`` where they are in SI, of ``Pendulum`` otherwise."""
-
-    si: bool
-    values: Mapping[str, Any]
+SI_KEYS: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *quantities.OPTIONAL)
+BARE_KEYS: Final = (*COUNTERPARTS, "zeta")
+_ONLY_SI: Final = tuple(name for name in SI_KEYS if name not in BARE_KEYS)
+_ONLY_BARE: Final = tuple(name for name in BARE_KEYS if name not in SI_KEYS)
 
 
 @contextlib.contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Put the name of a file before what is refused of it."""
+    """Put the name of a file before the message of an error in it."""
     try:
         yield
     except InputError as error:
@@ -51,37 +44,25 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
 def read_arguments(
     path: str | os.PathLike[str], typed: Mapping[str, float] | None = None
-) -> ModelArguments:
-    """Read a model file; see :func:`pendmap.load_model` for its arguments and errors."""
+) -> tuple[bool, dict[str, Any]]:
+    """Return whether a model file is in SI, and the arguments of ``Rig.of`` or ``Pendulum``."""
     content = read_toml(path)
     typed = dict(typed or {})
     with in_file(path):
         _check_top(content)
-        table = _pendulum_table(content)
+        table = content.get("pendulum")
+        if not isinstance(table, dict):
+            raise InputError("has no table [pendulum]")
         effects = _effects(content.get("effect", []), formulas_of(content.get("formula", [])))
         notes: dict[str, Any] = {name: content[name] for name in NOTES if name in content}
-        if _is_si(table):
-            exact = [_own_name(name) for name in typed]
-            numbers = _typed_over(table, typed)
-            return ModelArguments(
-                si=True, values={**numbers, "effects": effects, "notes": without(notes, exact)}
-            )
-        numbers = _bare_numbers(table, typed, effects)
-        return ModelArguments(
-            si=False, values={**numbers, "effects": effects, "notes": without(notes, typed)}
-        )
-
-
-def _pendulum_table(content: dict[str, Any]) -> dict[str, Any]:
-    table = content.get("pendulum")
-    if not isinstance(table, dict):
-        raise InputError("has no table [pendulum]")
-    return table
+        si = _is_si(table)
+        numbers = _typed_over(table, typed) if si else _bare_numbers(table, typed, effects)
+        exact = [_own_name(name) for name in typed] if si else typed
+        return si, {**numbers, "effects": effects, "notes": without(notes, exact)}
 
 
 def _check_top(content: dict[str, Any]) -> None:
-    known = ("pendulum", "formula", "effect", *NOTES, "format_version")
-    unknown = [key for key in content if key not in known]
+    unknown = [key for key in content if key not in TOP]
     if unknown:
         shown = f"[{unknown[0]}]" if isinstance(content[unknown[0]], dict) else unknown[0]
         tables = "[pendulum], [[formula]], [[effect]], [covariance], [provenance]"
@@ -92,13 +73,7 @@ def _check_top(content: dict[str, Any]) -> None:
 
 
 def check_notes(notes: object) -> None:
-    """Refuse what are no notes of a model.
-
-    Raises
-    ------
-    InputError
-        If they are no mapping, or have names or values that no model file has.
-    """
+    """Refuse notes that no model file can hold."""
     if not isinstance(notes, Mapping):
         raise InputError(f"notes must be a mapping, got {short_repr(notes)}")
     for name, table in notes.items():
@@ -111,9 +86,9 @@ def check_notes(notes: object) -> None:
 
 
 def _is_si(table: dict[str, Any]) -> bool:
-    """Whether a table is in SI; all its keys are checked."""
+    """Return whether a table is in SI; check all its keys."""
     for key in table:
-        if key not in _SI and key not in _BARE:
+        if key not in SI_KEYS and key not in BARE_KEYS:
             raise InputError(f"{_shown(key)} is not known{_instead(key)}")
     si = [key for key in table if key in _ONLY_SI]
     bare = [key for key in table if key in _ONLY_BARE]
@@ -130,26 +105,27 @@ def _shown(key: str) -> str:
 
 
 def _instead(key: str) -> str:
-    """Return the end of the sentence that a key is not known: what may stand in its place."""
+    """Return the end of the message that a key is not known: what may stand in its place."""
     stem = key.rsplit("_", 1)[0]
-    for known, unit in quantities.SI_UNITS.items():
-        if known.rsplit("_", 1)[0] in (key, stem) or known == stem:
+    for known in SI_KEYS:
+        if known != "p" and (known.rsplit("_", 1)[0] in (key, stem) or known == stem):
+            unit = LABELS[known].unit or "parts of critical damping"
             return f": it must be {known}, in {unit}"
-    near = difflib.get_close_matches(key, (*_BARE, *_SI), n=1, cutoff=0.7)
+    near = difflib.get_close_matches(key, (*BARE_KEYS, *SI_KEYS), n=1, cutoff=0.7)
     nearest = f", perhaps {near[0]} is meant" if near else ""
-    without = ", ".join(_BARE)
-    return f"{nearest}: it must be one of {without}, or in SI {', '.join(_SI)}"
+    without = ", ".join(BARE_KEYS)
+    return f"{nearest}: it must be one of {without}, or in SI {', '.join(SI_KEYS)}"
 
 
 def _own_name(name: str) -> str:
-    """Return what a :class:`Rig` calls a quantity that is typed."""
+    """Return the name in a :class:`Rig` of a quantity that is typed."""
     if name in COUNTERPARTS:
         return COUNTERPARTS[name][0]
     return next((own for own, ways in quantities.GROUPS.items() if name in ways), name)
 
 
 def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:
-    """Return the quantities of a table in SI with those that were typed in their places."""
+    """Return the quantities of a table in SI with those typed in their places."""
     units = Units(quantities.natural_frequency(table), si=True)
     numbers = dict(table)
     for name, value in typed.items():

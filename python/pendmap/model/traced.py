@@ -1,4 +1,4 @@
-"""A Python function read as a formula: called once with names in place of numbers."""
+"""The term of a formula from a Python function, called once with names in place of numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
 _SUM, _PRODUCT, _POWER, _WHOLE = range(4)
-"""How strongly a text is bound together; what binds less is put in brackets."""
+"""Precedence of operators; operands of lower precedence stand in brackets."""
 
 _USABLE: Final = (
     "arithmetic and numpy's sqrt, exp, log, sin, cos, tan, tanh, abs, sign, square, minimum, "
@@ -23,18 +23,18 @@ _USABLE: Final = (
 
 
 class _Text(np.lib.mixins.NDArrayOperatorsMixin):
-    """The text of what a function has computed so far."""
+    """The text of a term, with the precedence of its last operator."""
 
     def __init__(self, text: str, strength: int = _WHOLE) -> None:
         self.text = text
         self.strength = strength
 
     def at_least(self, strength: int) -> str:
-        """Return the text, in brackets where it is bound less strongly."""
+        """Return the text, in brackets if its precedence is lower."""
         return self.text if self.strength >= strength else f"({self.text})"
 
     def after(self, strength: int) -> str:
-        """Return the same where an operator or a sign stands before it."""
+        """Return the text for a place behind an operator or a sign."""
         return f"({self.text})" if self.text.startswith("-") else self.at_least(strength)
 
     def __array_ufunc__(
@@ -71,7 +71,7 @@ class _Text(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 def _joined(sign: str, strength: int, *, left: int = 0, right: int = 0) -> Callable[..., _Text]:
-    """Write an operator; ``left`` and ``right`` say how much more its operands must be bound."""
+    """Write an operator; ``left`` and ``right`` are added to the precedence of its operands."""
 
     def write(a: _Text, b: _Text) -> _Text:
         return _Text(f"{a.at_least(strength + left)}{sign}{b.after(strength + right)}", strength)
@@ -106,26 +106,11 @@ _WRITTEN: Final[dict[str, Callable[..., _Text]]] = {
 
 
 class _UnreadableError(Exception):
-    """Something that no formula has; its text says what."""
+    """An operation, named by its text, that no formula has."""
 
 
 def term_of(function: Callable[..., Any], parameters: Iterable[str], name: str) -> str:
-    """Return the term of a formula that computes what a function does.
-
-    Parameters
-    ----------
-    function : callable
-        As of :meth:`pendmap.Formula.of`.
-    parameters : iterable of str
-        The names of its parameters.
-    name : str
-        What it is called, for messages.
-
-    Raises
-    ------
-    InputError
-        If it does what no formula can say, or fails.
-    """
+    """Return the term that a function computes, as :meth:`pendmap.Formula.of` takes both."""
     known = {parameter: _Text(parameter) for parameter in parameters}
     variables = [_Text(variable) for variable in ("theta", "v", "t", "phase")]
     try:

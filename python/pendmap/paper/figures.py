@@ -1,4 +1,4 @@
-"""The paper's figures and its table by their numbers, on a virtual rig like the paper's."""
+"""The figures and table 1 of the paper by their numbers, on a virtual rig like the paper's."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from pendmap.identification import IdentificationReport
 
-
 TABLE: Final = "table1"
 FIGURES: Final = {
     "1": "Critical curves; strange attractors a, b and c",
@@ -33,10 +32,9 @@ FIGURES: Final = {
     "9": "Transient tumbling",
     TABLE: "Damping by each method, and what its simulation misses (%)",
 }
-"""What can be drawn, by the names a user types."""
+"""Titles of the figures, by the names a user types."""
 _TRANSIENT: Final = 500
-"""Periods that are left out before figure 2 begins."""
-_MOTIONS: Final = {"8": "steady_states", "9": "tumbling"}
+"""Forcing periods before figure 2 begins."""
 _RIG: Final = "virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s\u00b2"
 _PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
 
@@ -48,21 +46,16 @@ PRINTED: Final = {
 """The paper's table 1, percent: periods of 0.26 s and 1.54 s, peaks of 1.2 rad and 2.53 rad."""
 _PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 2.53 rad")
 
-
 _SQUARES: Final = (0.05, 1.6)
+"""Range of alpha^2 of figure 1."""
 _HIGHEST: Final = 2.6
+"""Largest e of figure 1."""
 _COLUMNS: Final = 120
-"""Range of alpha^2, largest e, and frequencies of figure 1."""
+"""Number of frequencies of figure 1."""
 
 
 def wanted(name: str) -> list[str]:
-    """Return the keys of :data:`FIGURES` that a user means, by ``4``, ``figure 4``, ``all``, ...
-
-    Raises
-    ------
-    InputError
-        If there is no such figure.
-    """
+    """Return the keys of :data:`FIGURES` that a user means by ``4``, ``figure 4``, ``all``, ..."""
     text = re.sub(r"[\s_.-]+", "", name.lower())
     text = re.sub(r"^(figure|fig)(?=\d)", "", text)
     if text == "all":
@@ -75,7 +68,7 @@ def wanted(name: str) -> list[str]:
 
 @functools.lru_cache(maxsize=1)
 def report(seed: int = 0) -> IdentificationReport:
-    """Return what is identified from the virtual rig's record, which is read as any other."""
+    """Return the damping identified from the virtual rig's record, written and read as a file."""
     import numpy as np  # noqa: PLC0415 (names are checked without it)
 
     from pendmap.identification import identify_experiment  # noqa: PLC0415
@@ -90,10 +83,7 @@ def report(seed: int = 0) -> IdentificationReport:
 
 
 def tumbling(periods: int = 6000) -> list[xr.Dataset]:
-    """Return trajectories at the paper's three points of tumbling chaos, without their transients.
-
-    Each begins at ``theta = 1`` at rest; the first 500 of all ``periods`` are left out.
-    """
+    """Return trajectories from 1 rad at rest at the paper's three points of tumbling chaos."""
     from pendmap.analysis.trajectory import simulate  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415 (likewise)
 
@@ -107,25 +97,9 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
 
 
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
-    """Draw one figure, or the table, into a file.
-
-    Parameters
-    ----------
-    key : str
-        A key of :data:`FIGURES`.
-    path : str or path
-        ``.png``, ``.svg`` or ``.pdf``; an existing file is replaced.
-    seed : int
-        Of the noise in the record.
-
-    Raises
-    ------
-    InputError
-        For a figure that is not there, or another suffix.
-    OSError
-        If the file cannot be written.
-    """
+    """Draw a figure, or the table, into a .png, .svg or .pdf; ``seed`` is that of the noise."""
     from pendmap import figures  # noqa: PLC0415
+    from pendmap.model import PRESETS  # noqa: PLC0415
     from pendmap.paper import draw, motions  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
@@ -134,18 +108,17 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":
-        return draw.draw_tongues(_critical(), path, title=title, marks=_strange())
+        marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
+        return draw.draw_tongues(_critical(), path, title=title, marks=marks)
     if key == "2":
         return draw.draw_tumbling(tumbling(), path, title=title)
     if key == "3":
         return draw.draw_pendulum(path, title=title)
-    if key in _MOTIONS:
-        runs = getattr(motions, _MOTIONS[key])(report(seed).methods["combined_repaired"].rig, seed)
-        steady, subtitle = (
-            key == "8",
-            f"{_RIG};   model by the combined method, repaired; seed {seed}",
-        )
-        return draw.draw_motions(runs, path, steady=steady, title=title, subtitle=subtitle)
+    if key in ("8", "9"):
+        make = motions.steady_states if key == "8" else motions.tumbling
+        runs = make(report(seed).methods["combined_repaired"].rig, seed)
+        subtitle = f"{_RIG};   model by the combined method, repaired; seed {seed}"
+        return draw.draw_motions(runs, path, steady=key == "8", title=title, subtitle=subtitle)
     found = report(seed)
     return figures.draw_identification(
         found,
@@ -164,23 +137,9 @@ def _critical() -> xr.Dataset:
     from pendmap.analysis.tongues import tongues  # noqa: PLC0415
     from pendmap.model import Pendulum  # noqa: PLC0415
 
-    square = np.linspace(_SQUARES[0], _SQUARES[1], _COLUMNS)[::-1]
-    p_max = _HIGHEST / _SQUARES[0]
-    return tongues(
-        Pendulum(gamma=0.1),
-        1 / np.sqrt(square),
-        p_max,
-        plane="e-alpha2",
-        inverted=False,
-        refine=True,
-    )
-
-
-def _strange() -> list[tuple[float, float, str]]:
-    """Return the points of figure 2 as marks of figure 1."""
-    from pendmap.model import PRESETS  # noqa: PLC0415
-
-    return [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
+    omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
+    p_max, plane = _HIGHEST / _SQUARES[0], "e-alpha2"
+    return tongues(Pendulum(gamma=0.1), omega, p_max, plane=plane, inverted=False, refine=True)
 
 
 def printed_table() -> tuple[list[str], list[list[str]]]:
@@ -190,17 +149,7 @@ def printed_table() -> tuple[list[str], list[list[str]]]:
 
 
 def write_table(found: IdentificationReport, path: str | os.PathLike[str]) -> Path:
-    """Write table 1 as CSV: a row for each period and peak, in percent a column for each method.
-
-    An empty cell is a simulation that rests by then.
-
-    Raises
-    ------
-    InputError
-        For another suffix than ``.csv``.
-    OSError
-        If the file cannot be written.
-    """
+    """Write table 1 as CSV, in percent; an empty cell is a simulation that rests by then."""
     names = [name for name, each in found.methods.items() if each.applicable]
     with (
         whole_file(path, [".csv"]) as part,

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from pendmap.comparison import ForcedComparison
     from pendmap.model import Rig
-    from pendmap.virtual_rig import RunPlan
-
 
 STEADY: Final = (
     (0.2, 1.9, "oscillation", 2, 0),
@@ -20,71 +20,43 @@ STEADY: Final = (
     (0.3, 2.0, "rotation", 1, 1),
     (1.0, 2.0, "rotation", 1, 1),
 )
-"""Drives ``p`` and ``Omega / 6.2 rad/s``, and the attractor that a run is started toward: kind,
-period, turns. The paper gives no numbers for its own."""
+"""Drives ``p`` and ``Omega / 6.2 rad/s``, not given by the paper, and the attractor of the start:
+kind, period, turns."""
 TUMBLING: Final = ((0.6, 2.0, 2.0, 6.0), (0.4, 2.0, 2.0, 6.0))
 """``p``, ``Omega / 6.2 rad/s``, angle (rad) and velocity (rad/s) of the start."""
 SECONDS = 2500.0
-"""After so long the paper takes its steady states."""
+"""Time after which the paper takes its steady states, s."""
 TUMBLED = 300.0
-"""Length of a run that tumbles, s: of the ensembles beside it all but a fiftieth settle in it."""
+"""Length of a run that tumbles, s: all but a fiftieth of the ensembles beside it settle in it."""
 _W0: Final = 6.2
+"""Natural frequency of the paper's rig, rad/s."""
 _CELLS: Final = 100
+"""Cells a side of the basin map in which starts are chosen."""
 _FASTEST: Final = 18.0
-"""Window of the basin map in which starts are chosen: velocities up to this, rad/s."""
+"""Largest velocity of that map, rad/s."""
 _RATE: Final = 50.0
-"""Samples a second: long runs are no denser than they need be."""
+"""Samples a second of the long runs."""
 _MEMBERS: Final = 40
-"""Starts beside a run of 2500 s: the question is where they end."""
+"""Starts of the ensemble beside a run of 2500 s."""
 
 
 def steady_states(model: Rig, seed: int = 0) -> list[ForcedComparison]:
-    """Return runs of 2500 s, each started in the basin of an attractor of the model.
-
-    The start is the cell of the attractor's basin that is farthest from any other: what the model
-    does not know of the rig must not lead elsewhere.
-
-    Parameters
-    ----------
-    model : Rig
-        Identified from the rig's free decay.
-    seed : int
-        Of the noise.
-    """
-    from pendmap.virtual_rig import RunPlan  # noqa: PLC0415 (this module is imported for its numbers)
-
-    plans = []
-    for p, omega, kind, n, w in STEADY:
-        driven = dataclasses.replace(model, p=p, Omega=omega * _W0)
-        theta, velocity = _inside(driven, kind, n, w)
-        plans.append(
-            RunPlan("forced", theta, velocity, SECONDS, p=p, frequency=round(omega * _W0, 6))
-        )
-    return beside(model, plans, seed, _MEMBERS)
+    """Return runs of 2500 s, each started deepest inside the basin of an attractor of the model."""
+    starts = [
+        (p, omega, *_inside(dataclasses.replace(model, p=p, Omega=omega * _W0), kind, n, w))
+        for p, omega, kind, n, w in STEADY
+    ]
+    return _beside(model, starts, SECONDS, seed, _MEMBERS)
 
 
 def tumbling(model: Rig, seed: int = 0) -> list[ForcedComparison]:
-    """Return runs of 300 s from starts that tumble at first, without any pre-iterates.
-
-    Parameters
-    ----------
-    model : Rig
-        Identified from the rig's free decay.
-    seed : int
-        Of the noise.
-    """
-    from pendmap.virtual_rig import RunPlan  # noqa: PLC0415 (likewise)
-
-    plans = [
-        RunPlan("forced", theta, velocity, TUMBLED, p=p, frequency=round(omega * _W0, 6))
-        for p, omega, theta, velocity in TUMBLING
-    ]
-    return beside(model, plans, seed)
+    """Return runs of 300 s from starts that tumble at first, without any pre-iterates."""
+    return _beside(model, TUMBLING, TUMBLED, seed)
 
 
 def _inside(model: Rig, kind: str, n: int, w: int) -> tuple[float, float]:
-    """Return the start deepest inside the basin of an attractor."""
-    import numpy as np  # noqa: PLC0415 (likewise)
+    """Return the start in the basin of an attractor that is farthest from any other basin."""
+    import numpy as np  # noqa: PLC0415 (this module is imported for its numbers)
     from scipy.ndimage import distance_transform_edt  # noqa: PLC0415
 
     from pendmap.analysis.basins import basins  # noqa: PLC0415
@@ -100,26 +72,14 @@ def _inside(model: Rig, kind: str, n: int, w: int) -> tuple[float, float]:
     return float(found["theta"].values[column]), float(found["velocity"].values[row])
 
 
-def beside(
-    model: Rig, plans: list[RunPlan], seed: int, members: int = 400
+def _beside(
+    model: Rig, starts: Iterable[tuple[float, ...]], seconds: float, seed: int, members: int = 400
 ) -> list[ForcedComparison]:
-    """Run the virtual rig, read its records as any other, and compare the model with them.
-
-    Parameters
-    ----------
-    model : Rig
-        The model.
-    plans : list of RunPlan
-        The runs.
-    seed : int
-        Of the noise.
-    members : int
-        Starts beside each run.
-    """
+    """Compare a model with records of the virtual rig from starts (p, Omega / w0, th, v)."""
     from pendmap import virtual_rig  # noqa: PLC0415 (likewise)
     from pendmap.comparison import Ensemble, compare  # noqa: PLC0415 (likewise)
     from pendmap.records import read_experiment  # noqa: PLC0415
-    from pendmap.virtual_rig import experiment  # noqa: PLC0415
+    from pendmap.virtual_rig import RunPlan, experiment  # noqa: PLC0415
 
     truth = experiment.PARAMETERS
     request = virtual_rig.Request(
@@ -132,7 +92,10 @@ def beside(
         noise=math.degrees(experiment.SENSOR.noise),
         counts=experiment.SENSOR.counts,
         rate=_RATE,
-        plans=tuple(plans),
+        plans=tuple(
+            RunPlan("forced", theta, velocity, seconds, p=p, frequency=round(omega * _W0, 6))
+            for p, omega, theta, velocity in starts
+        ),
     )
     with tempfile.TemporaryDirectory() as folder:
         where = virtual_rig.places(Path(folder) / "virtual_rig", replace=False)

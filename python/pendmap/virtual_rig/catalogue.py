@@ -6,29 +6,34 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.effects.damping import AGEING, DAMPING
-from pendmap.virtual_rig.effects.readings import READINGS
-from pendmap.virtual_rig.effects.stand import STANDS
-from pendmap.virtual_rig.effects.torques import TORQUES
+from pendmap.virtual_rig.effects import damping, readings, stand, torques
+from pendmap.virtual_rig.effects.base import Effect
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from pendmap.virtual_rig.effects.base import Effect
-
 EFFECTS: Final[dict[str, type[Effect]]] = {
-    effect.full_name(): effect for effect in (*DAMPING, *AGEING, *TORQUES, *STANDS, *READINGS)
+    kind.full_name(): kind
+    for module in (damping, torques, stand, readings)
+    for kind in vars(module).values()
+    if isinstance(kind, type) and issubclass(kind, Effect) and "formula" in vars(kind)
 }
-"""Every effect, by name and variant."""
+"""Every effect with a formula, by name and variant, in the order of the files."""
 
 ANY: Final = "any"
-"""Asks for one that the seed chooses."""
+"""Asks for an effect that the seed chooses."""
 NONE: Final = "none"
 """Asks for a rig without hidden effects."""
 
 
 def describe() -> list[dict[str, str]]:
-    """Name, group, formula, runs needed and parameters with their ranges, for each effect."""
+    """Return name, group, formula, runs needed and parameters with ranges of each effect.
+
+    Examples
+    --------
+    >>> next(e["formula"] for e in describe() if e["name"] == "quadratic_drag")
+    '-q v abs(v)'
+    """
     return [
         {
             "name": name,
@@ -48,31 +53,10 @@ def _range(field: dataclasses.Field[float]) -> str:
 
 
 def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> list[Effect]:
-    """Draw the effects that a user asked for.
+    """Draw the effects asked for, in their order; ``any`` chooses what such kinds of runs show.
 
-    Parameters
-    ----------
-    asked : list of str
-        Each ``name``, ``name:variant``, ``any``, or alone ``none``; parameters may follow, as in
-        ``quadratic_drag,q=0.01``.
-    rng : Generator
-        Where sizes and shapes come from.
-    scale : float
-        Multiplies every size that is drawn.
-    kinds : set of str
-        Kinds of the experiment's runs, ``free`` and ``forced``; ``any`` chooses only what they
-        show.
-
-    Returns
-    -------
-    list of Effect
-        In the order asked.
-
-    Raises
-    ------
-    InputError
-        For an unknown name or parameter, a value outside its range, an effect asked for twice, or
-        one that leaves no trace in such runs.
+    An entry is ``name``, ``name:variant`` or ``any``, with parameters as in
+    ``quadratic_drag,q=0.01``, or ``none`` alone; ``scale`` multiplies every size that is drawn.
     """
     if NONE in asked and len(asked) > 1:
         raise InputError("effect none must be alone, got others beside it")
@@ -99,7 +83,7 @@ def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> lis
 
 
 def draws_size(text: str) -> bool:
-    """Whether what a user asked for has a size that is drawn; where it is not known, too."""
+    """Return whether an entry of :func:`draw` has a size that is drawn, or is not known."""
     if text == NONE:
         return False
     name, given = _parse(text)
@@ -124,7 +108,7 @@ def _parse(text: str) -> tuple[str, dict[str, float]]:
 
 
 def _near(name: str) -> str:
-    """Which names come close; where none does, where they are listed."""
+    """Return the end of a message that a name is not known."""
     import difflib  # noqa: PLC0415 (for a message only)
 
     close = difflib.get_close_matches(name, EFFECTS, n=3)

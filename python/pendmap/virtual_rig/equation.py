@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.effects.base import Motion
+from pendmap.virtual_rig.effects.base import Floats, Motion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,37 +19,18 @@ if TYPE_CHECKING:
 
     from pendmap.virtual_rig.effects.base import Drive, Effect
 
-    Floats = NDArray[np.float64]
-
 
 @dataclasses.dataclass(frozen=True)
 class Parameters:
-    """The paper's rig, eq. 2.1, in SI.
+    """The paper's rig, in SI.
 
-    ``th'' + c_over_m th' + w0**2 (1 + a(t)) sin th = -friction sign(th')``
-
-    Parameters
-    ----------
-    w0 : float
-        Natural frequency ``sqrt(g / l)``, rad/s; above 0.
-    c_over_m : float
-        Viscous damping ``c / m``, 1/s; 0 or more.
-    friction : float
-        Dry friction ``Tr``, rad/s^2; 0 or more.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite or outside its range.
-
-    References
-    ----------
-    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eq. 2.1.
+    ``th'' + c_over_m th' + w0**2 (1 + a(t)) sin th = -friction sign(th')``, eq. 2.1 of Horton,
+    Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A.
     """
 
-    w0: float
-    c_over_m: float
-    friction: float
+    w0: float  # natural frequency sqrt(g / l), rad/s
+    c_over_m: float  # viscous damping c / m, 1/s
+    friction: float  # dry friction Tr, rad/s^2
 
     def __post_init__(self) -> None:
         for name, value in dataclasses.asdict(self).items():
@@ -61,24 +42,7 @@ class Parameters:
 
 
 class Equation:
-    """Accelerations of all runs of an experiment.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        The rig without its effects.
-    drive : Drive
-        The drive that is meant, for R runs.
-    lab : array, shape (R,)
-        When each run began, s.
-    effects : sequence of Effect
-        What is hidden in the rig.
-
-    Raises
-    ------
-    InputError
-        If the effects can make dry friction or viscous damping negative, or the inertia vanish.
-    """
+    """Accelerations of all R runs of an experiment, which began at ``lab``, s, shape (R,)."""
 
     def __init__(
         self, parameters: Parameters, drive: Drive, lab: Floats, effects: Sequence[Effect]
@@ -102,12 +66,12 @@ class Equation:
         }
         for name, value in least.items():
             if value < 0:
-                names = ", ".join(effect.title for effect in self.effects)
+                names = ", ".join(effect.full_name() for effect in self.effects)
                 raise InputError(
                     f"{names}: effects must leave {name} 0 or more, it would fall to {value:.3g}"
                 )
 
-    def motion(  # noqa: PLR0913, PLR0917 (the state of a lane has that many parts)
+    def motion(  # noqa: PLR0913, PLR0917 (the parts of a lane's state)
         self,
         run: NDArray[np.intp],
         time: Floats,
@@ -127,7 +91,7 @@ class Equation:
         return m
 
     def smooth(self, m: Motion, own: Floats) -> Floats:
-        """Everything but dry friction, per inertia, rad/s^2, shape (L, K)."""
+        """Return all but dry friction, per inertia, rad/s^2, shape (L, K)."""
         p = self.parameters
         total = -p.c_over_m * m.velocity - p.w0**2 * (1 + m.vertical) * m.sin
         if not isinstance(m.lateral, float):
@@ -137,17 +101,14 @@ class Equation:
         return total
 
     def friction(self, m: Motion, direction: Floats) -> Floats | float:
-        """Dry friction in a direction, rad/s^2, shape (L, K)."""
+        """Return the dry friction in a direction, rad/s^2, shape (L, K)."""
         level: Floats | float = self.parameters.friction
         for effect in self.effects:
             level = level + effect.friction(m, direction)
         return level
 
     def rates(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
-        """Return accelerations, shape (L, K), and rates of the effects' own variables.
-
-        Lanes whose direction is 0 stick: their acceleration is 0.
-        """
+        """Return accelerations, 0 of lanes that stick, and rates of the effects' own variables."""
         force = self.smooth(m, own) - m.direction * self.friction(m, m.direction)
         inertia: Floats | float = 1.0
         for effect in self.effects:
@@ -168,17 +129,13 @@ class Equation:
         return np.concatenate(parts, axis=-1) if parts else np.zeros((*m.theta.shape, 0))
 
     def margins(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
-        """How far a pendulum at rest is from slipping up and down, rad/s^2, shape (L, K).
-
-        It slips toward positive angles where the first is negative, toward negative ones where
-        the second is.
-        """
+        """Return how far a pendulum at rest is from slipping up and down, rad/s^2, shape (L, K)."""
         load = self.smooth(m, own)
         one = np.ones_like(m.direction)
         return self.friction(m, one) - load, load + self.friction(m, -one)
 
     def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:
-        """Times since the run began, s, and jumps of the velocity there, rad/s."""
+        """Return times since the run began, s, and jumps of the velocity there, rad/s."""
         lab = float(self.lab[run])
         found = [kick for e in self.effects for kick in e.kicks(lab + begin, lab + end)]
         return sorted((time - lab, jump) for time, jump in found)

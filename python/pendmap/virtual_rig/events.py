@@ -1,4 +1,4 @@
-"""Where within a step the velocity or a margin of the stick passes zero."""
+"""The first event within each step: where the velocity, a margin or the load passes zero."""
 
 from __future__ import annotations
 
@@ -8,45 +8,30 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from pendmap.virtual_rig import path as gauss
-from pendmap.virtual_rig.path import value
+from pendmap.virtual_rig.path import Floats, value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    from pendmap.virtual_rig.lanes import Lanes
+    from pendmap.virtual_rig.lanes import Indices, Lanes
     from pendmap.virtual_rig.step import Step
 
-    Indices = NDArray[np.intp]
-
-
 _TINY: Final = 1e-4
-"""Where a velocity that starts at zero is looked at first, as a share of a sixteenth step."""
+"""Where a velocity that starts at zero is evaluated first, as a share of a sixteenth step."""
 _ROUNDING: Final = 1e-12
 """Velocity that may be rounding, rad/s."""
 
 PLACES: Final[Floats] = np.arange(17) / 16
-"""Places within a step where signs are looked at, shape (17,)."""
+"""Places within a step where signs are evaluated, shape (17,)."""
+_BASIS: Final = gauss.basis(PLACES, gauss.NODES + 2)
 
 
-def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> Flags:
-    """Tell which lanes need a closer look: those that may come to rest within the step.
+def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> NDArray[np.bool_]:
+    """Return which lanes may come to rest within the step, shape (L,).
 
-    Parameters
-    ----------
-    velocity, acceleration : array, shape (L, 17)
-        At s = 0, 1/16, ... 1, times the lane's direction.
-    length : array, shape (L,)
-        Length of the step, s.
-
-    Returns
-    -------
-    array of bool, shape (L,)
-        Where the velocity is not above 0 somewhere after s = 0, or where it has a minimum that
-        can reach 0 between two of the places.
+    Velocity and acceleration are those at the 17 places, times the lane's direction, shape (L, 17).
     """
     crosses = (velocity[:, 1:] <= 0).any(axis=1)
     reach = length / (PLACES.size - 1) * np.abs(acceleration).max(axis=1)
@@ -58,16 +43,10 @@ def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> Flags:
 def turn_of(
     velocity: list[float], acceleration: list[float], direction: float, seen: Floats
 ) -> float | None:
-    """First place after s = 0 where a velocity becomes zero; ``None`` if it does not.
+    """Return the first place after s = 0 where a velocity becomes zero, if any.
 
-    Parameters
-    ----------
-    velocity, acceleration : list of float
-        Legendre coefficients over the step.
-    direction : float
-        Sign of the velocity before that place.
-    seen : array, shape (17,)
-        ``direction * velocity`` at s = 0, 1/16, ... 1.
+    ``velocity`` and ``acceleration`` are Legendre coefficients over the step, ``seen`` is
+    ``direction * velocity`` at the 17 places.
     """
 
     def forward(s: float) -> float:
@@ -94,10 +73,7 @@ def turn_of(
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Zero of a function whose signs differ at ``low`` and ``high``.
-
-    Where rounding hides that, the end with the smaller value is the zero.
-    """
+    """Return the zero of a function between two ends; the smaller end where rounding hides it."""
     at_low, at_high = function(low), function(high)
     if at_low * at_high >= 0:
         return low if abs(at_low) < abs(at_high) else high
@@ -105,15 +81,7 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def stop_of(margin: Callable[[float], float], seen: Floats) -> float | None:
-    """First place after s = 0 where a margin is used up; ``None`` if it is not.
-
-    Parameters
-    ----------
-    margin : function
-        The margin at a place s.
-    seen : array, shape (17,)
-        The margin at s = 0, 1/16, ... 1.
-    """
+    """Return the first place after s = 0 where a margin is used up, if any; 17 are ``seen``."""
     for k in range(1, PLACES.size):
         low, high = PLACES[k - 1], PLACES[k]
         if seen[k] < 0:
@@ -134,12 +102,6 @@ def _dips(three: Floats) -> bool:
     if not (here <= before and here <= after and bend > 0):
         return False
     return here <= 2 * (after - before) ** 2 / (8 * bend) + bend / 4
-
-
-# The first event within each step of many lanes.
-
-
-_BASIS: Final = gauss.basis(PLACES, gauss.NODES + 2)
 
 
 class Switch(NamedTuple):

@@ -17,57 +17,53 @@ from pendmap.virtual_rig.integrator import integrate
 from pendmap.virtual_rig.lanes import Starts
 from pendmap.virtual_rig.mess import Mess
 from pendmap.virtual_rig.presets import PRESETS, RunPlan
-from pendmap.virtual_rig.sensor import Sensor
+from pendmap.virtual_rig.sensor import Sensor, check_ranges
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
     from pendmap.virtual_rig.effects.base import Effect
-    from pendmap.virtual_rig.path import Path
-
-    Floats = NDArray[np.float64]
-
+    from pendmap.virtual_rig.path import Floats, Path
 
 WINDOW: Final = 1.0
-"""Length of the pieces over which the gap is measured, s: short enough that chaos stays small."""
-
+"""Length of the pieces over which the gap is measured, s: chaos stays small."""
 _AFTER_REST: Final = 3.0
+"""Length of a record after the pendulum has come to rest, s."""
 _MOST_SAMPLES: Final = 10_000_000
-"""Samples of all runs together; their records take 250 megabytes."""
+"""Largest number of samples of all runs; their records take 250 megabytes."""
 _RIG, _RUNS, _EFFECTS, _SENSOR, _MESS = range(5)
+"""Streams of random numbers."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """What a user asks of the rig; ``None`` leaves it to the preset and the seed.
+    """Request for an experiment; ``None`` leaves a value to the preset and the seed.
 
     Parameters
     ----------
     preset : str
         A name of ``PRESETS``.
     seed : int
-        All draws come from it; 0 or more.
+        Seed of all draws; 0 or more.
     effects : tuple of str
-        Effects to hide; :func:`pendmap.virtual_rig.catalogue.draw` says how they are written.
+        Effects to hide: ``name``, ``name:variant`` or ``any``, with parameters as in
+        ``quadratic_drag,q=0.01``; or ``none`` alone.
     size : float
         Multiplies the size of every effect that is drawn; above 0, and 1 where none is.
     w0, c_over_m, friction : float
         The rig in SI, rad/s, 1/s, rad/s^2.
     free, forced : int
-        How many runs of each kind, at most 99 together.
+        Numbers of runs of each kind, at most 99 together.
     duration : float
         Length of every run, s, at most 3600.
     noise : float
         Noise of the sensor, degrees.
-    rate, counts, correlation, dropouts, outliers, jitter
-        As in :class:`Sensor`.
+    rate, counts, jitter : float, int, float
+        Samples a second, Hz; counts a turn, 0 without steps; rms of the sampling instants, s.
+    correlation, dropouts, outliers : float
+        AR(1) coefficient of the noise; shares of the samples that are lost, and that are false.
     mess : float
         Size of weak disturbances that no effect describes, in multiples of the noise, at most 100.
     plans : tuple of RunPlan
-        The runs, instead of those that the preset draws; then neither their number nor their
-        duration is asked for. Runs that come first are the same whatever follows them.
+        The runs, instead of those that the preset draws, their number and their duration.
 
     Raises
     ------
@@ -96,7 +92,6 @@ class Request:
     plans: tuple[RunPlan, ...] = ()
 
     def __post_init__(self) -> None:
-        self._refuse_rig()
         if self.preset not in PRESETS:
             known = ", ".join(PRESETS)
             raise InputError(f"experiment must be one of {known}, got {self.preset!r}")
@@ -104,10 +99,14 @@ class Request:
             raise InputError(f"seed must be 0 or more, got {self.seed}")
         if not (math.isfinite(self.size) and self.size > 0):
             raise InputError(f"size must be a finite number above 0, got {self.size:g}")
-        if self.duration is not None and not 1 <= self.duration <= 3600:  # noqa: PLR2004
-            raise InputError(f"duration must be a number from 1 to 3600 s, got {self.duration:g}")
-        if not 0 <= self.mess <= 100:  # noqa: PLR2004 (said in the docstring)
-            raise InputError(f"mess must be a number from 0 to 100, got {self.mess:g}")
+        # A rig far outside these ranges takes too long: the steps follow its quickest time.
+        check_ranges(
+            self,
+            w0=(0.1, 100.0, "rad/s"),
+            c_over_m=(0.0, 100.0, "1/s"),
+            duration=(1.0, 3600.0, "s"),
+            mess=(0.0, 100.0, ""),
+        )
         self._refuse_idle()
         self._refuse_plans()
         free, forced = self.runs
@@ -121,18 +120,8 @@ class Request:
                 f" {free + forced} runs of {seconds:g} s, got {self.rate:g}"
             )
 
-    def _refuse_rig(self) -> None:
-        # What is far outside takes for ever: the steps follow the quickest time of the rig.
-        ranges = {"w0": (0.1, 100.0, "rad/s"), "c_over_m": (0.0, 100.0, "1/s")}
-        for name, (low, high, unit) in ranges.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise InputError(
-                    f"{name} must be a number from {low:g} to {high:g} {unit}, got {value:g}"
-                )
-
     def _refuse_idle(self) -> None:
-        """Refuse what is asked for and would change nothing."""
+        """Refuse settings that would change nothing."""
         asked = self.effects or PRESETS[self.preset].effects
         if self.size != 1 and not any(draws_size(text) for text in asked):
             raise InputError(
@@ -161,7 +150,7 @@ class Request:
 
     @property
     def runs(self) -> tuple[int, int]:
-        """How many free and forced runs."""
+        """Numbers of free and forced runs."""
         if self.plans:
             free = sum(plan.kind == "free" for plan in self.plans)
             return free, len(self.plans) - free
@@ -170,18 +159,18 @@ class Request:
         return free, preset.forced if self.forced is None else self.forced
 
     def stream(self, *path: int) -> np.random.Generator:
-        """A stream of random numbers of its own for each part of the experiment."""
+        """Return the stream of random numbers of a part of the experiment."""
         return np.random.default_rng([self.seed, *path])
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One run: what was meant, what happened, what was recorded.
+    """One run: its plan, its motion and its record.
 
     Parameters
     ----------
     plan : RunPlan
-        What was meant.
+        The planned run.
     path : Path
         The clean motion.
     time, angle : array, shape (N,)
@@ -189,7 +178,7 @@ class Run:
     lost : int
         Samples that the record lacks.
     gap : float
-        What the effects change in the reading within a second, rad rms; no parameter is adapted.
+        Change of the reading by the effects within a second, rad rms; no parameter is adapted.
     """
 
     plan: RunPlan
@@ -213,7 +202,7 @@ class Experiment:
 
     @property
     def gap(self) -> float:
-        """What the effects change in the reading within a second, rad rms over all samples."""
+        """Change of the reading by the effects within a second, rad rms over all samples."""
         weights = [run.time.size for run in self.runs]
         return math.sqrt(float(np.average([run.gap**2 for run in self.runs], weights=weights)))
 
@@ -221,12 +210,18 @@ class Experiment:
 def make(request: Request) -> Experiment:
     """Draw an experiment, integrate its runs and read its sensor.
 
-    The same request gives the same experiment, bit for bit on one machine.
+    A request gives one experiment, bit for bit on one machine.
 
     Raises
     ------
     InputError
         If a value, a name of an effect or a combination is not allowed.
+
+    Examples
+    --------
+    >>> run = make(Request("free_decay", seed=1, duration=5.0)).runs[0]
+    >>> run.time.size, run.plan.kind
+    (501, 'free')
     """
     preset = PRESETS[request.preset]
     rng = request.stream(_RIG)
@@ -244,14 +239,17 @@ def make(request: Request) -> Experiment:
     effects = draw(asked, request.stream(_EFFECTS), request.size, kinds)
     readings = [effect for effect in effects if isinstance(effect, ReadingEffect)]
     others = [effect for effect in effects if not isinstance(effect, ReadingEffect)]
-    lab = np.array([plan.lab_time for plan in plans])
-    mess = _mess(request, sensor, parameters.w0, plans)
+    mess = None
+    if request.mess != 0:
+        spread = request.mess * math.hypot(sensor.noise, sensor.count / math.sqrt(12))
+        longest = max(plan.lab_time + plan.duration for plan in plans)
+        mess = Mess.made(request.stream(_MESS), spread, parameters.w0, longest)
     bearing: list[Effect] = [] if mess is None else [mess.texture]
-    drive = Drive.harmonic(
-        np.array([plan.p for plan in plans]),
-        np.array([plan.frequency for plan in plans]),
-        np.array([plan.phase for plan in plans]),
+    lab, *harmonic = (
+        np.array([getattr(plan, name) for plan in plans])
+        for name in ("lab_time", "p", "frequency", "phase")
     )
+    drive = Drive.harmonic(*harmonic)
     equation = Equation(parameters, drive, lab, others + bearing)
     paths = _integrate(equation, plans, readings)
     if preset.until_rest and request.duration is None and not request.plans:
@@ -284,14 +282,6 @@ def make(request: Request) -> Experiment:
     return Experiment(request, parameters, effects, sensor, runs, mess)
 
 
-def _mess(request: Request, sensor: Sensor, w0: float, plans: Sequence[RunPlan]) -> Mess | None:
-    if request.mess == 0:
-        return None
-    size = request.mess * math.hypot(sensor.noise, sensor.count / math.sqrt(12))
-    longest = max(plan.lab_time + plan.duration for plan in plans)
-    return Mess.made(request.stream(_MESS), size, w0, longest)
-
-
 def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
     low, high = PRESETS[request.preset].noise
     drawn = math.exp(rng.uniform(math.log(low), math.log(high)))
@@ -304,7 +294,7 @@ def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
 
 
 def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
-    """The same runs with another length, and the same pauses between them."""
+    """Return runs with another length, and the same pauses between them."""
     result, lab = [], 0.0
     for k, plan in enumerate(plans):
         result.append(dataclasses.replace(plan, duration=duration, lab_time=round(lab, 1)))
@@ -332,7 +322,7 @@ def _integrate(
 
 
 def _true(time: Floats, readings: list[ReadingEffect]) -> Floats:
-    """True times of what is recorded at ``time``."""
+    """Return the true times of what is recorded at ``time``."""
     for effect in readings:
         time = effect.clock(time)
     return time
@@ -346,7 +336,7 @@ def _until_rest(plan: RunPlan, path: Path) -> RunPlan:
 
 
 def _strayed(plain: Equation, paths: list[Path], instants: list[Floats]) -> list[Floats]:
-    """The motion minus that of a rig without effects, set back on it every second, rad."""
+    """Return the motion minus that of a rig without effects, set back on it every second, rad."""
     begins = [np.arange(0.0, max(times[-1], WINDOW / 2), WINDOW) for times in instants]
     ends = [np.append(begin[1:], times[-1]) for begin, times in zip(begins, instants, strict=True)]
     starts = Starts(
@@ -368,27 +358,27 @@ def _strayed(plain: Equation, paths: list[Path], instants: list[Floats]) -> list
     return result
 
 
-# A rig like that of Horton, Wiercigroch & Xu (2008): the record behind figures 4 to 7, table 1.
-
-
 PARAMETERS: Final = Parameters(w0=6.2, c_over_m=2 * 0.004 * 6.2, friction=0.08)
-"""The paper gives no numbers; these have periods and a length of the decay like its figures."""
+"""A rig like that of Horton, Wiercigroch & Xu (2008), figures 4 to 7 and table 1.
+
+The paper gives no numbers; these have periods and a length of the decay like its figures.
+"""
 RELEASE: Final = 3.0
-"""Where it is released at rest, rad."""
+"""Angle of the release at rest, rad."""
 SECONDS: Final = 86.0
-"""Length of the record: it comes to rest before."""
+"""Length of the record, s: the pendulum comes to rest before."""
 SENSOR: Final = Sensor(rate=100.0, counts=4096, noise=math.radians(0.1))
 OFFSET: Final = math.radians(0.05)
-"""What the encoder reads at rest, rad."""
+"""Reading of the encoder at rest, rad."""
 
 
 def paper_decay(seed: int = 0) -> tuple[Floats, Floats]:
-    """Return a free decay as the encoder reads it, from its release until it rests.
+    """Return a free decay like the paper's as the encoder reads it, from release until rest.
 
     Parameters
     ----------
     seed : int
-        Of the noise; 0 or more.
+        Seed of the noise; 0 or more.
 
     Returns
     -------

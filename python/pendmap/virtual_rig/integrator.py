@@ -24,20 +24,7 @@ if TYPE_CHECKING:
 
 
 def integrate(equation: Equation, starts: Starts) -> list[Path]:
-    """Integrate runs, or parts of them, from their starts to their ends.
-
-    Parameters
-    ----------
-    equation : Equation
-        The rig with its effects.
-    starts : Starts
-        N starts. Variables of the effects' own begin at 0.
-
-    Returns
-    -------
-    list of Path
-        One for each start.
-    """
+    """Integrate runs, or parts of them, from their starts to their ends: a path for each start."""
     lanes = Lanes(equation, starts)
     live = np.flatnonzero(starts.end > starts.begin)
     while live.size:

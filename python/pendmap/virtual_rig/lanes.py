@@ -6,64 +6,38 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pendmap.virtual_rig.path import Event, Path
+from pendmap.virtual_rig.path import Event, Floats, Path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
     from pendmap.virtual_rig.effects.base import Motion
     from pendmap.virtual_rig.equation import Equation
 
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 _FIRST: Final = 0.25
-"""The first step, as a share of the longest."""
+"""Length of the first step over the longest."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Starts:
-    """Where N integrations begin and end.
+    """Where N integrations begin and end; all arrays have the shape (N,)."""
 
-    Parameters
-    ----------
-    run : array of int, shape (N,)
-        Which of the equation's runs each belongs to.
-    begin, end : array, shape (N,)
-        Times since that run began, s.
-    theta, velocity : array, shape (N,)
-        State at ``begin``, rad and rad/s.
-    """
-
-    run: Indices
-    begin: Floats
+    run: Indices  # of the equation
+    begin: Floats  # since the run began, s
     end: Floats
-    theta: Floats
-    velocity: Floats
+    theta: Floats  # at begin, rad
+    velocity: Floats  # at begin, rad/s
 
 
 class Lanes:
-    """State of N lanes, each at a time of its own.
+    """State of N lanes, each at a time of its own, in arrays of shape (N,).
 
-    Attributes
-    ----------
-    time, theta, velocity : array, shape (N,)
-        Where each lane is, s, rad, rad/s.
-    own : array, shape (N, M)
-        The effects' own variables.
-    direction, side : array, shape (N,)
-        Signs of the velocity and of the load on the bearing; direction 0 sticks.
-    wish : array, shape (N,)
-        Length of the next step, s.
-    stop : array, shape (N,)
-        Where that step has to end at the latest: at a kick or at the end, s.
-    longest : float
-        Longest step, s: a radian of the swing or of the drive.
-    paths : list of Path
-        What was integrated so far.
+    ``time``, ``theta``, ``velocity`` are s, rad, rad/s; ``own``, shape (N, M), the effects' own
+    variables; ``direction`` and ``side`` the signs of velocity (0 sticks) and load. The next step
+    takes ``wish`` s, at most ``longest``, a radian of the swing or of the drive, and ends at
+    ``stop`` at the latest: a kick or the end.
     """
 
     def __init__(self, equation: Equation, starts: Starts) -> None:
@@ -108,21 +82,10 @@ class Lanes:
         )
 
     def margins(self, lane: int, after: Floats, own: Floats) -> tuple[Floats, Floats]:
-        """How far a lane that is held where it is stays from slipping, up and down, rad/s^2.
+        """Return the margins, rad/s^2, of a lane held still, at S times ``after`` its own, s.
 
-        Parameters
-        ----------
-        lane : int
-            Which.
-        after : array, shape (S,)
-            Times after the lane's own, s.
-        own : array, shape (S, M)
-            The effects' own variables then.
-
-        Returns
-        -------
-        array, array, shape (S,)
-            Margins; the pendulum slips where one is negative.
+        It slips up where the first is negative, down where the second is; ``own``, shape (S, M),
+        holds the effects' own variables.
         """
         still = np.zeros((1, after.size))
         time, theta = self.time[lane] + after[np.newaxis], self.theta[lane] + still
@@ -132,32 +95,21 @@ class Lanes:
 
     def happen(self, lane: int, what: str) -> None:
         """Let an event happen to a lane: ``rest``, ``up``, ``down`` (released so) or ``unload``."""
-        happens: dict[str, Callable[[int], None]] = {
-            "rest": self._rest,
-            "up": self._up,
-            "down": self._down,
-            "unload": self._unload,
-        }
-        happens[what](lane)
-
-    def _rest(self, lane: int) -> None:
-        self.velocity[lane] = 0.0
-        self.direction[lane] = self._slips(lane)
-        self._note(lane, "turn" if self.direction[lane] else "stick")
-
-    def _up(self, lane: int) -> None:
-        self.direction[lane] = 1.0
-        self._note(lane, "release")
-
-    def _down(self, lane: int) -> None:
-        self.direction[lane] = -1.0
-        self._note(lane, "release")
-
-    def _unload(self, lane: int) -> None:
-        self.side[lane] = -self.side[lane]
+        if what == "unload":
+            self.side[lane] = -self.side[lane]
+            return
+        if what == "rest":
+            self.velocity[lane] = 0.0
+            self.direction[lane] = self._slips(lane)
+            noted = "turn" if self.direction[lane] else "stick"
+        else:
+            self.direction[lane] = 1.0 if what == "up" else -1.0
+            noted = "release"
+        event = Event(float(self.time[lane]), noted, float(self.theta[lane]))
+        self.paths[lane].events.append(event)
 
     def _slips(self, lane: int) -> float:
-        """Direction in which a pendulum at rest slips; 0 if it sticks."""
+        """Return the direction in which a pendulum at rest slips, 0 if it sticks."""
         up, down = self.margins(lane, np.zeros(1), self.own[lane : lane + 1])
         if up[0] < 0:
             return 1.0
@@ -173,7 +125,3 @@ class Lanes:
         self.direction[lane] = np.sign(self.velocity[lane])
         if self.velocity[lane] == 0:
             self.direction[lane] = self._slips(lane)
-
-    def _note(self, lane: int, what: str) -> None:
-        event = Event(float(self.time[lane]), what, float(self.theta[lane]))
-        self.paths[lane].events.append(event)

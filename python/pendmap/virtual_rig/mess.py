@@ -1,8 +1,8 @@
-"""Weak disturbances that no effect describes: what every rig has beside its main effect.
+"""Weak disturbances that no effect describes, beside the main effect of a rig.
 
-A texture of the bearing (a torque and a friction that are random series in the angle), a slow
-drift of the sensor's zero, and noise that hangs together over a part of a second to some seconds.
-Each has a random share of the size, a multiple of the sensor's noise.
+They are a texture of the bearing (torque and friction as random series in the angle), a slow drift
+of the sensor's zero, and noise with a correlation time of a part of a second to some seconds. Each
+has a random share of the size, a multiple of the sensor's noise.
 """
 
 from __future__ import annotations
@@ -13,32 +13,24 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Effect
+from pendmap.virtual_rig.effects.base import Effect, Floats, Motion
 from pendmap.virtual_rig.effects.readings import fading
 
 if TYPE_CHECKING:
     from numpy.random import Generator
-    from numpy.typing import NDArray
 
-    from pendmap.virtual_rig.effects.base import Motion
     from pendmap.virtual_rig.sensor import Sensor
-
-    Floats = NDArray[np.float64]
 
 ORDERS: Final = (2, 40)
 """Orders per turn of a texture, the least and the greatest."""
-
 TERMS: Final = 8
 """Terms of a texture, and of a drift."""
-
 TORQUE: Final = 0.1
 """Torque of a texture, in units of w0^2, that moves readings by about 1 rad."""
-
 FRICTION: Final = 0.005
 """Friction of a texture, in units of w0^2, that moves readings by about 1 rad."""
 
 
-@dataclasses.dataclass(frozen=True)
 class Texture(Effect):
     """Races that are not round: torque and friction vary with the angle.
 
@@ -55,7 +47,7 @@ class Texture(Effect):
     series: tuple[Floats, ...]
 
     def __post_init__(self) -> None:
-        """Take the numbers as they are: nobody types them."""
+        """Check nothing: the numbers are drawn."""
 
     @classmethod
     def made(cls, rng: Generator, torque: float, friction: float) -> Texture:
@@ -83,38 +75,16 @@ class Texture(Effect):
 
 @dataclasses.dataclass(frozen=True)
 class Mess:
-    """Disturbances of one experiment.
-
-    Parameters
-    ----------
-    texture : Texture
-        Of the bearing.
-    drift : array, shape (3, k)
-        Amplitudes (rad), angular frequencies (rad/s) and phases of the drift of the sensor's zero.
-    noise, time : float
-        Root mean square (rad) and correlation time (s) of the noise that hangs together.
-    """
+    """Disturbances of one experiment."""
 
     texture: Texture
-    drift: Floats
-    noise: float
-    time: float
+    drift: Floats  # amplitudes (rad), angular frequencies (rad/s), phases of the zero; shape (3, k)
+    noise: float  # root mean square of the correlated noise, rad
+    time: float  # its correlation time, s
 
     @classmethod
     def made(cls, rng: Generator, size: float, w0: float, longest: float) -> Mess:
-        """Draw disturbances.
-
-        Parameters
-        ----------
-        rng : Generator
-            Draws.
-        size : float
-            Root mean square of what they do to the readings, about, rad.
-        w0 : float
-            Natural frequency, rad/s.
-        longest : float
-            Time in the laboratory when the last run ends, s.
-        """
+        """Draw disturbances that move readings by about ``size`` rad rms until ``longest`` s."""
         shares = size * np.sqrt(rng.dirichlet(np.ones(4)))
         slow = 2 * math.pi / np.exp(rng.uniform(math.log(60), math.log(60 + longest), TERMS))
         weights = rng.standard_normal(TERMS) / slow

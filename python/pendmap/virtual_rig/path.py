@@ -1,4 +1,12 @@
-"""The clean motion of one run, continuous in time."""
+"""The clean motion of one run, continuous in time, by Gauss collocation.
+
+Within a step of length ``h`` from ``t0``, ``s = (t - t0) / h`` in [0, 1], the acceleration is the
+polynomial of degree ``NODES - 1`` through its values at the Gauss-Legendre points. Velocity and
+angle are its exact integrals: the Gauss method, of order ``2 NODES`` at the step's end, of order
+``NODES + 2`` in the angle within (Hairer, Norsett & Wanner 1993, Solving Ordinary Differential
+Equations I, section II.7). Polynomials are rows of coefficients of the Legendre polynomials
+``P_k(2 s - 1)``.
+"""
 
 from __future__ import annotations
 
@@ -7,31 +15,71 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
     from collections.abc import Sequence
+
+Floats = NDArray[np.float64]
+
+NODES: Final = 10
+"""Gauss points of a step."""
+
+_X, _WEIGHTS = legendre.leggauss(NODES)
+
+POINTS: Final[Floats] = (_X + 1) / 2
+"""Gauss-Legendre points in (0, 1), shape (NODES,)."""
+
+COEFFICIENTS: Final[Floats] = (
+    legendre.legvander(_X, NODES - 1).T * _WEIGHTS * (np.arange(NODES)[:, np.newaxis] + 0.5)
+)
+"""Coefficients of a polynomial from its values at ``POINTS``, shape (NODES, NODES)."""
+
+
+def _integral(count: int) -> Floats:
+    """Integral over s from 0, from ``count`` coefficients to one more."""
+    # d s = d x / 2 in the variable x = 2 s - 1 of the Legendre polynomials.
+    return np.asarray(legendre.legint(np.eye(count), lbnd=-1, axis=0)) / 2
+
+
+INTEGRAL: Final[Floats] = _integral(NODES)
+"""Coefficients of the integral from those of a polynomial, shape (NODES + 1, NODES)."""
+
+
+def basis(s: Floats, count: int) -> Floats:
+    """Legendre polynomials at ``s``, shape (..., count)."""
+    return np.asarray(legendre.legvander(2 * s - 1, count - 1))
+
+
+FIRST: Final[Floats] = basis(POINTS, NODES + 1) @ INTEGRAL @ COEFFICIENTS
+"""Values at ``POINTS`` of the integral of a polynomial, from its values there."""
+
+SECOND_INTEGRAL: Final[Floats] = _integral(NODES + 1)
+"""Coefficients of the integral of a polynomial of NODES + 1, shape (NODES + 2, NODES + 1)."""
+
+SECOND: Final[Floats] = basis(POINTS, NODES + 2) @ SECOND_INTEGRAL @ INTEGRAL @ COEFFICIENTS
+"""Values at ``POINTS`` of the second integral of a polynomial, from its values there."""
+
+
+def value(coefficients: Sequence[float], s: float) -> float:
+    """Value of one polynomial at one ``s`` (Clenshaw's recurrence)."""
+    x = 2 * s - 1
+    last, before = 0.0, 0.0
+    for k in range(len(coefficients) - 1, 0, -1):
+        last, before = (
+            coefficients[k] + (2 * k + 1) / (k + 1) * x * last - (k + 1) / (k + 2) * before,
+            last,
+        )
+    return coefficients[0] + x * last - before / 2
 
 
 @dataclasses.dataclass(frozen=True)
 class Event:
-    """A velocity zero, or the end of a stick.
+    """A velocity zero, or the end of a stick."""
 
-    Parameters
-    ----------
-    time : float
-        Time since the run began, s.
-    what : str
-        ``turn``, ``stick`` or ``release``.
-    theta : float
-        Angle, rad.
-    """
-
-    time: float
-    what: str
-    theta: float
+    time: float  # since the run began, s
+    what: str  # turn, stick or release
+    theta: float  # rad
 
 
 class Path:
@@ -75,69 +123,3 @@ class Path:
         # The step that holds both ends is clipped, so that rounding never extrapolates.
         polynomials = basis(np.clip(s, 0.0, 1.0), count)
         return np.asarray(np.einsum("nk,nk->n", polynomials, np.array(coefficients)[step]))
-
-
-# Gauss collocation: the solution over one step as a polynomial.
-#
-# Within a step of length ``h`` from ``t0``, ``s = (t - t0) / h`` in [0, 1], the acceleration is the
-# polynomial of degree ``NODES - 1`` through its values at the Gauss-Legendre points. Velocity and
-# angle are its exact integrals. This is the Gauss method of order ``2 NODES`` at the step's end,
-# and
-# of order ``NODES + 2`` in the angle within.
-#
-# Polynomials are rows of coefficients of the Legendre polynomials ``P_k(2 s - 1)``.
-#
-# References
-# ----------
-# Hairer, Norsett & Wanner (1993), Solving Ordinary Differential Equations I, section II.7.
-
-
-NODES: Final = 10
-"""Points a step."""
-
-_X, _WEIGHTS = legendre.leggauss(NODES)
-
-POINTS: Final[Floats] = (_X + 1) / 2
-"""Gauss-Legendre points in (0, 1), shape (NODES,)."""
-
-COEFFICIENTS: Final[Floats] = (
-    legendre.legvander(_X, NODES - 1).T * _WEIGHTS * (np.arange(NODES)[:, np.newaxis] + 0.5)
-)
-"""Coefficients of a polynomial from its values at ``POINTS``, shape (NODES, NODES)."""
-
-
-def _integral(count: int) -> Floats:
-    """Integral over s from 0, from ``count`` coefficients to one more."""
-    # d s = d x / 2 in the variable x = 2 s - 1 of the Legendre polynomials.
-    return np.asarray(legendre.legint(np.eye(count), lbnd=-1, axis=0)) / 2
-
-
-INTEGRAL: Final[Floats] = _integral(NODES)
-"""Coefficients of the integral from those of a polynomial, shape (NODES + 1, NODES)."""
-
-
-def basis(s: Floats, count: int) -> Floats:
-    """Legendre polynomials at ``s``, shape (..., count)."""
-    return np.asarray(legendre.legvander(2 * s - 1, count - 1))
-
-
-FIRST: Final[Floats] = basis(POINTS, NODES + 1) @ INTEGRAL @ COEFFICIENTS
-"""Values at ``POINTS`` of the integral of a polynomial, from its values there."""
-
-SECOND_INTEGRAL: Final[Floats] = _integral(NODES + 1)
-"""Likewise of a polynomial of one degree more, shape (NODES + 2, NODES + 1)."""
-
-SECOND: Final[Floats] = basis(POINTS, NODES + 2) @ SECOND_INTEGRAL @ INTEGRAL @ COEFFICIENTS
-"""Likewise of the integral of the integral."""
-
-
-def value(coefficients: Sequence[float], s: float) -> float:
-    """Value of one polynomial at one ``s`` (Clenshaw's recurrence)."""
-    x = 2 * s - 1
-    last, before = 0.0, 0.0
-    for k in range(len(coefficients) - 1, 0, -1):
-        last, before = (
-            coefficients[k] + (2 * k + 1) / (k + 1) * x * last - (k + 1) / (k + 2) * before,
-            last,
-        )
-    return coefficients[0] + x * last - before / 2

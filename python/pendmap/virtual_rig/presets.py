@@ -1,4 +1,4 @@
-"""Which runs an experiment has, drawn from its seed."""
+"""The runs of an experiment, drawn from its seed."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Final
 from pendmap.virtual_rig.equation import Parameters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.random import Generator
 
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """What is meant to happen in one run.
+    """The plan of one run.
 
     Parameters
     ----------
@@ -27,7 +25,7 @@ class RunPlan:
     duration : float
         Length of the record, s.
     p, frequency, phase : float
-        The drive ``p cos(Omega t + phi)``; ``p`` is 0 in a free run.
+        The drive ``p cos(Omega t + phi)``, Omega in rad/s; ``p`` is 0 in a free run.
     lab_time : float
         When the run begins, s.
     """
@@ -44,35 +42,17 @@ class RunPlan:
 
 @dataclasses.dataclass(frozen=True)
 class Preset:
-    """An experiment by name.
-
-    Parameters
-    ----------
-    about : str
-        What it is, in a line.
-    free, forced : int
-        How many runs of each kind.
-    duration : (float, float)
-        Range of their lengths, s.
-    c_over_m, friction : (float, float)
-        Ranges of c/m, 1/s, and of Tr, rad/s^2.
-    noise : (float, float)
-        Range of the noise, degrees, drawn log-uniformly.
-    effects : tuple of str
-        What is hidden if nothing is asked for.
-    until_rest : bool
-        Whether a record ends a little after the pendulum has come to rest.
-    """
+    """An experiment by name, with the ranges that its parts are drawn from."""
 
     about: str
-    free: int
+    free: int  # runs
     forced: int
-    duration: tuple[float, float]
-    c_over_m: tuple[float, float]
-    friction: tuple[float, float]
-    noise: tuple[float, float]
-    effects: tuple[str, ...]
-    until_rest: bool = False
+    duration: tuple[float, float]  # of a run, s
+    c_over_m: tuple[float, float]  # 1/s
+    friction: tuple[float, float]  # Tr, rad/s^2
+    noise: tuple[float, float]  # degrees, drawn log-uniformly
+    effects: tuple[str, ...]  # hidden if nothing is asked for
+    until_rest: bool = False  # a record ends a little after the pendulum has come to rest
 
     def parameters(self, rng: Generator) -> Parameters:
         """Draw the rig without its effects."""
@@ -80,17 +60,7 @@ class Preset:
         return Parameters(w0, rng.uniform(*self.c_over_m), rng.uniform(*self.friction))
 
     def plan(self, rng: Generator, w0: float, counts: tuple[int, int]) -> list[RunPlan]:
-        """Draw the runs, free and forced ones in turn, one after another in lab time.
-
-        Parameters
-        ----------
-        rng : Generator
-            Where they come from.
-        w0 : float
-            Natural frequency, rad/s.
-        counts : (int, int)
-            Free and forced runs.
-        """
+        """Draw free and forced runs in turn, one after another in lab time."""
         free = [(_free(rng, k, w0, alone=self.until_rest)) for k in range(counts[0])]
         forced = [_FORCED[k % len(_FORCED)](rng, w0) for k in range(counts[1])]
         mixed = []
@@ -151,12 +121,7 @@ def _strong(rng: Generator, w0: float) -> RunPlan:
     return _forced(rng, frequency, p, rng.uniform(-2.5, 2.5), rng.uniform(-1.0, 1.0) * w0)
 
 
-_FORCED: Final[tuple[Callable[[Generator, float], RunPlan], ...]] = (
-    _swinging,
-    _rotating,
-    _slow,
-    _strong,
-)
+_FORCED: Final = (_swinging, _rotating, _slow, _strong)
 
 PRESETS: Final[dict[str, Preset]] = {
     "free_decay": Preset(

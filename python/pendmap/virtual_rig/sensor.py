@@ -15,63 +15,47 @@ if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
+    from pendmap.virtual_rig.path import Floats
 
 _LONGEST_GAP: Final = 20
-"""Samples that a dropout can swallow."""
+"""Longest gap of a dropout, samples."""
+
+
+def check_ranges(owner: object, **ranges: tuple[float, float, str]) -> None:
+    """Refuse attributes outside their ranges (least, greatest, unit); ``None`` is allowed."""
+    for name, (low, high, unit) in ranges.items():
+        value = getattr(owner, name)
+        if value is not None and not low <= value <= high:
+            wanted = f"a number from {low:g} to {high:g} {unit}".strip()
+            raise InputError(f"{name} must be {wanted}, got {value:g}")
 
 
 @dataclasses.dataclass(frozen=True)
 class Sensor:
-    """How the angle is read and written down.
+    """The reading and the record of the angle.
 
     ``theta_rad = count round((reading + noise) / count)`` with ``count = 2 pi / counts``.
-
-    Parameters
-    ----------
-    rate : float
-        Samples a second, Hz.
-    counts : int
-        Counts a turn; 0 reads without steps.
-    noise : float
-        Standard deviation of the noise before it is counted, rad.
-    correlation : float
-        Coefficient of the noise from one sample to the next (AR(1)); 0 is white.
-    dropouts, outliers : float
-        Shares of the samples that are lost, in gaps of up to 20, and that are false by 0.2 rad
-        or more.
-    jitter : float
-        Standard deviation of the instants of sampling, s; the record keeps the nominal ones.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite or outside its range.
     """
 
-    rate: float = 100.0
-    counts: int = 4096
-    noise: float = 0.0
-    correlation: float = 0.0
-    dropouts: float = 0.0
-    outliers: float = 0.0
-    jitter: float = 0.0
+    rate: float = 100.0  # samples a second, Hz
+    counts: int = 4096  # a turn; 0 reads without steps
+    noise: float = 0.0  # standard deviation before it is counted, rad
+    correlation: float = 0.0  # of the noise from one sample to the next, AR(1); 0 is white
+    dropouts: float = 0.0  # share of the samples that are lost, in gaps of up to 20
+    outliers: float = 0.0  # share of the samples that are false by 0.2 rad or more
+    jitter: float = 0.0  # standard deviation of the instants, s; the nominal ones are kept
 
     def __post_init__(self) -> None:
-        ranges = {
-            "rate": (1.0, 1e5, "Hz"),
-            "counts": (0, 10**9, ""),
-            "noise": (0.0, math.pi, "rad"),
-            "correlation": (-0.999, 0.999, ""),
-            "dropouts": (0.0, 0.5, ""),
-            "outliers": (0.0, 0.5, ""),
-            "jitter": (0.0, 0.1, "s"),
-        }
-        for name, (low, high, unit) in ranges.items():
-            value = getattr(self, name)
-            if not math.isfinite(value) or not low <= value <= high:
-                wanted = f"a number from {low:g} to {high:g} {unit}".strip()
-                raise InputError(f"{name} must be {wanted}, got {value:g}")
+        check_ranges(
+            self,
+            rate=(1.0, 1e5, "Hz"),
+            counts=(0, 10**9, ""),
+            noise=(0.0, math.pi, "rad"),
+            correlation=(-0.999, 0.999, ""),
+            dropouts=(0.0, 0.5, ""),
+            outliers=(0.0, 0.5, ""),
+            jitter=(0.0, 0.1, "s"),
+        )
 
     @property
     def count(self) -> float:
@@ -90,17 +74,17 @@ class Sensor:
         return np.sort(np.clip(shifted, times[0], times[-1]))
 
     def write_down(self, reading: Floats, rng: Generator) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return the angles of the record, rad, and which samples it keeps; shapes (N,).
-
-        The draws for noise, false and lost samples follow one another whatever their sizes are, so
-        that one setting does not change what another one draws.
-        """
+        """Return the angles of the record, rad, and which samples it keeps; shapes (N,)."""
+        # All draws are made whatever the sizes are: no setting changes the draws of another.
         count = reading.size
         white = rng.standard_normal(count)
         false, shift = rng.random(count), rng.uniform(0.2, math.pi, count)
         sign, lost = rng.choice((-1.0, 1.0), count), rng.random(count)
         lengths = rng.integers(1, _LONGEST_GAP, count, endpoint=True)
-        value = reading + self.noise * self._coloured(white)
+        if self.correlation:
+            white[1:] *= math.sqrt(1 - self.correlation**2)
+            white = fading(white, self.correlation)
+        value = reading + self.noise * white
         value = value + np.where(false < self.outliers, sign * shift, 0.0)
         if self.counts:
             value = self.count * np.round(value / self.count)
@@ -112,12 +96,3 @@ class Sensor:
             keep[k : k + lengths[k]] = False
         keep[0] = True
         return value, keep
-
-    def _coloured(self, white: Floats) -> Floats:
-        """AR(1) noise of unit variance from white noise."""
-        rho = self.correlation
-        if rho == 0:
-            return white
-        driven = math.sqrt(1 - rho**2) * white
-        driven[0] = white[0]
-        return fading(driven, rho)

@@ -12,10 +12,8 @@ from pendmap.virtual_rig import path as gauss
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.virtual_rig.lanes import Lanes
-
-    Floats = NDArray[np.float64]
-    Indices = NDArray[np.intp]
+    from pendmap.virtual_rig.lanes import Indices, Lanes
+    from pendmap.virtual_rig.path import Floats
 
 TOLERANCE: Final = 1e-11
 """Largest last coefficients of a velocity's polynomial, rad/s."""
@@ -30,40 +28,20 @@ _SMALLEST: Final = 1e-300
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """A step of L lanes.
+    """A step of L lanes; polynomials are Legendre coefficients over it."""
 
-    Parameters
-    ----------
-    lane : array of int, shape (L,)
-        Which lanes.
-    length : array, shape (L,)
-        Lengths, s.
-    acceleration, velocity, theta : array, shape (L, NODES), (L, NODES + 1), (L, NODES + 2)
-        Legendre coefficients over the step.
-    own : array, shape (L, NODES + 1, M)
-        Likewise of the effects' own variables.
-    good : array of bool, shape (L,)
-        Whether the step is accurate enough.
-    wish : array, shape (L,)
-        Length of the next one, s.
-    """
-
-    lane: Indices
-    length: Floats
-    acceleration: Floats
-    velocity: Floats
-    theta: Floats
-    own: Floats
-    good: NDArray[np.bool_]
-    wish: Floats
+    lane: Indices  # shape (L,)
+    length: Floats  # s, shape (L,)
+    acceleration: Floats  # shape (L, NODES)
+    velocity: Floats  # shape (L, NODES + 1)
+    theta: Floats  # shape (L, NODES + 2)
+    own: Floats  # the effects' own variables, shape (L, NODES + 1, M)
+    good: NDArray[np.bool_]  # whether the step is accurate enough, shape (L,)
+    wish: Floats  # length of the next step, s, shape (L,)
 
 
 def solve(lanes: Lanes, lane: Indices) -> Step:
-    """Solve one step of some lanes, each of its own length.
-
-    The error is judged by the last two coefficients of each polynomial, the next length chosen so
-    that they come to the tolerance.
-    """
+    """Solve one step of some lanes; the last two coefficients of a polynomial are its error."""
     wished = lanes.wish[lane]
     length = np.minimum(wished, lanes.stop[lane] - lanes.time[lane])
     h = length[:, np.newaxis]

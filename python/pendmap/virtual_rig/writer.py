@@ -26,7 +26,7 @@ _FILES: Final = re.compile(r"experiment\.toml|run_\d+\.csv")
 """Names of the files of an experiment."""
 _GRAVITY: Final = 9.81
 _ENOUGH: Final = 3
-"""Runs of a kind from which on one is held out."""
+"""Least number of runs of a kind of which one is held out."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Places:
 
 
 def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
-    """Check where an experiment shall be written, before anything is computed.
+    """Return where an experiment is to be written, checked before anything is computed.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
 
 
 def write(experiment: Experiment, where: Places) -> None:
-    """Write the folder and the truth: both complete, or neither.
+    """Write the folder and the truth of an experiment: both complete, or neither.
 
     They are written beside their places and renamed at the end; an interrupt waits until then.
 
@@ -96,48 +96,43 @@ def write(experiment: Experiment, where: Places) -> None:
     ):
         folder.mkdir()
         for k, run in enumerate(experiment.runs):
-            _write_run(folder / _file(k), run)
-        _write_toml(folder / "experiment.toml", _description(experiment))
-        _write_toml(truth, _truth(experiment))
+            # 12 digits keep every count apart, and an angle without counts to 1e-11 rad.
+            rows = zip(run.time.tolist(), run.angle.tolist(), strict=True)
+            lines = ["t_s,theta_rad", *(f"{time:.6f},{angle:.12g}" for time, angle in rows)]
+            (folder / _file(k)).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        pairs = (
+            (folder / "experiment.toml", _description(experiment)),
+            (truth, _truth(experiment)),
+        )
+        for path, content in pairs:
+            path.write_text(toml_text(content), encoding="utf-8", newline="\n")
 
 
 def _file(k: int) -> str:
     return f"run_{k:02d}.csv"
 
 
-def _write_run(path: Path, run: Run) -> None:
-    # 12 digits keep every count apart, and an angle without counts to 1e-11 rad.
-    rows = zip(run.time.tolist(), run.angle.tolist(), strict=True)
-    lines = ["t_s,theta_rad", *(f"{time:.6f},{angle:.12g}" for time, angle in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _write_toml(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(toml_text(content), encoding="utf-8", newline="\n")
-
-
 def _description(experiment: Experiment) -> dict[str, Any]:
-    """What somebody who did the experiment would know."""
+    """Return what somebody who did the experiment would know."""
     rig: dict[str, Any] = {"gravity": _GRAVITY, "w0": round(experiment.parameters.w0, 1)}
     if experiment.sensor.counts:
         rig["encoder_counts"] = experiment.sensor.counts
-    runs = []
-    held = held_out(experiment)
+    runs, held = [], held_out(experiment)
     for k, run in enumerate(experiment.runs):
         plan = run.plan
         entry: dict[str, Any] = {"file": _file(k), "kind": plan.kind, "lab_time_s": plan.lab_time}
         if k in held:
             entry["hold_out"] = True
         if plan.kind == "forced":
-            entry["drive"] = _drive(run)
+            entry["drive"] = {"p": plan.p, "Omega": plan.frequency, "phi": plan.phase}
         runs.append(entry)
     return {"rig": rig, "run": runs}
 
 
 def held_out(experiment: Experiment) -> set[int]:
-    """Which runs are to be kept from fits, to try them on: of each kind with 3 or more, one.
+    """Return the runs kept from fits: of each kind with 3 or more runs the last but one.
 
-    It is the last but one: what is fitted has runs before and after it, quicker and slower ones.
+    Runs before and after it, quicker and slower ones, are fitted.
     """
     kinds: dict[str, list[int]] = {}
     for k, run in enumerate(experiment.runs):
@@ -145,12 +140,8 @@ def held_out(experiment: Experiment) -> set[int]:
     return {runs[-2] for runs in kinds.values() if len(runs) >= _ENOUGH}
 
 
-def _drive(run: Run) -> dict[str, float]:
-    return {"p": run.plan.p, "Omega": run.plan.frequency, "phi": run.plan.phase}
-
-
 def _truth(experiment: Experiment) -> dict[str, Any]:
-    """Everything that was drawn and hidden."""
+    """Return all that was drawn and hidden."""
     request, parameters, sensor = experiment.request, experiment.parameters, experiment.sensor
     asked = {k: v for k, v in dataclasses.asdict(request).items() if v not in (None, ())}
     return {

@@ -1,4 +1,4 @@
-"""What an effect is: parameters with their ranges, and what it adds to the equation or the reading.
+"""An effect: parameters with their ranges, and its terms in the equation or the reading.
 
 The equation of the virtual rig, in SI and per unit of inertia:
 
@@ -12,75 +12,38 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, dataclass_transform
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.random import Generator
-    from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
-
+Floats = NDArray[np.float64]
 
 MOST: Final = 1e4
-"""Largest value of a parameter, in the largest that is drawn: what is quicker takes for ever."""
+"""Largest value of a parameter over the largest that is drawn: bounds the integrator's time."""
 
 
 class Motion:
-    """The state of L lanes at K times each; a lane is one run that is being integrated.
+    """The state of L lanes at K times each; a lane is one run that is being integrated."""
 
-    Attributes
-    ----------
-    run : array of int, shape (L, 1)
-        Which run a lane belongs to.
-    time, lab : array, shape (L, K)
-        Time since the run began and since the first run began, s.
-    theta, velocity : array, shape (L, K)
-        Angle in rad and angular velocity in rad/s.
-    direction : array, shape (L, 1)
-        Sign of the velocity, held through a step: -1, 1, or 0 for a lane that sticks.
-    side : array, shape (L, 1)
-        Sign of the load on the bearing, held through a step: -1 or 1.
-    speed : array, shape (L, K)
-        ``direction * velocity``, the smooth continuation of ``abs(velocity)``.
-    vertical, lateral : array, shape (L, K)
-        Acceleration of the pivot over g, positive upward and toward positive angles.
-    w0 : float
-        Natural frequency, rad/s.
-    """
-
-    __slots__ = (
-        "cos",
-        "direction",
-        "lab",
-        "lateral",
-        "run",
-        "side",
-        "sin",
-        "speed",
-        "theta",
-        "time",
-        "velocity",
-        "vertical",
-        "w0",
-    )
-
+    run: NDArray[np.intp]  # the lane's run, shape (L, 1)
+    time: Floats  # since the run began, s, shape (L, K) as all below
+    lab: Floats  # since the first run began, s
+    theta: Floats  # rad
+    velocity: Floats  # rad/s
+    direction: Floats  # sign of the velocity, held through a step; 0 sticks; shape (L, 1)
+    side: Floats  # sign of the load on the bearing, held through a step; shape (L, 1)
+    speed: Floats  # direction * velocity: the smooth continuation of abs(velocity)
+    vertical: Floats | float  # acceleration of the pivot over g, upward
+    lateral: Floats | float  # acceleration of the pivot over g, toward positive angles
+    w0: float  # natural frequency, rad/s
+    sin: Floats  # of theta
     cos: Floats
-    direction: Floats
-    lab: Floats
-    lateral: Floats | float
-    run: NDArray[np.intp]
-    side: Floats
-    sin: Floats
-    speed: Floats
-    theta: Floats
-    time: Floats
-    velocity: Floats
-    vertical: Floats | float
-    w0: float
 
     @property
     def load(self) -> Floats:
@@ -89,11 +52,7 @@ class Motion:
 
 
 def size(low: float, high: float, unit: str, most: float | None = None) -> Any:  # noqa: ANN401 (of a field)
-    """Describe the parameter that says how strong an effect is.
-
-    It is drawn log-uniformly between ``low`` and ``high``; the absolute value may be ``most``, by
-    default :data:`MOST` times ``high``.
-    """
+    """Describe the size of an effect, drawn log-uniformly, in absolute value at most ``most``."""
     most = MOST * high if most is None else most
     return dataclasses.field(
         metadata={"low": low, "high": high, "unit": unit, "size": True, "most": most}
@@ -109,28 +68,20 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     least: float | None = None,
     most: float | None = None,
 ) -> Any:  # noqa: ANN401 (of a field)
-    """Describe a parameter that says what form an effect has.
-
-    It is drawn uniformly between ``low`` and ``high``; it may be from ``least`` to ``most``, by
-    default up to :data:`MOST` times the larger of them, of either sign.
-    """
+    """Describe a parameter of an effect's form, drawn uniformly; it is from least to most."""
     most = MOST * max(abs(low), abs(high)) if most is None else most
     least = -most if least is None else least
     metadata = {"low": low, "high": high, "unit": unit, "whole": whole}
     return dataclasses.field(metadata=metadata | {"least": least, "most": most})
 
 
+@dataclass_transform(frozen_default=True)
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """One thing that the paper's equation leaves out.
+    """One term that the paper's equation leaves out.
 
     A subclass names it, gives its formula in SI, lists its parameters as fields made by
-    :func:`size` and :func:`shape`, and overrides what it changes.
-
-    Raises
-    ------
-    InputError
-        If a parameter is not finite or outside its range.
+    :func:`size` and :func:`shape`, and overrides what it changes; it becomes a frozen dataclass.
     """
 
     name: ClassVar[str]
@@ -138,18 +89,21 @@ class Effect:
     formula: ClassVar[str]
     variant: ClassVar[str] = ""
     signed: ClassVar[bool] = False
-    """Whether either sign of the size makes sense."""
+    """Whether the size may have either sign."""
     states: ClassVar[int] = 0
-    """How many variables of its own the effect integrates."""
+    """Number of variables of its own that the effect integrates."""
     drawn: ClassVar[bool] = True
     """Whether a draw may choose it."""
     needs: ClassVar[str] = ""
     """The kind of run that shows it, ``free`` or ``forced``; empty if any does."""
 
+    def __init_subclass__(cls) -> None:
+        dataclasses.dataclass(frozen=True)(cls)
+
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = float(getattr(self, field.name))
-            what = f"effect {self.title}: {field.name} must be"
+            what = f"effect {self.full_name()}: {field.name} must be"
             if not math.isfinite(value):
                 raise InputError(f"{what} a finite number, got {value:g}")
             about = field.metadata
@@ -162,11 +116,6 @@ class Effect:
                 raise InputError(f"{what} a whole number, got {value:g}")
             object.__setattr__(self, field.name, value)
 
-    @property
-    def title(self) -> str:
-        """Name and variant, as typed."""
-        return self.full_name()
-
     @classmethod
     def full_name(cls) -> str:
         """Name and variant, as typed: ``magnet`` or ``magnet:dipole``."""
@@ -174,22 +123,14 @@ class Effect:
 
     @classmethod
     def draw(cls, rng: Generator, scale: float, given: dict[str, float]) -> Effect:
-        """Draw the parameters; the size is multiplied by ``scale``, those ``given`` are taken.
-
-        Raises
-        ------
-        InputError
-            If a parameter that is given does not exist or is outside its range.
-        """
+        """Draw the parameters; the size is multiplied by ``scale``, those ``given`` are taken."""
         known = {field.name: field.metadata for field in dataclasses.fields(cls)}
         for name in given:
             if name not in known:
                 has = ", ".join(known) or "none"
                 raise InputError(f"effect {cls.full_name()} has no parameter {name!r}: {has}")
-        values = {}
-        for name, about in known.items():
-            # Drawn even where it is given, so that the other draws stay what they were.
-            values[name] = cls._draw_one(rng, about, scale)
+        # All are drawn, given or not, so that the other draws do not change.
+        values = {name: cls._draw_one(rng, about, scale) for name, about in known.items()}
         return cls(**(values | given))
 
     @classmethod
@@ -203,34 +144,31 @@ class Effect:
         return float(rng.uniform(low, high))
 
     def least_friction(self) -> float:
-        """The least that the effect ever adds to the dry friction, rad/s^2."""
+        """Return the least that the effect adds to the dry friction, rad/s^2."""
         return 0.0
 
     def least_damping(self) -> float:
-        """The least that the effect ever adds to c/m, 1/s."""
+        """Return the least that the effect adds to c/m, 1/s."""
         return 0.0
 
     def acceleration(self, motion: Motion, own: Floats) -> Floats | float:
-        """Acceleration that the effect adds, rad/s^2, shape (L, K)."""
+        """Return the acceleration by the effect, rad/s^2, shape (L, K)."""
         return 0.0
 
     def friction(self, motion: Motion, direction: Floats) -> Floats | float:
-        """What the effect adds to the dry friction in a direction, rad/s^2, shape (L, K)."""
+        """Return the dry friction by the effect in a direction, rad/s^2, shape (L, K)."""
         return 0.0
 
     def inertia(self, motion: Motion) -> Floats | float:
-        """What the effect adds to the inertia, as a share of it, shape (L, K)."""
+        """Return the inertia by the effect, as a share of the rig's, shape (L, K)."""
         return 0.0
 
     def begin(self, motion: Motion) -> Floats:
-        """The effect's own variables where a motion begins, shape (L, K, states)."""
+        """Return the effect's own variables where a motion begins, shape (L, K, states)."""
         return np.zeros((*motion.theta.shape, self.states))
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
-        """Time derivatives of the effect's own variables ``own``, shape (L, K, states).
-
-        Most effects have none, so that there is nothing to change.
-        """
+        """Return the time derivatives of the effect's own variables, shape (L, K, states)."""
         return own[..., :0]
 
     def alter(self, drive: Drive, lab: Floats) -> Drive:
@@ -238,32 +176,23 @@ class Effect:
         return drive
 
     def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
-        """Lab times in s, and jumps of the velocity in rad/s, between two lab times."""
+        """Return the lab times, s, and sizes, rad/s, of jumps of the velocity between two times."""
         return []
-
-
-# The pivot's motion that is meant, and that acts.
 
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """Acceleration of the pivot over g in each of R runs.
+    """Acceleration of the pivot over g in each of R runs; all arrays have the shape (R,).
 
     Upward: ``a(t) = p cos(psi) + p_second cos(2 psi + phi_second)`` with the phase
     ``psi = Omega t + chirp t**2 / 2 + phi``; toward positive angles
     ``p_lateral cos(psi + phi_lateral)``.
-
-    Parameters
-    ----------
-    p, frequency, phase, chirp, p_second, phi_second, p_lateral, phi_lateral : array, shape (R,)
-        ``p`` and its like without unit and 0 in a free run, ``frequency`` (Omega) in rad/s,
-        phases in rad, ``chirp`` in rad/s^2.
     """
 
-    p: Floats
-    frequency: Floats
-    phase: Floats
-    chirp: Floats
+    p: Floats  # 0 in a free run
+    frequency: Floats  # Omega, rad/s
+    phase: Floats  # rad
+    chirp: Floats  # rad/s^2
     p_second: Floats
     phi_second: Floats
     p_lateral: Floats
@@ -276,15 +205,7 @@ class Drive:
         return cls(p, frequency, phase, none, none, none, none, none)
 
     def at(self, run: NDArray[np.intp], time: Floats) -> tuple[Floats | float, Floats | float]:
-        """Return upward and lateral acceleration over g, each of shape (L, K).
-
-        Parameters
-        ----------
-        run : array of int, shape (L, 1)
-            Which run each lane belongs to.
-        time : array, shape (L, K)
-            Time since that run began, s.
-        """
+        """Return upward and lateral acceleration over g, shape (L, K), as in :class:`Motion`."""
         if not self.p.any():
             return 0.0, 0.0
         psi = (self.frequency[run] + self.chirp[run] * time / 2) * time + self.phase[run]

@@ -1,23 +1,16 @@
-"""Effects that brake: damping and dry friction."""
+"""Effects that brake: damping and dry friction, constant or with the time in the laboratory."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Effect, Motion, shape, size
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+from pendmap.virtual_rig.effects.base import Effect, Floats, Motion, shape, size
 
 
-@dataclass(frozen=True)
 class ViscousDamping(Effect):
-    """More of what the rig has anyway."""
+    """Viscous damping beside that of the rig."""
 
     name = "viscous_damping"
     group = "damping"
@@ -30,9 +23,8 @@ class ViscousDamping(Effect):
         return -self.gamma * motion.velocity
 
 
-@dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """More of what the rig has anyway."""
+    """Coulomb friction beside that of the rig."""
 
     name = "coulomb_friction"
     group = "friction"
@@ -45,7 +37,6 @@ class CoulombFriction(Effect):
         return self.theta_r
 
 
-@dataclass(frozen=True)
 class QuadraticDrag(Effect):
     """Drag of the air at high Reynolds numbers."""
 
@@ -59,9 +50,8 @@ class QuadraticDrag(Effect):
         return -self.q * motion.velocity * motion.speed
 
 
-@dataclass(frozen=True)
 class CubicDamping(Effect):
-    """The next odd power."""
+    """Damping by the next odd power of the velocity."""
 
     name = "cubic_damping"
     group = "damping"
@@ -73,7 +63,6 @@ class CubicDamping(Effect):
         return -self.k3 * motion.velocity**3
 
 
-@dataclass(frozen=True)
 class PowerLawDrag(Effect):
     """Drag between laminar and turbulent flow."""
 
@@ -89,43 +78,6 @@ class PowerLawDrag(Effect):
         return -self.q * motion.direction * np.maximum(motion.speed, 0.0) ** self.n
 
 
-@dataclass(frozen=True)
-class AsymmetricViscous(Effect):
-    """Damping that differs between the two directions."""
-
-    name = "asymmetric_viscous"
-    group = "damping"
-    formula = "-b abs(v)"
-    signed = True
-
-    b: float = size(0.0005, 0.002, "1/s")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.b * motion.speed
-
-    def least_damping(self) -> float:
-        return -abs(self.b)
-
-
-@dataclass(frozen=True)
-class AsymmetricCoulomb(Effect):
-    """Dry friction that differs between the two directions."""
-
-    name = "asymmetric_coulomb"
-    group = "friction"
-    formula = "-d abs(sign v)"
-    signed = True
-
-    d: float = size(0.0035, 0.014, "rad/s^2")
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.d * direction
-
-    def least_friction(self) -> float:
-        return -abs(self.d)
-
-
-@dataclass(frozen=True)
 class EddyBrake(Effect):
     """Eddy currents in a plate that passes a magnet: strongest at one velocity.
 
@@ -143,7 +95,6 @@ class EddyBrake(Effect):
         return -self.b * self.vc**2 * motion.velocity / (self.vc**2 + motion.velocity**2)
 
 
-@dataclass(frozen=True)
 class StribeckFriction(Effect):
     """Dry friction that is larger when the motion is slow."""
 
@@ -161,16 +112,14 @@ class StribeckFriction(Effect):
         return self.a * np.exp(-(slow**self.delta))
 
 
-@dataclass(frozen=True)
 class SharpStribeckFriction(StribeckFriction):
-    """The same with a cusp at rest (Tustin's form) instead of a round top."""
+    """Stribeck friction with a cusp at rest (Tustin's form) instead of a round top."""
 
     variant = "sharp"
     formula = "-a exp(-abs(v/vs)) sign v"
     delta: ClassVar[float] = 1.0
 
 
-@dataclass(frozen=True)
 class LoadDependentFriction(Effect):
     """Dry friction in proportion to the load on the bearing; at rest it is what Tr says."""
 
@@ -187,7 +136,40 @@ class LoadDependentFriction(Effect):
         return -self.k
 
 
-@dataclass(frozen=True)
+class AsymmetricViscous(Effect):
+    """Damping that differs between the two directions."""
+
+    name = "asymmetric_viscous"
+    group = "damping"
+    formula = "-b abs(v)"
+    signed = True
+
+    b: float = size(0.0005, 0.002, "1/s")
+
+    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+        return -self.b * motion.speed
+
+    def least_damping(self) -> float:
+        return -abs(self.b)
+
+
+class AsymmetricCoulomb(Effect):
+    """Dry friction that differs between the two directions."""
+
+    name = "asymmetric_coulomb"
+    group = "friction"
+    formula = "-d abs(sign v)"
+    signed = True
+
+    d: float = size(0.0035, 0.014, "rad/s^2")
+
+    def friction(self, motion: Motion, direction: Floats) -> Floats:
+        return self.d * direction
+
+    def least_friction(self) -> float:
+        return -abs(self.d)
+
+
 class DahlFriction(Effect):
     """Friction of a contact that yields before it slips.
 
@@ -210,7 +192,6 @@ class DahlFriction(Effect):
         return slip[..., np.newaxis]
 
 
-@dataclass(frozen=True)
 class RoughSpot(Effect):
     """Dry friction at one angle: dirt in the bearing."""
 
@@ -226,28 +207,6 @@ class RoughSpot(Effect):
         return self.f * np.exp((np.cos(motion.theta - self.th0) - 1) / self.w**2)
 
 
-DAMPING: tuple[type[Effect], ...] = (
-    ViscousDamping,
-    CoulombFriction,
-    QuadraticDrag,
-    CubicDamping,
-    PowerLawDrag,
-    EddyBrake,
-    StribeckFriction,
-    SharpStribeckFriction,
-    LoadDependentFriction,
-    AsymmetricViscous,
-    AsymmetricCoulomb,
-    DahlFriction,
-    RoughSpot,
-)
-"""All effects of this file, as they are listed."""
-
-
-# Effects that change with the time in the laboratory.
-
-
-@dataclass(frozen=True)
 class CoulombDrift(Effect):
     """Wear: dry friction grows with lab time."""
 
@@ -261,7 +220,6 @@ class CoulombDrift(Effect):
         return self.r * motion.lab
 
 
-@dataclass(frozen=True)
 class WarmingCoulomb(Effect):
     """A bearing that warms up: dry friction falls to a new level."""
 
@@ -279,9 +237,8 @@ class WarmingCoulomb(Effect):
         return -self.f
 
 
-@dataclass(frozen=True)
 class SlowlyWarmingCoulomb(WarmingCoulomb):
-    """The same with a hyperbola: the last of it takes far longer."""
+    """Friction that falls along a hyperbola: the last part takes far longer."""
 
     variant = "hyperbolic"
     formula = "+f t/(t + tau) sign v, t lab time"
@@ -290,7 +247,6 @@ class SlowlyWarmingCoulomb(WarmingCoulomb):
         return -self.f * motion.lab / (motion.lab + self.tau)
 
 
-@dataclass(frozen=True)
 class ViscousDrift(Effect):
     """Grease that thickens: viscous damping grows with lab time."""
 
@@ -304,7 +260,6 @@ class ViscousDrift(Effect):
         return -self.r * motion.lab * motion.velocity
 
 
-@dataclass(frozen=True)
 class WarmingViscous(Effect):
     """Grease that warms up: viscous damping falls to a new level."""
 
@@ -322,9 +277,8 @@ class WarmingViscous(Effect):
         return -self.b
 
 
-@dataclass(frozen=True)
 class SlowlyWarmingViscous(WarmingViscous):
-    """The same with a hyperbola: the last of it takes far longer."""
+    """Damping that falls along a hyperbola: the last part takes far longer."""
 
     variant = "hyperbolic"
     formula = "+b t/(t + tau) v, t lab time"
@@ -333,7 +287,6 @@ class SlowlyWarmingViscous(WarmingViscous):
         return self.b * motion.lab / (motion.lab + self.tau) * motion.velocity
 
 
-@dataclass(frozen=True)
 class NaturalFrequencyDrift(Effect):
     """A rod that shortens as it cools."""
 
@@ -346,14 +299,3 @@ class NaturalFrequencyDrift(Effect):
     def acceleration(self, motion: Motion, own: Floats) -> Floats:
         pull = motion.w0**2 * (1 + motion.vertical) * motion.sin
         return np.asarray(-self.r * motion.lab * pull)
-
-
-AGEING: tuple[type[Effect], ...] = (
-    CoulombDrift,
-    WarmingCoulomb,
-    SlowlyWarmingCoulomb,
-    ViscousDrift,
-    WarmingViscous,
-    SlowlyWarmingViscous,
-    NaturalFrequencyDrift,
-)

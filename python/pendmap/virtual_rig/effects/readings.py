@@ -4,26 +4,21 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Effect, shape, size
+from pendmap.virtual_rig.effects.base import Effect, Floats, shape, size
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.virtual_rig.path import Path
 
-    Floats = NDArray[np.float64]
-
-
 _FINE: Final = 1e-3
 """Step of the lag's exact response to a cubic between two points, s."""
 
 
-@dataclass(frozen=True)
 class ReadingEffect(Effect):
     """An effect that leaves the motion alone."""
 
@@ -41,17 +36,7 @@ class ReadingEffect(Effect):
 
 
 def read(path: Path, time: Floats, effects: list[ReadingEffect]) -> Floats:
-    """Return what a sensor without noise reads at true times, rad, shape (N,).
-
-    Parameters
-    ----------
-    path : Path
-        The clean motion.
-    time : array, shape (N,)
-        True times, s, increasing.
-    effects : list of ReadingEffect
-        The sensor's effects; each acts on what the one before it leaves.
-    """
+    """Return what a sensor without noise reads of a path at true, increasing times, rad."""
     # Turning points between the samples matter to backlash.
     turns = np.array([event.time for event in path.events if event.what == "turn"])
     turns = turns[(turns > time[0]) & (turns < time[-1])]
@@ -70,7 +55,6 @@ def fading(values: Floats, factor: float) -> Floats:
     return np.array(list(itertools.accumulate(values.tolist(), lambda y, x: factor * y + x)))
 
 
-@dataclass(frozen=True)
 class EncoderOffset(ReadingEffect):
     """The zero of the sensor is not at the lowest point."""
 
@@ -85,7 +69,6 @@ class EncoderOffset(ReadingEffect):
         return angle + self.d
 
 
-@dataclass(frozen=True)
 class EncoderDrift(ReadingEffect):
     """The zero of the sensor wanders off, by as much in every second."""
 
@@ -100,7 +83,6 @@ class EncoderDrift(ReadingEffect):
         return angle + self.r * (path.lab + time)
 
 
-@dataclass(frozen=True)
 class EncoderGain(ReadingEffect):
     """The sensor's scale is wrong."""
 
@@ -115,7 +97,6 @@ class EncoderGain(ReadingEffect):
         return (1 + self.e) * angle
 
 
-@dataclass(frozen=True)
 class EncoderEccentricity(ReadingEffect):
     """The disc of the encoder is not centred on its shaft."""
 
@@ -130,7 +111,6 @@ class EncoderEccentricity(ReadingEffect):
         return angle + self.e * np.sin(angle + self.psi)
 
 
-@dataclass(frozen=True)
 class EncoderBacklash(ReadingEffect):
     """Play between shaft and sensor, centred at the start: the reading lags on either side."""
 
@@ -150,7 +130,6 @@ class EncoderBacklash(ReadingEffect):
         return np.array(result)
 
 
-@dataclass(frozen=True)
 class SensorLag(ReadingEffect):
     """A filter of first order in the sensor, settled when the run begins."""
 
@@ -172,7 +151,7 @@ class SensorLag(ReadingEffect):
         d = (velocity[:-1] + velocity[1:] - 2 * rise) / step**2
 
         def settled(k: NDArray[np.intp], t: Floats) -> Floats:
-            """What the lag reads of the cubic alone: P - tau P' + tau^2 P'' - tau^3 P'''."""
+            """Return the settled reading of a cubic: P - tau P' + tau^2 P'' - tau^3 P'''."""
             p = theta[k] + t * (velocity[k] + t * (c[k] + t * d[k]))
             first = velocity[k] + t * (2 * c[k] + 3 * t * d[k])
             second = 2 * c[k] + 6 * t * d[k]
@@ -190,7 +169,6 @@ class SensorLag(ReadingEffect):
         return np.asarray(settled(k, t) + departure[k] * np.exp(-t / self.tau))
 
 
-@dataclass(frozen=True)
 class Timebase(ReadingEffect):
     """The clock of the record runs fast or slow."""
 
@@ -205,15 +183,3 @@ class Timebase(ReadingEffect):
 
     def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
         return angle
-
-
-READINGS: tuple[type[Effect], ...] = (
-    EncoderOffset,
-    EncoderDrift,
-    EncoderGain,
-    EncoderEccentricity,
-    EncoderBacklash,
-    SensorLag,
-    Timebase,
-)
-"""All effects of this file, as they are listed."""

@@ -4,33 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Effect, Motion, shape, size
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pendmap.virtual_rig.effects.base import Drive
-
-    Floats = NDArray[np.float64]
+from pendmap.virtual_rig.effects.base import Drive, Effect, Floats, Motion, shape, size
 
 
 def _recoil(motion: Motion, own: Floats, mode: tuple[float, float, float]) -> Floats:
-    """Acceleration of a lateral mode but for the part with th'', rad/s^2, shape (L, K).
-
-    ``x'' = -2 z wx x' - wx^2 x + mu v^2 sin th - mu th'' cos th``, lengths over that of the
-    pendulum; ``own`` holds ``x, x'``.
-    """
+    """Return ``-2 z wx x' - wx^2 x + mu v^2 sin th``, the lateral mode's ``x''`` without th''."""
     mu, wx, z = mode
     x, rate = own[..., 0], own[..., 1]
     return np.asarray(-2 * z * wx * rate - wx**2 * x + mu * motion.velocity**2 * motion.sin)
 
 
-@dataclass(frozen=True)
 class PivotCompliance(Effect):
     """A pivot that gives way sideways, with a mode of its own, driven by the pendulum's pull."""
 
@@ -73,9 +59,8 @@ class PivotCompliance(Effect):
         return result
 
 
-@dataclass(frozen=True)
 class TwoModePivot(PivotCompliance):
-    """The same with two modes: the pivot's post, and the table under it."""
+    """A pivot with two modes: its post, and the table under it."""
 
     variant = "two_modes"
     formula = "-(x1 + x2)'' cos th, each as in pivot_compliance, mu2 = share mu"
@@ -89,7 +74,6 @@ class TwoModePivot(PivotCompliance):
         return [(self.mu, self.wx, self.z), (self.share * self.mu, self.wx2, self.z2)]
 
 
-@dataclass(frozen=True)
 class BaseSway(Effect):
     """The floor sways sideways, steadily, whatever the pendulum does."""
 
@@ -106,7 +90,6 @@ class BaseSway(Effect):
         return np.asarray(-(motion.w0**2) * sway * motion.cos)
 
 
-@dataclass(frozen=True)
 class Impulses(Effect):
     """A knock against the rig: a jump of the velocity at a lab time."""
 
@@ -121,7 +104,6 @@ class Impulses(Effect):
         return [(self.t0, self.J)] if begin < self.t0 < end else []
 
 
-@dataclass(frozen=True)
 class ImpulseTrain(Effect):
     """Knocks about every ``every`` seconds of lab time, in either sense."""
 
@@ -152,7 +134,6 @@ class _DriveEffect(Effect):
     signed = True
 
 
-@dataclass(frozen=True)
 class DriveAmplitude(_DriveEffect):
     """The drive's amplitude is not what the experiment says."""
 
@@ -165,7 +146,6 @@ class DriveAmplitude(_DriveEffect):
         return dataclasses.replace(drive, p=drive.p * (1 + self.e))
 
 
-@dataclass(frozen=True)
 class DrivePhase(_DriveEffect):
     """The drive is late or early, by the same phase in all runs."""
 
@@ -178,7 +158,6 @@ class DrivePhase(_DriveEffect):
         return dataclasses.replace(drive, phase=drive.phase + self.d)
 
 
-@dataclass(frozen=True)
 class DriveFrequency(_DriveEffect):
     """The drive's frequency is not what the experiment says."""
 
@@ -191,7 +170,6 @@ class DriveFrequency(_DriveEffect):
         return dataclasses.replace(drive, frequency=drive.frequency * (1 + self.e))
 
 
-@dataclass(frozen=True)
 class DriveChirp(_DriveEffect):
     """The drive's frequency creeps during a run."""
 
@@ -204,7 +182,6 @@ class DriveChirp(_DriveEffect):
         return dataclasses.replace(drive, chirp=np.full_like(drive.p, self.r))
 
 
-@dataclass(frozen=True)
 class DriveSecondHarmonic(_DriveEffect):
     """A shaker that distorts: twice the frequency as well."""
 
@@ -220,7 +197,6 @@ class DriveSecondHarmonic(_DriveEffect):
         return dataclasses.replace(drive, p_second=self.e * drive.p, phi_second=phi)
 
 
-@dataclass(frozen=True)
 class LateralDrive(_DriveEffect):
     """A shaker that does not move straight: sideways as well."""
 
@@ -234,19 +210,3 @@ class LateralDrive(_DriveEffect):
     def alter(self, drive: Drive, lab: Floats) -> Drive:
         phi = np.full_like(drive.p, self.phase)
         return dataclasses.replace(drive, p_lateral=self.e * drive.p, phi_lateral=phi)
-
-
-STANDS: tuple[type[Effect], ...] = (
-    PivotCompliance,
-    TwoModePivot,
-    BaseSway,
-    Impulses,
-    ImpulseTrain,
-    DriveAmplitude,
-    DrivePhase,
-    DriveFrequency,
-    DriveChirp,
-    DriveSecondHarmonic,
-    LateralDrive,
-)
-"""All effects of this file, as they are listed."""

@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Effect, Motion, shape, size
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+from pendmap.virtual_rig.effects.base import Effect, Floats, Motion, shape, size
 
 
-@dataclass(frozen=True)
 class BiasTorque(Effect):
     """A constant pull: a cable, a tilted fan."""
 
@@ -30,7 +21,6 @@ class BiasTorque(Effect):
         return self.torque
 
 
-@dataclass(frozen=True)
 class BearingHarmonic(Effect):
     """Cogging or uneven races: a torque that repeats n times a turn."""
 
@@ -46,7 +36,6 @@ class BearingHarmonic(Effect):
         return np.asarray(self.amplitude * np.sin(self.n * motion.theta + self.psi))
 
 
-@dataclass(frozen=True)
 class Magnet(Effect):
     """A magnet under the lowest point: a narrow well."""
 
@@ -63,7 +52,6 @@ class Magnet(Effect):
         return np.asarray(-self.amplitude * x * np.exp(-(x**2) / 2))
 
 
-@dataclass(frozen=True)
 class DipoleMagnet(Effect):
     """Two dipoles in line, a gap apart at the lowest point: U ~ r^-3, its tails far wider."""
 
@@ -81,7 +69,6 @@ class DipoleMagnet(Effect):
         return np.asarray(-self.amplitude * motion.sin / self.d * distance**-2.5)
 
 
-@dataclass(frozen=True)
 class ElasticRestoring(Effect):
     """A cable that winds up: it counts turns."""
 
@@ -95,7 +82,6 @@ class ElasticRestoring(Effect):
         return -self.k * motion.theta
 
 
-@dataclass(frozen=True)
 class RigTilt(Effect):
     """The rig leans: gravity does not pull along the line of the drive and of the zero."""
 
@@ -110,7 +96,6 @@ class RigTilt(Effect):
         return np.asarray(-(motion.w0**2) * (np.sin(motion.theta + self.d) - motion.sin))
 
 
-@dataclass(frozen=True)
 class InertiaRipple(Effect):
     """An inertia that varies with the angle: a joint, a belt, a camera on the arm."""
 
@@ -130,7 +115,6 @@ class InertiaRipple(Effect):
         return np.asarray(self.e * self.n / 2 * np.sin(angle) * motion.velocity**2)
 
 
-@dataclass(frozen=True)
 class AddedMass(Effect):
     """The fluid that moves along: it has inertia, also against the pivot's motion, but no weight.
 
@@ -151,7 +135,6 @@ class AddedMass(Effect):
         return np.asarray(-self.e * motion.w0**2 * motion.vertical * motion.sin)
 
 
-@dataclass(frozen=True)
 class LateAddedMass(Effect):
     """A weight at the pivot's hub (a clamp, a cable tie) from some lab time on: inertia alone."""
 
@@ -165,17 +148,3 @@ class LateAddedMass(Effect):
 
     def inertia(self, motion: Motion) -> Floats:
         return np.asarray(self.e * (motion.lab - motion.time > self.t0))
-
-
-TORQUES: tuple[type[Effect], ...] = (
-    BiasTorque,
-    BearingHarmonic,
-    Magnet,
-    DipoleMagnet,
-    ElasticRestoring,
-    RigTilt,
-    InertiaRipple,
-    AddedMass,
-    LateAddedMass,
-)
-"""All effects of this file, as they are listed."""

@@ -9,9 +9,9 @@ import statistics
 import time
 from typing import TYPE_CHECKING, Protocol
 
-from peers import numba_growth, ours, pynamical
-from peers.common import SEED, Case, errors, grid, median_ratio, regular_starts
-from peers.report import machine, note, say, table
+from benchmarks.peers import numba_growth, ours, pynamical
+from benchmarks.peers.common import SEED, Case, errors, grid, median_ratio, regular_starts
+from benchmarks.peers.report import machine, note, say, table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

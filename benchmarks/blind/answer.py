@@ -7,8 +7,8 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from blind_cases import SOUND, Case, record
-from blind_difficulty import difficulty, disturbance
+from benchmarks.blind.cases import SOUND, Case, record
+from benchmarks.blind.difficulty import difficulty, disturbance
 from pendmap import virtual_rig
 from pendmap.comparison.data import evidence_of
 from pendmap.diagnosis import diagnose

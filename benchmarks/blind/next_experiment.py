@@ -1,6 +1,6 @@
 """What the next experiment decides, against what ``pendmap diagnose`` predicts of it.
 
-    python benchmarks/next_experiment.py --cases 60 --seed 1 --out next.jsonl
+    python -m benchmarks.blind.next_experiment --cases 60 --seed 1 --out next.jsonl
 
 Small effects are hidden in free decays of the virtual rig until a diagnosis cannot tell names
 apart. Then the rig records what ``next_experiment`` recommends (``recommended``), and besides, as
@@ -30,8 +30,8 @@ os.environ.update(
 
 import numpy as np
 
-from blind_report import wilson
-from peers.report import machine, say, table
+from benchmarks.blind.report import wilson
+from benchmarks.peers.report import machine, say, table
 from pendmap import virtual_rig
 from pendmap.diagnosis import diagnose
 from pendmap.records import read_experiment

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import pendmap
-from peers import numba_growth, ours, pynamical
-from peers.common import Case, median_ratio, regular_starts
-from peers.report import machine, note, say, table
+from benchmarks.peers import numba_growth, ours, pynamical
+from benchmarks.peers.common import Case, median_ratio, regular_starts
+from benchmarks.peers.report import machine, note, say, table
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -16,7 +16,7 @@ from pathlib import Path
 # One thread, before numpy is imported.
 os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
 
-from peers.report import machine, note, say, table
+from benchmarks.peers.report import machine, note, say, table
 from pendmap.virtual_rig import Request, make, places, write
 
 HEADERS = ("effects", "experiments", "median s", "most s", "400 in min", "wanted min")

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from peers.report import machine, note, say, table
+from benchmarks.peers.report import machine, note, say, table
 
 CASES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "nothing hidden": (("none",), ()),
@@ -76,7 +76,15 @@ def one(case: str, seed: int) -> Timed:
 def apart(case: str, seed: int, threads: int) -> Timed:
     """Do the same in a process with so many threads."""
     own = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": str(threads)}
-    command = [sys.executable, __file__, "--one", case, "--seed", str(seed)]
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.speed.diagnose",
+        "--one",
+        case,
+        "--seed",
+        str(seed),
+    ]
     done = subprocess.run(  # noqa: S603 (this script itself)
         command, env=os.environ | own, capture_output=True, text=True, check=True
     )

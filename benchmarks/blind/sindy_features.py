@@ -5,7 +5,7 @@ effect less that without it, so that SINDy is offered the very form that was hid
 shapes are the candidates of ``pendmap diagnose``. What a sensor or a clock does is linearised: a
 reading ``y = th + e g(th)`` obeys, to first order in e,
 
-``y'' = F + e (g'' - F_th g - F_v g')``,   ``g' = g_th v``,   ``g'' = g_thth v^2 + g_th F``,
+``y'' = F + e (g'' - F_th g - F_v g')``,   ``g' = g_th v + g_t``,   ``g'' = g_thth v^2 + g_th F``,
 
 where ``F(th, v, t)`` is the acceleration without effects; a clock that is wrong, or a sensor that
 is late, reads the drive at another time.
@@ -26,6 +26,7 @@ from pendmap.virtual_rig import EFFECTS
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.effects.readings import ReadingEffect
 from pendmap.virtual_rig.equation import Equation, Parameters
+from pendmap.virtual_rig.path import Path
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -150,7 +151,8 @@ def features(every: Iterable[States], rig: Parameters) -> list[tuple[Candidate, 
     pool = candidates({"viscous_damping", "coulomb_friction"}, driven=forced)
     found = []
     for candidate in (c for shapes in pool for c in shapes):
-        if EFFECTS[candidate.name].needs == "forced" and not forced:
+        kind = EFFECTS[candidate.name]
+        if (kind.needs == "forced" and not forced) or kind.states:  # a memory is no feature
             continue
         shape = tuple(candidate.effect(Rig(rig.w0).units).parameters.items())
         kept = tuple((n, v) for n, v in shape if n in candidate.shape)
@@ -216,13 +218,19 @@ def _reading(states: States, rig: Parameters, plain: Floats, feature: Feature) -
     clock = effect.clock(time)
     if np.any(clock != time):
         return (_rates(states, rig, [], theta, clock) - plain) / FAINT
-    effect = _made(feature, 0.5)
+    size = min(
+        0.5, *(f.metadata["most"] for f in dataclasses.fields(effect) if "size" in f.metadata)
+    )
+    effect = _made(feature, size)
+    path = Path()
+    path.lab = states.run.lab_time_s
 
-    def moved(angle: Floats) -> Floats:
-        return np.asarray((effect.distort(time, angle, None) - angle) / 0.5, np.float64)
+    def moved(angle: Floats, late: float = 0.0) -> Floats:
+        return np.asarray((effect.distort(time + late, angle, path) - angle) / size, np.float64)
 
     less, here, more = (moved(theta + d) for d in (-STEP, 0.0, STEP))
+    drift = (moved(theta, STEP) - moved(theta, -STEP)) / (2 * STEP)
     slope, bend = (more - less) / (2 * STEP), (more - 2 * here + less) / STEP**2
     further = _rates(states, rig, [], theta + STEP)
     by_angle = (further - _rates(states, rig, [], theta - STEP)) / (2 * STEP)
-    return bend * v**2 + slope * plain - by_angle * here + rig.c_over_m * slope * v
+    return bend * v**2 + slope * plain - by_angle * here + rig.c_over_m * (slope * v + drift)

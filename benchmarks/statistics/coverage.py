@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from peers.report import machine, note, say, table
+from benchmarks.peers.report import machine, note, say, table
 from pendmap.identification.methods.trajectory import identify
 
 NAMES = ("w0", "c_over_m", "Tr", "offset")

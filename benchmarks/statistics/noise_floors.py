@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from peers.report import machine, note, say, table
+from benchmarks.peers.report import machine, note, say, table
 from pendmap.records.noise import noise_of
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sindy_forms import Regression, Setting
+    from benchmarks.blind.sindy_forms import Regression, Setting
 
     Floats = NDArray[np.float64]
 

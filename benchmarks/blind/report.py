@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blind_answer import STRONG, family
-from blind_difficulty import CLEAR
+from benchmarks.blind.answer import STRONG, family
+from benchmarks.blind.difficulty import CLEAR
 from pendmap.model.effects import library
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 
 import numpy as np
 
-from peers.report import machine, note, say, table
+from benchmarks.peers.report import machine, note, say, table
 from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, identify
-from pendmap.identification.methods.registry import combined, de_paula, decrement, log_decrement
+from pendmap.identification.methods import combined, de_paula, decrement, log_decrement
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive
@@ -46,7 +46,7 @@ PAPER = {
     "log_decrement": (16.95, 17.46, 4.35, 6.04),
     "de_paula": (64.81, 41.58, 9.17, 13.29),
 }
-TRUTHS = Path(__file__).resolve().parents[1] / "tests" / "truths.json"
+TRUTHS = Path(__file__).resolve().parents[2] / "tests" / "truths.json"
 
 
 def recursion_error() -> tuple[float, float]:
@@ -99,7 +99,7 @@ def true_peaks(path: Motion) -> Peaks:
 
 
 def with_period(found: Identification, period: float, name: str) -> Identification:
-    """The same zeta and theta_r with another average period."""
+    """Return an identification with its zeta and theta_r and another average period."""
     zeta = found.derived["zeta"].value
     w0 = 2 * math.pi / (period * math.sqrt(1 - zeta**2))
     made = {"w0": Estimate(w0), "c_over_m": Estimate(2 * zeta * w0)}

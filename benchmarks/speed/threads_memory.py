@@ -17,9 +17,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from peers import ours
-from peers.common import CASES, grid
-from peers.report import machine, note, say, table
+from benchmarks.peers import ours
+from benchmarks.peers.common import CASES, grid
+from benchmarks.peers.report import machine, note, say, table
 
 STEPS, PERIODS, SIDE = 33, 200, 320
 WANTED, LIMIT_GIB = 0.93, 1.5
@@ -40,7 +40,7 @@ def work(threads: int) -> None:
 
 def kernel_seconds(processes: int, threads: int) -> float:
     """Return the longest time among workers that begin together."""
-    call = [sys.executable, __file__, "--worker", str(threads)]
+    call = [sys.executable, "-m", "benchmarks.speed.threads_memory", "--worker", str(threads)]
     workers = [
         subprocess.Popen(call, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)  # noqa: S603 (this file)
         for _ in range(processes)

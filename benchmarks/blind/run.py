@@ -1,6 +1,6 @@
 """The blind benchmark of ``pendmap diagnose``: the truth stands in files that no diagnosis opens.
 
-    python benchmarks/blind.py --experiments 1000 --workers 2 --out blind.jsonl
+    python -m benchmarks.blind.run --experiments 1000 --workers 2 --out blind.jsonl
 
 Of the experiments two in five hide nothing; of the others half hide one effect, a quarter two, and
 in a quarter the true effect is withheld from the search, with all that these records do not tell
@@ -32,10 +32,9 @@ os.environ.update(
 
 import numpy as np
 
-import blind_answer
-import blind_cases
-import blind_report
-from peers.report import machine, note, say, table
+from benchmarks.blind import answer, report
+from benchmarks.blind.cases import Case, draw
+from benchmarks.peers.report import machine, note, say, table
 
 KINDS = ["none", "one", "none", "one", "two", "none", "one", "withheld", "none", "two"]
 KINDS += ["none", "one", "none", "one", "withheld", "none", "one", "none", "two", "withheld"]
@@ -46,7 +45,7 @@ FURTHER = ("form", "nuisance", "mess", "layout")
 """Experiments that are scored apart, in the order of their streams of random numbers."""
 
 
-def drawn(count: int, seed: int, **further: int) -> list[blind_cases.Case]:
+def drawn(count: int, seed: int, **further: int) -> list[Case]:
     """Draw the cases, so many of each kind in ``FURTHER`` among them.
 
     Each has a seed of its own: more of them change none.
@@ -57,7 +56,7 @@ def drawn(count: int, seed: int, **further: int) -> list[blind_cases.Case]:
         number = further.get(what, 0) if what else count
         for k in range(number):
             rng = np.random.default_rng((seed, stream, k))
-            cases.append(blind_cases.draw(what or kinds[k], rng))
+            cases.append(draw(what or kinds[k], rng))
     return cases
 
 
@@ -103,7 +102,7 @@ def main() -> None:
             ProcessPoolExecutor(given.workers) as pool,
             given.out.open("a", encoding="utf-8") as out,
         ):
-            for done, row in enumerate(pool.map(blind_answer.run, left), 1):
+            for done, row in enumerate(pool.map(answer.run, left), 1):
                 out.write(json.dumps({"run": seed} | row, default=float) + "\n")
                 out.flush()
                 rows.append(row)
@@ -113,18 +112,18 @@ def main() -> None:
     good = [row for row in rows if "error" not in row]
     say(machine(("numpy", "scipy")))
     say(f"seed      {seed}; {len(rows)} experiments, {len(failed)} refused; all in {given.out}\n")
-    say(table(["figure", "target", "measured"], blind_report.figures(good)))
+    say(table(["figure", "target", "measured"], report.figures(good)))
     say("")
-    if layouts := blind_report.layouts(good):
+    if layouts := report.layouts(good):
         say(table(["layout", "false alarms", "right", "wrong without reserve"], layouts))
         say("")
-    say(table(["probability", "names", "mean", "right"], blind_report.reliability(good)))
+    say(table(["probability", "names", "mean", "right"], report.reliability(good)))
     say("")
-    say(table(["hidden, G >= 60", "said", "times"], blind_report.confusion(good)))
+    say(table(["hidden, G >= 60", "said", "times"], report.confusion(good)))
     for row in failed:
         say(f"refused: {row['what']} {row['effects']} seed {row['seed']}: {row['error']}")
     if given.plot:
-        blind_report.draw_reliability(good, given.plot)
+        report.draw_reliability(good, given.plot)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """How much verdicts depend on the thresholds: each is halved and doubled.
 
-    python benchmarks/thresholds.py --experiments 200 --seed 1 --workers 2
+    python -m benchmarks.blind.thresholds --experiments 200 --seed 1 --workers 2
 
-The experiments are those of blind.py. Each is diagnosed with the thresholds as they are, and with
+The experiments are those of run.py. Each is diagnosed with the thresholds as they are, and with
 one of them halved, then doubled. A verdict has changed where its word, its names or their reserve
 have. Most searches take the same way: a fit that was made before is remembered. A quarter of the
 experiments have disturbances that no effect describes. Results are appended to ``--out``, and a run
@@ -26,9 +26,9 @@ os.environ.update(
     dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 )
 
-import blind
-import blind_cases
-from peers.report import machine, note, say, table
+from benchmarks.blind.cases import Case, record
+from benchmarks.blind.run import drawn, rows_of
+from benchmarks.peers.report import machine, note, say, table
 from pendmap import comparison
 from pendmap.comparison.data import Evidence
 from pendmap.diagnosis import diagnose, fitted_model, held, model_error, physical, refit, scores
@@ -127,11 +127,11 @@ def memory() -> Iterator[None]:
             setattr(module, name, whole)
 
 
-def run(case: blind_cases.Case) -> dict[str, Any]:
+def run(case: Case) -> dict[str, Any]:
     """Return what is said of an experiment, as usual and with each threshold changed."""
     own = [effect.split(":")[0] for effect in case.effects] if case.what == "withheld" else []
     without = [name for name in own if name in library()]
-    experiment = blind_cases.record(case).experiment
+    experiment = record(case).experiment
 
     def said(thresholds: Thresholds) -> list[str]:
         try:
@@ -156,9 +156,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("thresholds.jsonl"))
     given = parser.parse_args()
     mess = given.experiments // 4
-    cases = blind.drawn(given.experiments - mess, given.seed, mess=mess)
+    cases = drawn(given.experiments - mess, given.seed, mess=mess)
     cases = [dataclasses.replace(case, rate=RATE) for case in cases]
-    rows = blind.rows_of(given.out)
+    rows = rows_of(given.out)
     known = {(row["what"], row["seed"]) for row in rows}
     left = [case for case in cases if (case.what, case.seed) not in known]
     with (

@@ -11,8 +11,8 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from peers import ours
-from peers.report import machine, note, say, table
+from benchmarks.peers import ours
+from benchmarks.peers.report import machine, note, say, table
 
 
 @dataclass(frozen=True)

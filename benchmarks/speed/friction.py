@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numba
 import numpy as np
 
-from peers import ours
-from peers.common import SEED, THETA_RANGE, VELOCITY_RANGE, Case, Method, median_ratio
-from peers.heyoka_friction import HeyokaFriction
-from peers.report import machine, note, say, table
+from benchmarks.peers import ours
+from benchmarks.peers.common import SEED, THETA_RANGE, VELOCITY_RANGE, Case, Method, median_ratio
+from benchmarks.peers.heyoka_friction import HeyokaFriction
+from benchmarks.peers.report import machine, note, say, table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

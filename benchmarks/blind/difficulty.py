@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blind_cases import record
+from benchmarks.blind.cases import record
 from pendmap.comparison.data import Evidence, evidence_of
 from pendmap.diagnosis.baseline import baseline
 from pendmap.diagnosis.candidates import candidates
@@ -24,7 +24,7 @@ from pendmap.diagnosis.thresholds import Thresholds
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from blind_cases import Case
+    from benchmarks.blind.cases import Case
     from pendmap.diagnosis.fitted_model import Trial, Windows
     from pendmap.diagnosis.scores import Scores
 
@@ -32,7 +32,7 @@ CLEAR = 25.0
 """Separation times score from which names are told apart nearly always."""
 
 REFITTED, WORTH = 3, 0.5
-"""So many impostors are fitted, of those whose score is this part of what is to be explained."""
+"""Largest number of impostors that are fitted, and their least gain as a share of chi-square."""
 
 CONTAINED = 1e-3
 """A special case leaves no more than this of what is to be explained: rounding and steps."""

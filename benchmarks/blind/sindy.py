@@ -1,11 +1,11 @@
 """``pendmap diagnose`` beside SINDy on the same experiments, by bins of G.
 
-    python benchmarks/blind.py --experiments 1000 --out blind.jsonl
-    python benchmarks/blind_sindy.py blind.jsonl --workers 2 --out sindy.jsonl
+    python -m benchmarks.blind.run --experiments 1000 --out blind.jsonl
+    python -m benchmarks.blind.sindy blind.jsonl --workers 2 --out sindy.jsonl
 
-Each experiment that ``blind.py`` wrote down with one effect hidden, two or none is recorded again
+Each experiment that ``run.py`` wrote down with one effect hidden, two or none is recorded again
 from its seed. SINDy regresses ``th''`` sparsely on the candidates of ``diagnose`` in the
-same shapes (:mod:`sindy_features`); torques have the very form that the rig hides. Angle and
+same shapes (``sindy_features``); torques have the very form that the rig hides. Angle and
 velocity come from a filter of Savitzky and Golay whose width goes by the noise.
 
 - Strong form (Brunton, Proctor & Kutz 2016): the second derivative of the smoothed angle, its
@@ -21,7 +21,7 @@ column for each form has the least penalty with which it claims no more than pen
 is hidden, on these very experiments.
 
 As in ``diagnose`` gravity, viscous damping and Coulomb friction are in every model, and at most
-three effects besides; SINDy is told so. "Right" is what ``blind_report.right`` says for both. SINDy
+three effects besides; SINDy is told so. "Right" is what ``report.right`` says for both. SINDy
 is given the classes of equals that its own features cannot tell apart, and those that pendmap
 found.
 
@@ -52,13 +52,13 @@ os.environ.update(
 
 import numpy as np
 
-import blind_cases
-from blind_report import right, strength, true_names, wilson
-from peers.report import machine, note, say, table
+from benchmarks.blind.cases import Case, record
+from benchmarks.blind.report import right, strength, true_names, wilson
+from benchmarks.blind.sindy_choice import choose
+from benchmarks.blind.sindy_forms import Setting, prepared, regression
+from benchmarks.peers.report import machine, note, say, table
 from pendmap.comparison.data import evidence_of
 from pendmap.identification.methods.joint import as_fit_run
-from sindy_choice import choose
-from sindy_forms import Setting, prepared, regression
 
 WIDTH = 2.0
 SETTINGS = {
@@ -77,16 +77,16 @@ EDGES = (0.0, 12.0, 30.0, 100.0, 300.0, 1000.0, np.inf)
 KINDS = ("one", "two", "none")
 
 
-def case_of(row: dict[str, Any]) -> blind_cases.Case:
+def case_of(row: dict[str, Any]) -> Case:
     """Return the case of a row, from which the same experiment can be made."""
-    names = [field.name for field in dataclasses.fields(blind_cases.Case)]
-    return blind_cases.Case(**{n: row[n] for n in names} | {"effects": tuple(row["effects"])})
+    names = [field.name for field in dataclasses.fields(Case)]
+    return Case(**{n: row[n] for n in names} | {"effects": tuple(row["effects"])})
 
 
 def run(row: dict[str, Any]) -> dict[str, Any]:
     """Make a row's experiment again and let SINDy answer."""
     result: dict[str, Any] = {"what": row["what"], "seed": row["seed"]}
-    evidence = evidence_of(blind_cases.record(case_of(row)).experiment)
+    evidence = evidence_of(record(case_of(row)).experiment)
     runs = [as_fit_run(*pair) for pair in zip(evidence.runs, evidence.readings, strict=True)]
     begin = time.process_time()
     data = prepared(runs, WIDTH)
@@ -166,13 +166,13 @@ def lines(
 def main() -> None:
     """Let SINDy answer what is not answered yet, print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("blind", type=Path, help="what blind.py wrote")
+    parser.add_argument("blind", type=Path, help="what benchmarks.blind.run wrote")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--limit", type=int, default=None, help="only the first so many")
     parser.add_argument("--out", type=Path, default=Path("sindy.jsonl"), help="SINDy's answers")
     given = parser.parse_args()
     if not given.blind.exists():
-        parser.error(f"{given.blind}: there must be such a file, written by blind.py")
+        parser.error(f"{given.blind}: there must be such a file, written by benchmarks.blind.run")
     rows = [row for row in _read(given.blind) if row["what"] in KINDS and "error" not in row]
     rows = rows[: given.limit]
     answers = {row["seed"]: row for row in _read(given.out)}
@@ -210,7 +210,9 @@ def _read(path: Path) -> list[dict[str, Any]]:
         found = [json.loads(line) for line in whole if line.endswith("\n")]
         _ = [(row["what"], row["seed"]) for row in found]
     except (ValueError, TypeError, KeyError):
-        sys.exit(f"{path}: must be a file that blind.py wrote, got no list of experiments")
+        sys.exit(
+            f"{path}: must be a file that benchmarks.blind.run wrote, got no list of experiments"
+        )
     return found
 
 

@@ -1,6 +1,6 @@
 """The two regressions of SINDy, strong and weak.
 
-Both regress ``th''`` on the columns of :mod:`sindy_features`. What every model has (``sin th``,
+Both regress ``th''`` on the columns of ``sindy_features``. What every model has (``sin th``,
 ``v``, ``sign v``) is projected out of target and features first, which is the same as never
 thresholding it. Columns then have unit length, so that one threshold suits them all.
 """
@@ -17,16 +17,16 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csr_array
 
-from sindy_features import columns, features, smoothed
+from benchmarks.blind.sindy_features import columns, features, smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from benchmarks.blind.sindy_features import Feature, States
     from pendmap.identification.runs import FitRun
     from pendmap.virtual_rig.equation import Parameters
-    from sindy_features import Feature, States
 
     Floats = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def prepared(runs: Sequence[FitRun], width: float) -> Prepared:
     runs : sequence of FitRun
         The records of an experiment.
     width : float
-        Factor of the smoothing window, see :func:`sindy_features.smoothed`.
+        Factor of the smoothing window, see ``sindy_features.smoothed``.
     """
     every, rig = smoothed(runs, width)
     pool = features(every, rig)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from peers import heyoka_batch, numba_rk4, ours
-from peers.common import (
+from benchmarks.peers import heyoka_batch, numba_rk4, ours
+from benchmarks.peers.common import (
     CASES,
     SEED,
     Case,
@@ -21,7 +21,7 @@ from peers.common import (
     regular_starts,
     side_for,
 )
-from peers.report import machine, note, say, table
+from benchmarks.peers.report import machine, note, say, table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

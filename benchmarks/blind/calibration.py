@@ -1,6 +1,6 @@
 """Coefficients of pendmap/diagnosis/verdict.py from blind experiments.
 
-    python benchmarks/blind_calibration.py blind.jsonl [more.jsonl ...]
+    python -m benchmarks.blind.calibration blind.jsonl [more.jsonl ...]
 
 A name is right where it is hidden, by itself or in its class.
 Logistic regression; each number is drawn towards the one that stands there by a normal prior of
@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from blind_report import classes, true_names
+from benchmarks.blind.report import classes, true_names
 from pendmap.diagnosis.verdict import COEFFICIENTS, features
 
 WIDTH = 1.0

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.integrate import solve_ivp  # type: ignore[import-untyped]
 
-from peers import heyoka_batch, ours
-from peers.common import SEED, Case, Method, Regular, errors
-from peers.report import has_avx512, machine, note, say, table
+from benchmarks.peers import heyoka_batch, ours
+from benchmarks.peers.common import SEED, Case, Method, Regular, errors
+from benchmarks.peers.report import has_avx512, machine, note, say, table
 
 if TYPE_CHECKING:
     from collections.abc import Callable
