@@ -15,7 +15,7 @@ from pendmap.identification.runs import FitRun
 from pendmap.model import Rig
 from pendmap.records.noise import noise_of
 from pendmap.records.summary import noise_said
-from pendmap.signal.window_polynomial import smoothed_velocity
+from pendmap.signal.local_polynomial import smoothed_velocity
 
 FINE = np.arange(-200, 60_200) / 2000
 TIME = np.arange(3000) * 0.01

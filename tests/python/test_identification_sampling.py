@@ -15,7 +15,7 @@ from pendmap import read_experiment
 from pendmap.identification import find_peaks
 from pendmap.identification.readings import reading_of
 from pendmap.records.noise import noise_of
-from pendmap.records.resampled import measured
+from pendmap.records.samples import measured
 
 if TYPE_CHECKING:
     from pathlib import Path

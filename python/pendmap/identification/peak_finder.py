@@ -11,14 +11,14 @@ from scipy.special import ellipk
 
 from pendmap.identification.turning import End, release, rough_damping, stop
 from pendmap.records.resolution import levels_shared
-from pendmap.signal.window_polynomial import fit_around
+from pendmap.signal.local_polynomial import fit_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.identification.readings import Reading
     from pendmap.identification.turning import Outline
-    from pendmap.signal.window_polynomial import WindowFit
+    from pendmap.signal.local_polynomial import WindowFit
 
     Floats = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from pendmap.identification.coarse_finder import coarse_finder, is_coarse
 from pendmap.identification.peak_finder import Finder
 from pendmap.identification.readings import reading_of
 from pendmap.identification.turning import outline
-from pendmap.records.resampled import measured
+from pendmap.records.samples import measured
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:

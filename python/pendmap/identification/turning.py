@@ -12,7 +12,7 @@ from scipy.special import ellipe, ellipk
 
 from pendmap.records.resolution import step_of
 from pendmap.signal.half_cycles import swings
-from pendmap.signal.window_polynomial import fit_around
+from pendmap.signal.local_polynomial import fit_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Records of experiments: read, understood, checked; nothing is ever written beside them."""
+"""Records of experiments: read, converted to SI and checked; no file is written."""
 
 from __future__ import annotations
 

@@ -1,40 +1,67 @@
-"""What the runs of an experiment show together."""
+"""What the runs of an experiment show together: copied readings and unlike rigs.
+
+Readings are copied where consecutive readings equal those of another run up to a factor and a zero,
+within the written digits. Two recordings of one motion differ by their noise.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.records.copies import once_each
+import numpy as np
+
+from pendmap.formatting import counted
 from pendmap.records.experiment import Finding
 from pendmap.records.scale import small_period
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from pendmap.records.experiment import Run
 
+    Floats = NDArray[np.float64]
+
+
 ONE_RIG: Final = 0.05
-"""Share by which periods of small swings of one pendulum may differ: 10 % of its length."""
+"""Relative difference of small-swing periods from which runs are of several rigs."""
+
+FEWEST_SHARED: Final = 50
+"""Readings: fewer shared readings are no copy, fewer remaining readings are no run."""
+
+LEAST_SHARE: Final = 0.1
+"""Share of the shorter run: fewer shared readings are no copy."""
+
+LEAST_LEVELS: Final = 20
+"""Sensor steps that shared readings span at least; fewer agree by chance."""
+
+AGREEING: Final = 0.99
+"""Share of shared readings that agree within half a step; 1 % may be edited."""
+
+FACTOR_ERROR: Final = 1e-6
+"""Relative error of a conversion factor between units as people write it."""
+
+OFF_STEP: Final = 1e-2
+"""Steps by which distances of readings may miss whole multiples of a step."""
+
+MOST_THINNED: Final = 10
+"""Readings of which a copy keeps one, at most, to be found."""
 
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
-    """Return runs, each reading counted once, and what they show together.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        All of an experiment.
-    """
+    """Return runs in which each reading counts once, and the findings across runs."""
     made = once_each(runs)
-    found = list(_unlike(made))
+    found = _unlike(made)
     if runs and all(run.hold_out for run in runs):
         found.append(Finding("all-held-out", "all runs are held out: none is left to fit"))
     return tuple(made), tuple(found)
 
 
 def _unlike(runs: Sequence[Run]) -> list[Finding]:
-    """Return that runs are of several pendulums, where the periods of small swings show it."""
+    """Return a finding if the periods of small swings differ between runs."""
     swings = {
         run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
         for run in runs
@@ -49,3 +76,161 @@ def _unlike(runs: Sequence[Run]) -> list[Finding]:
         "these are not runs of one pendulum"
     )
     return [Finding("rigs-differ", text)]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Motion:
+    """Readings from the first to the last trusted one, with their clock ticks."""
+
+    first: int
+    theta: Floats
+    step: float
+    tick: NDArray[np.int64]  # time in whole intervals; lost readings leave ticks empty
+    interval: float
+
+    @classmethod
+    def of(cls, run: Run) -> _Motion:
+        at = np.flatnonzero(run.trusted)
+        part = slice(at[0], at[-1] + 1) if at.size else slice(0, 0)
+        theta, apart = run.theta[part], np.diff(run.time[part])
+        interval = float(np.median(apart)) if apart.size else 1.0
+        ticks = np.cumsum(np.maximum(np.round(apart / interval), 1.0))
+        tick = np.concatenate([[0.0], ticks])[: theta.size].astype(np.int64)
+        return cls(part.start, theta, _digit(theta), tick, interval)
+
+
+def once_each(runs: Sequence[Run]) -> list[Run]:
+    """Return runs in which each reading counts once.
+
+    Of two runs that share readings, the held-out run gives way, else the shorter, else the later.
+    """
+    made = list(runs)
+    motions = [_Motion.of(run) for run in runs]
+    order = sorted(range(len(runs)), key=lambda k: (runs[k].hold_out, -motions[k].theta.size, k))
+    for place, k in enumerate(order):
+        for other in order[:place]:
+            shared = _shared(motions[other], motions[k])
+            if shared is not None and made[k].moves:
+                first = motions[k].first + shared[0]
+                made[k] = _without(made[k], runs[other], first, shared[1])
+    return made
+
+
+def _digit(theta: Floats) -> float:
+    """Return the step in which readings are written or counted; 0 where none is seen."""
+    apart = np.diff(np.unique(np.round(theta, 12)))
+    if not apart.size:
+        return 0.0
+    step = float(apart.min())
+    # Written digits round multiples of a count: the mean of many steps is exact enough.
+    near = apart[apart < 1.5 * step]
+    step = float(near.mean())
+    multiples = apart / step
+    away = np.abs(multiples - np.round(multiples))
+    return step if float(np.quantile(away, 0.9)) < OFF_STEP * max(multiples.mean(), 1.0) else 0.0
+
+
+def _shared(one: _Motion, other: _Motion) -> tuple[int, int] | None:
+    """Return the first copied reading of ``other`` and their number; None without a copy."""
+    size = min(one.theta.size, other.theta.size)
+    least = max(FEWEST_SHARED, round(LEAST_SHARE * size))
+    if size < least:
+        return None
+    for mine, its in _ticks(one, other):
+        lags = _lags(_spread(one.theta, mine), _spread(other.theta, its), least)
+        for lag in lags | ({0} if one.theta.size == other.theta.size else set()):
+            _, a, b = np.intersect1d(mine, its + lag, assume_unique=True, return_indices=True)
+            if a.size >= least and _alike(one.theta[a], other.theta[b], one.step, other.step):
+                return int(b[0]), int(b[-1] - b[0]) + 1
+    return None
+
+
+def _ticks(one: _Motion, other: _Motion) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Return the ways to place both runs on one clock: one after another, and by time."""
+    in_a_row = np.arange(one.theta.size), np.arange(other.theta.size)
+    ratio = other.interval / one.interval
+    times = round(max(ratio, 1 / ratio))
+    whole = abs(max(ratio, 1 / ratio) / times - 1) < OFF_STEP
+    by_time = (
+        one.tick * (times if whole and ratio < 1 else 1),
+        other.tick * (times if whole and ratio > 1 else 1),
+    )
+    wide = any(t.size and t[-1] >= MOST_THINNED * t.size for t in by_time)
+    if wide or all(np.array_equal(a, b) for a, b in zip(in_a_row, by_time, strict=True)):
+        return [in_a_row]
+    return [in_a_row, by_time]
+
+
+def _spread(theta: Floats, tick: NDArray[np.int64]) -> Floats:
+    """Return readings at their ticks, NaN at empty ticks."""
+    spread = np.full(int(tick[-1]) + 1, np.nan)
+    spread[tick] = theta
+    return spread
+
+
+def _lags(a: Floats, b: Floats, least: int) -> set[int]:
+    """Return the lags, in ticks, at which ``b`` is most like ``a`` or its mirror image."""
+    wide = 1 << (a.size + b.size - 1).bit_length()
+    middle = float(np.nanmean(a))
+    lags = np.arange(1 - b.size, a.size)
+
+    def spectra(values: Floats) -> list[NDArray[np.complex128]]:
+        there = np.isfinite(values)
+        moved = np.where(there, values - middle, 0.0)
+        return [np.fft.rfft(part, wide) for part in (there.astype(float), moved, moved * moved)]
+
+    def product(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> Floats:
+        return np.asarray(np.fft.irfft(x * np.conj(y), wide)[lags % wide])
+
+    (there_a, one_a, two_a), (there_b, one_b, two_b) = spectra(a), spectra(b)
+    count = np.round(product(there_a, there_b))
+    enough = count >= least
+    if not enough.any():
+        return set()
+    count = np.maximum(count, 1.0)
+    mean_a, mean_b = product(one_a, there_b) / count, product(there_a, one_b) / count
+    own = (product(two_a, there_b) + product(there_a, two_b)) / count - mean_a**2 - mean_b**2
+    both = 2 * (product(one_a, one_b) / count - mean_a * mean_b)
+    # The variance of the difference, and that of the sum.
+    found = (np.argmin(np.where(enough, own + sign * both, np.inf)) for sign in (-1, 1))
+    return {int(lags[k]) for k in found}
+
+
+def _alike(a: Floats, b: Floats, step: float, other: float) -> bool:
+    """Return whether ``b`` is ``a`` up to a factor and a zero, within half a step of either."""
+    columns = np.column_stack([a, np.ones(a.size)])
+    away = np.zeros(a.size)
+    # Edited readings move the first line: a second one is fitted without them.
+    for _ in range(2):
+        near = away <= np.quantile(away, AGREEING)
+        (factor, zero), *_ = np.linalg.lstsq(columns[near], b[near], rcond=None)
+        away = np.abs(b - factor * a - zero)
+    steps = max(abs(factor) * step, other)
+    if float(np.ptp(b)) <= LEAST_LEVELS * steps:
+        return False
+    # The error of the line is a step over the root of the number of readings.
+    allowed = (0.5 + a.size**-0.5) * steps + FACTOR_ERROR * float(np.ptp(b))
+    return bool(np.mean(away <= allowed) >= AGREEING)
+
+
+def _without(run: Run, other: Run, first: int, count: int) -> Run:
+    """Return a run in which ``count`` readings from ``first`` on do not count: copies."""
+    trusted = run.trusted.copy()
+    before = int(trusted.sum())
+    trusted[first : first + count] = False
+    if int(trusted.sum()) < max(FEWEST_SHARED, LEAST_SHARE * before):
+        trusted[:] = False
+    copied = before - int(trusted.sum())
+    text = (
+        f"{run.name} is a copy of {other.name}: {copied} of its {counted(before, 'reading')} are "
+        "readings of that run, and count once"
+    )
+    if run.hold_out and not trusted.any():
+        text += ": held out, it would test nothing"
+    low, high = float(run.time[first]), float(run.time[first + count - 1])
+    found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
+    segments = run.segments
+    if not trusted.any():
+        segments = tuple(dataclasses.replace(part, used=False) for part in segments)
+    findings = (*run.findings, found)
+    return dataclasses.replace(run, trusted=trusted, segments=segments, findings=findings)

@@ -1,8 +1,7 @@
-"""The angle, from whichever channel tells it: read, integrated, or seen in a picture."""
+"""The angle of a record: read, integrated, or computed from pixels or an acceleration."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -11,7 +10,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import counted
 from pendmap.records.from_acceleration import angle_from
-from pendmap.records.rod_sensors import LIKE, angle_of_rate
+from pendmap.records.rod_sensors import PLACE_EXAMPLE, angle_of_rate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,35 +22,48 @@ if TYPE_CHECKING:
 
 TURN: Final = 2 * math.pi
 
-BAND: Final = 1.01
-"""Turns that wrapped readings span at most, a count or some noise beyond one."""
+WRAPPED_SPAN: Final = 1.01
+"""Turns that wrapped readings span at most: one turn and some noise."""
 
-JUMP: Final = 0.75
-"""Turns between neighbours that are a wrap: a true half turn from one sample to the next could
-not be told from it anyway."""
+WRAP_JUMP: Final = 0.75
+"""Turns between neighbours from which a jump is a wrap."""
 
-LARGEST: Final = 1e5
-"""Radians beyond which a number is no pendulum's angle: ten thousand turns."""
+LARGEST_ANGLE: Final = 1e5
+"""Largest number in rad that can be an angle: ten thousand turns."""
 
-MOST: Final = 0.5
-"""Share of such numbers from which the column is no angle, or in another unit."""
+MOST_HUGE: Final = 0.5
+"""Share of larger numbers from which the column is refused."""
+
+GAUSS_NEWTON_STEPS: Final = 50
+"""Most steps of the circle fit; five are enough from the algebraic circle."""
+
+RADIUS_DOUBT: Final = 0.02
+"""Relative standard error of the radius from which it is reported."""
+
+FEWEST_PEAKS: Final = 6
+"""Readings that show a pattern of turning points at least."""
+
+KEEP_PATTERN: Final = 0.9
+"""Share of the readings that must keep to the pattern."""
+
+PEAK_RISE: Final = 0.02
+"""Relative rise from one amplitude to the next that reading errors explain."""
+
+PERIOD_CHANGE: Final = 0.15
+"""Relative change from one interval to the next that periods show at most."""
+
+CLOCK_SPREAD: Final = 1e-4
+"""Relative spread of intervals below which they are those of a clock."""
 
 
 def make(work: Work) -> None:
-    """Make the angle from the channels that there are; leave out rows without one.
-
-    Raises
-    ------
-    InputError
-        If none of them tells it.
-    """
-    if "peaks" in work.extra and "no angle" in work.extra:
+    """Make the angle from the channels; leave out rows without one."""
+    if "peaks" in work.extra and "angle" not in work.columns:
         work.theta = work.extra.pop("peaks")
         work.peaks_only = True
         _one_sign(work)
-    elif "no angle" in work.extra:
+    elif "angle" not in work.columns:
         _derived(work)
-    work.extra.pop("no angle", None)
     _finite(work, "angle", work.theta)
     _sane(work)
     if not work.peaks_only:
@@ -59,7 +71,7 @@ def make(work: Work) -> None:
 
 
 def _one_sign(work: Work) -> None:
-    """Say how turning points without signs are taken: those of one side would halve ``w0``."""
+    """Report turning points of one sign: those of one side alone would halve ``w0``."""
     peaks = work.theta[np.isfinite(work.theta)]
     if peaks.size and (np.all(peaks >= 0) or np.all(peaks <= 0)):
         text = (
@@ -70,7 +82,7 @@ def _one_sign(work: Work) -> None:
 
 
 def _finite(work: Work, what: str, *values: Floats) -> None:
-    """Leave out rows where a channel that is needed has no number."""
+    """Leave out rows in which a needed channel has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     missing = np.flatnonzero(~good)
     if missing.size and missing.size == good.size:
@@ -83,36 +95,33 @@ def _finite(work: Work, what: str, *values: Floats) -> None:
 
 
 def _sane(work: Work) -> None:
-    """Leave out numbers that no angle has."""
-    huge = np.abs(work.theta) > LARGEST
-    if np.mean(huge) > MOST:
+    """Leave out numbers that are too large for an angle."""
+    huge = np.abs(work.theta) > LARGEST_ANGLE
+    if np.mean(huge) > MOST_HUGE:
         largest = float(np.max(np.abs(work.theta)))
         raise InputError(
-            f"{work.where}: angles must be up to {LARGEST:g} rad, got {largest:.3g} rad, too large"
-            " for a pendulum; a scale may stand in [columns] of experiment.toml"
+            f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
+            " large for a pendulum; a scale may stand in [columns] of experiment.toml"
         )
     if huge.any():
-        text = f"{counted(int(huge.sum()), 'number')} beyond {LARGEST:g} rad left out"
+        text = f"{counted(int(huge.sum()), 'number')} beyond {LARGEST_ANGLE:g} rad left out"
         work.say("angle-huge", text, mended=True, at=np.flatnonzero(huge))
         work.keep(~huge)
         work.refuse_short()
 
 
 def _derived(work: Work) -> None:
+    """Make the angle from pixels, a velocity or an acceleration, in this order."""
     if "pixel_x" in work.extra:
         x, y = work.extra["pixel_x"], work.extra["pixel_y"]
         _finite(work, "position", x, y)
         x, y = work.extra.pop("pixel_x"), work.extra.pop("pixel_y")
-        found = circle_angle(work.time, x, y, work.where)
-        work.theta = found.theta
-        work.say("angle-from-pixels", found.text, mended=True)
-        if found.doubt:
-            work.say("circle-uncertain", found.doubt)
+        _circle_angle(work, x, y)
         return
     if "velocity" in work.extra:
         _finite(work, "velocity", work.extra["velocity"])
         rate = work.extra["velocity"]
-        work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST)
+        work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
         work.integrated = True
         text = (
             "the angle is the velocity integrated; its zero is the middle of the swing: for"
@@ -124,14 +133,14 @@ def _derived(work: Work) -> None:
 
 
 def _accelerated(work: Work) -> None:
-    """Make the angle of an acceleration alone, whose place must be known."""
+    """Make the angle from an acceleration alone; its place on the rod must be known."""
     beside = "an angle, a velocity (gyroscope) or pixel_x and pixel_y beside it"
     sensor = work.accelerometer
     if sensor is None:
         raise InputError(
             f"{work.where}: an acceleration alone tells no angle, where the sensor sits is not"
             f" known: {work.place_missing} missing in [columns] of experiment.toml: it must be like"
-            f" {LIKE}, or {beside}"
+            f" {PLACE_EXAMPLE}, or {beside}"
         )
     if sensor.direction == "radial":
         raise InputError(
@@ -144,8 +153,7 @@ def _accelerated(work: Work) -> None:
             f" a free decay, or {beside}"
         )
     _finite(work, "acceleration", work.extra["acceleration"])
-    found = angle_from(work.time, work.extra["acceleration"], sensor, work.where)
-    work.theta, work.accelerometer = found.theta, found.accelerometer
+    doubt = angle_from(work, sensor)
     removed = ", gravity removed" if not sensor.gravity else f", g = {sensor.gravity:g} m/s^2"
     place = (
         "an angular acceleration"
@@ -157,16 +165,16 @@ def _accelerated(work: Work) -> None:
         " pictures and the methods of peaks; the trajectory method fits the acceleration itself"
     )
     work.say("angle-from-acceleration", text, mended=True)
-    if found.doubt:
-        work.say("acceleration-weak", found.doubt)
+    if doubt:
+        work.say("acceleration-weak", doubt)
 
 
 def _unwrap(work: Work) -> None:
-    """Undo the jumps of a sensor that shows an angle within one turn."""
+    """Undo the jumps of a sensor that shows the angle within one turn."""
     steps = np.diff(work.theta)
-    jumps = np.flatnonzero(np.abs(steps) > JUMP * TURN)
+    jumps = np.flatnonzero(np.abs(steps) > WRAP_JUMP * TURN)
     span = float(np.ptp(work.theta))
-    if not jumps.size or span > BAND * TURN or span < 0.9 * TURN:
+    if not jumps.size or span > WRAPPED_SPAN * TURN or span < 0.9 * TURN:
         return
     work.theta = np.unwrap(work.theta)
     text = f"the sensor wraps: {counted(jumps.size, 'jump')} of one turn undone"
@@ -177,40 +185,15 @@ def _unwrap(work: Work) -> None:
         work.say("unwrapping-uncertain", text)
 
 
-# From a picture's coordinates to an angle: a circle through the places of the bob.
+def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
+    """Make the angle of points on a circle, from downward, toward positive x.
 
-
-ROUNDS: Final = 50
-"""Steps of Gauss and Newton; from the algebraic circle five do."""
-
-DOUBT: Final = 0.02
-"""Relative standard error of the radius that is worth saying: every angle errs by as much."""
-
-
-@dataclasses.dataclass(frozen=True)
-class CircleAngle:
-    """An angle and how it came about."""
-
-    theta: Floats
-    text: str
-    doubt: str
-
-
-def circle_angle(time: Floats, x: Floats, y: Floats, where: str) -> CircleAngle:
-    """Return the angle of points on a circle, from downward, turning toward positive x.
-
-    Down is along y, on the side where the bob is quickest: pictures count y from the top, other
-    tools from the bottom.
-
-    Raises
-    ------
-    InputError
-        If the points lie on no circle.
+    Down is along y, on the side where the bob is quickest. Raises InputError without a circle.
     """
     middle = np.array([np.median(x), np.median(y)])
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if not size or not math.isfinite(size):
-        raise InputError(f"{where}: pixel_x and pixel_y must show a swing, they do not move")
+        raise InputError(f"{work.where}: pixel_x and pixel_y must show a swing, they do not move")
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
     a, b, radius = _algebraic(u, v)
     kept = np.ones(u.size, bool)
@@ -221,25 +204,25 @@ def circle_angle(time: Floats, x: Floats, y: Floats, where: str) -> CircleAngle:
         kept = away <= limit
     if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(
-            f"{where}: pixel_x and pixel_y must be places of a bob, they lie on no circle"
+            f"{work.where}: pixel_x and pixel_y must be places of a bob, they lie on no circle"
         )
-    speed = np.hypot(np.gradient(u, time), np.gradient(v, time))
+    speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
     down = 1.0 if np.median((v - b)[quick]) > 0 else -1.0
-    theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
+    work.theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
     centre = middle + size * np.array([a, b])
     text = (
         f"the angle is that on a circle around ({centre[0]:.5g}, {centre[1]:.5g}) of radius"
         f" {radius * size:.5g}, y counted {'down' if down > 0 else 'up'}ward; the places are"
         f" {rms * size:.2g} from it, rms"
     )
-    doubt = ""
-    if error > DOUBT * radius:
-        doubt = (
+    work.say("angle-from-pixels", text, mended=True)
+    if error > RADIUS_DOUBT * radius:
+        text = (
             f"the radius is uncertain by {100 * error / radius:.0f} %, and so is every angle: the"
             " arc is short"
         )
-    return CircleAngle(theta, text, doubt)
+        work.say("circle-uncertain", text)
 
 
 def _algebraic(u: Floats, v: Floats) -> tuple[float, float, float]:
@@ -254,7 +237,7 @@ def _geometric(
     u: Floats, v: Floats, a: float, b: float, radius: float
 ) -> tuple[float, float, float, float, float]:
     """Return the circle of least distances, the standard error of its radius, and the rms."""
-    for _ in range(ROUNDS):
+    for _ in range(GAUSS_NEWTON_STEPS):
         distance = np.maximum(np.hypot(u - a, v - b), 1e-12)
         slope = np.column_stack([-(u - a) / distance, -(v - b) / distance, -np.ones(u.size)])
         step = np.linalg.lstsq(slope, -(distance - radius), rcond=None)[0]
@@ -266,3 +249,51 @@ def _geometric(
     inverse = np.linalg.pinv(slope.T @ slope)
     error = rms * math.sqrt(max(float(inverse[2, 2]), 0.0))
     return a, b, radius, error, rms
+
+
+def check_peaks(work: Work) -> None:
+    """Report angles of a free record that look like turning points; leave them out of fits.
+
+    Turning points alternate in sign, or have one sign; their sizes fall, their intervals are alike.
+    """
+    if work.plan.kind != "free" or "angle" not in work.columns:
+        return
+    good = np.isfinite(work.theta)
+    found = _pattern(work.time[good], work.theta[good])
+    if found is None:
+        return
+    work.peaks_only = True
+    work.trusted[:] = False
+    named = f'peaks = "{work.columns["angle"]}"'
+    text = (
+        f"{found}: turning points alone? Then [columns] of experiment.toml says so, {named}, one"
+        " for each half swing"
+    )
+    work.say("peaks-undeclared", text)
+
+
+def _pattern(time: Floats, theta: Floats) -> str | None:
+    """Return the pattern of turning points that readings show, in words; None for a motion."""
+    if theta.size < FEWEST_PEAKS:
+        return None
+    steps = np.diff(time)
+    slowly = np.abs(np.diff(steps)) < PERIOD_CHANGE * np.minimum(steps[1:], steps[:-1])
+    size = np.abs(theta)
+    falls = np.diff(size) < PEAK_RISE * float(size.max())
+    if (
+        np.mean(slowly) < KEEP_PATTERN
+        or np.mean(falls) < KEEP_PATTERN
+        or size[-1] > (1 - PEAK_RISE) * size[0]
+    ):
+        return None
+    other_side = theta[1:] * theta[:-1] < 0
+    if np.mean(other_side) >= KEEP_PATTERN:
+        return "readings on one side and the other, ever smaller"
+    regular = float(np.ptp(steps)) < CLOCK_SPREAD * float(np.mean(steps))
+    if (
+        np.any(other_side)
+        or regular
+        or np.mean(np.diff(theta) * np.sign(theta[0]) < 0) < KEEP_PATTERN
+    ):
+        return None
+    return "slow readings on one side, ever smaller"

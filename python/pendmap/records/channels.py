@@ -1,8 +1,7 @@
-"""Which column is which channel, in SI."""
+"""Which column is which channel, in SI; which columns no channel is read from."""
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 import re
 from typing import TYPE_CHECKING, Final
@@ -11,78 +10,66 @@ import numpy as np
 
 from pendmap.errors import InputError, short_repr
 from pendmap.model.quantities import GRAVITY
+from pendmap.records.description import Column
 from pendmap.records.experiment import Finding
-from pendmap.records.other_angles import position_of
-from pendmap.records.rod_sensors import Accelerometer, Place, accelerometer_of
-from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain
-from pendmap.records.unused import ask, changes, head_of
+from pendmap.records.rod_sensors import accelerometer_of
+from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain, spelling
+from pendmap.records.work import Work
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from numpy.typing import NDArray
 
-    from pendmap.records.description import Column, Description, RunPlan
+    from pendmap.records.description import Description, RunPlan
     from pendmap.records.text import Table
 
     Floats = NDArray[np.float64]
 
 
 _MOST_NAMED: Final = 8
-"""Columns that a message lists."""
+"""Columns that a message lists at most."""
 
+ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
+"""Channels from which an angle can be made."""
 
-@dataclasses.dataclass(frozen=True)
-class Channels:
-    """The channels of a table.
+POSITION_NAME: Final = "pos(ition)?"
 
-    Parameters
-    ----------
-    values : mapping of str to ndarray, shape (rows,)
-        By channel, in SI; the time is always there.
-    columns : mapping of str to str
-        The heading of each.
-    declared : frozenset of str
-        Channels whose unit or scale somebody declared in [columns].
-    pivot : mapping of str to ndarray, or None
-        The pivot's motion in SI.
-    pivot_unit : str or None
-        What it is: ``"m/s2"``, ``"m/s"`` or ``"m"``.
-    findings : tuple of Finding
-        What had to be guessed.
-    accelerometer : Accelerometer or None
-        Where the acceleration was measured, if that is known ...
-    place_missing : str
-        ... else the keys of [columns] that would say it.
-    edge, phase : str and float, or None
-        Which edge of the trigger counts, and the drive's phase there, rad; as [columns] has them.
-    unused : tuple of str
-        What heads the columns that none of this comes from.
-    """
+POSITION_AGREES: Final = 0.9
+"""Correlation, lines removed, from which a position is the integral of the velocity."""
 
-    values: Mapping[str, Floats]
-    columns: Mapping[str, str]
-    declared: frozenset[str] = frozenset()
-    pivot: Mapping[str, Floats] | None = None
-    pivot_unit: str | None = None
-    findings: tuple[Finding, ...] = ()
-    accelerometer: Accelerometer | None = None
-    place_missing: str = ""
-    edge: str | None = None
-    phase: float | None = None
-    unused: tuple[str, ...] = ()
+MOTOR_NAMES: Final = re.compile(
+    r"\b(torques?|drehmoment|couple|tau|currents?|strom|motors?|pwm|duty|effort|actuator|u)\b"
+)
+
+MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")
+
+PIVOT_NAMES: Final = re.compile(
+    r"\b(pivot|cart|carriage|trolley|slider?|shaker|stage|base|platform|support|suspension|wagen)\b"
+)
+
+ASKED_PIVOT_UNITS: Final = {
+    "m": "m",
+    "mm": "mm",
+    "cm": "cm",
+    "m/s": "m/s",
+    "m/s2": "m/s2",
+    "g": "g",
+}
+
+PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|place|x)", "m"))
+"""Units of a pivot's column by words in its name."""
+
+ANGLE_NAMES: Final = re.compile(r"pos(ition)?|.*(angle|winkel|theta|encoder).*")
+
+MOST_UNUSED: Final = 12
+"""Names of unused columns that a message lists at most."""
 
 
 def channels_of(  # noqa: C901 (a step each)
     table: Table, description: Description, plan: RunPlan, where: str
-) -> Channels:
-    """Choose the columns: those that [columns] names, the default names, then names like them.
-
-    Raises
-    ------
-    InputError
-        If a column that is named is not there, or there is no time or nothing of the angle.
-    """
+) -> Work:
+    """Return a record with its channels: of columns named in [columns], by default, or alike."""
     asked = description.columns
     places: dict[str, int] = {}
     for channel, column in asked.items():
@@ -100,9 +87,9 @@ def channels_of(  # noqa: C901 (a step each)
     rate = description.rate_hz
     findings = pictured(table, places, asked)
     findings += guess(table, places, timed=rate is None)
-    values, units = {}, {}
+    values, heads = {}, {}
     if rate and "time" not in places:
-        values["time"], units["time"] = table.order / rate, f"{rate:g} readings a second"
+        values["time"], heads["time"] = table.order / rate, f"{rate:g} readings a second"
     elif rate:
         text = f"{head_of(table, places['time'])!r} has the times: rate_hz {rate:g} is not used"
         findings.append(Finding("rate-unused", text))
@@ -110,41 +97,47 @@ def channels_of(  # noqa: C901 (a step each)
     for channel, place in places.items():
         given = asked.get(channel)
         values[channel] = _in_si(channel, table, place, given, description, where)
-        units[channel] = head_of(table, place)
-    declared = {c for c, column in asked.items() if column.unit or column.scale}
-    pivot, unit = _pivot(table, plan, where)
-    carried = [_place((plan.pivot or {})[way], table, where) for way in pivot or ()]
-    unused, questions = ask(table, {*places.values(), *carried}, places, plan)
+        heads[channel] = head_of(table, place)
+    pivot, pivot_unit, carried = _pivot(table, plan, where)
+    unused, questions = _unused(table, {*places.values(), *carried}, places, plan)
     findings += questions
     if plan.pivot and "unit" not in plan.pivot:
         text = 'the pivot has no unit: taken for an acceleration, unit = "m/s2"'
         findings.append(Finding("pivot-unit", text))
     sensor, missing = None, ""
     if "acceleration" in places:
-        k, said = places["acceleration"], asked.get("acceleration")
-        heading, read_in = name_and_unit(table.names[k])
+        said = asked.get("acceleration", Column())
+        heading, read_in = name_and_unit(table.names[places["acceleration"]])
         gravity = float(description.known.get("gravity", GRAVITY))
-        given_in = said.unit if said and said.unit else read_in
-        spot = said.place if said else Place()
-        scaled = said is not None and said.scale is not None
-        sensor, missing = accelerometer_of(spot, given_in, heading, gravity, scaled=scaled)
-    edges = asked.get("trigger")
-    return Channels(
-        values,
-        units,
-        frozenset(declared),
-        pivot,
-        unit,
-        tuple(findings),
+        scaled = said.scale is not None
+        sensor, missing = accelerometer_of(
+            said.place, said.unit or read_in, heading, gravity, scaled=scaled
+        )
+    edges = asked.get("trigger", Column())
+    time = values.pop("time")
+    return Work(
+        where=where,
+        plan=plan,
+        known=description.known,
+        declared=frozenset(c for c, column in asked.items() if column.unit or column.scale),
+        time=time,
+        theta=values.pop("angle", np.zeros(time.size)),
+        rows=table.rows.copy(),
+        extra=values | pivot,
+        trusted=np.ones(time.size, bool),
+        findings=[*table.findings, *findings],
+        columns=heads,
+        unused=unused,
         accelerometer=sensor,
         place_missing=missing,
-        edge=edges.edge if edges else None,
-        phase=edges.phase if edges else None,
-        unused=unused,
+        edge=edges.edge,
+        phase=edges.phase,
+        pivot_unit=pivot_unit,
     )
 
 
 def _place(name: str, table: Table, where: str) -> int:
+    """Return the place of a column by its heading, or by its name without the unit."""
     if name in table.names:
         return table.names.index(name)
     bare = [name_and_unit(head)[0] for head in table.names]
@@ -160,19 +153,21 @@ def _place(name: str, table: Table, where: str) -> int:
 
 
 def _listed(table: Table) -> str:
+    """Return the headings of a table for a message."""
     names = [name[:40] or "(no name)" for name in table.names]
     more = f", ... ({len(names)} in all)" if len(names) > _MOST_NAMED else ""
     return ", ".join(map(repr, names[:_MOST_NAMED])) + more
 
 
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
+    """Refuse a table without times or angles, or with one column for two channels."""
     advice = "experiment.toml names others in [columns]"
     if "time" not in places and not timed:
         raise InputError(
             f"{where}: no column of times: there must be one like t_s, or a rate: --rate 1000 or"
             f" rate_hz = 1000 in [columns] of experiment.toml (Hz); got columns {_listed(table)}"
         )
-    if not any(channel in places for channel in ANGLES):
+    if not any(channel in places for channel in ANGLE_CHANNELS):
         raise InputError(
             f"{where}: no column of angles: there must be theta_rad or one like it; there are"
             f" {_listed(table)}; {advice}"
@@ -193,6 +188,7 @@ def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
     description: Description,
     where: str,
 ) -> Floats:
+    """Return the values of a column in SI: scaled as declared, or by its unit."""
     raw = table.values[:, place]
     kind = CHANNELS[channel]
     where = f"{where}: {channel}"
@@ -202,7 +198,7 @@ def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
     unit = column.unit if column else None
     if unit is None:
         name, unit = name_and_unit(table.names[place])
-        # A column called "volts" or "counts" says its unit by its name.
+        # The name of a column "volts" or "counts" is its unit.
         unit = unit or (name if re.fullmatch("volts?|counts?|adc", plain(name)) else None)
     if unit is None:
         return np.asarray(raw - zero)
@@ -212,27 +208,24 @@ def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
     return np.asarray((raw - zero) * kind.factor(unit, where))
 
 
-def _pivot(table: Table, plan: RunPlan, where: str) -> tuple[dict[str, Floats] | None, str | None]:
+def _pivot(
+    table: Table, plan: RunPlan, where: str
+) -> tuple[dict[str, Floats], str | None, list[int]]:
+    """Return the pivot's channels in SI, their unit, and the places of their columns."""
     if plan.pivot is None:
-        return None, None
+        return {}, None, []
     unit, factor = PIVOT_UNITS[plan.pivot.get("unit", "m/s2")]
-    found = {}
-    for way in ("vertical", "horizontal"):
-        if way in plan.pivot:
-            place = _place(plan.pivot[way], table, f"{where}: pivot: {way}")
-            found[way] = np.asarray(table.values[:, place] * factor * plan.pivot_scale)
-    return found, unit
-
-
-# Which columns are meant where nobody says it: by their names, their place, what they show.
-
-
-ANGLES: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
-"""Channels that tell of the angle, one way or another."""
+    ways = [way for way in ("vertical", "horizontal") if way in plan.pivot]
+    places = [_place(plan.pivot[way], table, f"{where}: pivot: {way}") for way in ways]
+    found = {
+        f"pivot:{way}": np.asarray(table.values[:, place] * factor * plan.pivot_scale)
+        for way, place in zip(ways, places, strict=True)
+    }
+    return found, unit, places
 
 
 def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
-    """Take the coordinates of a picture where the angle beside them has nothing to say."""
+    """Use the coordinates of a picture if the angle beside them is constant."""
     found = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
     place = places.get("angle", found.get("angle"))
     both = found | places
@@ -249,13 +242,13 @@ def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) 
 
 
 def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
-    """Find what is missing by names like the usual ones, or without names by position."""
+    """Find missing channels by names like the usual ones; without names by position."""
     if not table.headed:
         return _by_position(table, places, timed=timed)
     guessed = _by_name(table, places)
-    if "time" in places and any(channel in places for channel in ANGLES):
+    if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
         guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
-    # A picture's coordinates beside an angle are what the angle was made from.
+    # The angle beside a picture's coordinates was made from them.
     pair = all(name in places or name in guessed for name in ("pixel_x", "pixel_y"))
     if "angle" in places or "angle" in guessed or not pair:
         guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
@@ -264,7 +257,7 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
     if not {"angle", "pixel_x", "peaks"} & {*places, *guessed}:
         position = position_of(table, places | guessed)
         guessed |= {} if position is None else {"angle": position}
-    if not timed and not any(channel in places or channel in guessed for channel in ANGLES):
+    if not timed and not any(channel in places or channel in guessed for channel in ANGLE_CHANNELS):
         free = [k for k in range(table.values.shape[1]) if k not in guessed.values()]
         guessed |= {"angle": free[0]} if len(free) == 1 else {}
     places.update(guessed)
@@ -287,7 +280,7 @@ def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
             for k, (name, unit) in enumerate(split)
             if k not in taken
             and (unit is None or kind.has(unit))
-            and any(re.fullmatch(pattern, plain(name)) for pattern in kind.names)
+            and re.fullmatch(kind.names, plain(name))
         ]
         if fitting:
             guessed[channel] = _best(channel, fitting, table)
@@ -298,15 +291,13 @@ def _best(channel: str, fitting: list[int], table: Table) -> int:
     """Return the axis of a sensor that moves most; of all else the first column."""
     if channel not in {"velocity", "acceleration"} or len(fitting) == 1:
         return fitting[0]
-    spread = [np.nan_to_num(np.nanstd(_safe(table.values[:, k]))) for k in fitting]
+    columns = table.values[:, fitting]
+    spread = np.std(np.where(np.isfinite(columns), columns, 0.0), axis=0)
     return fitting[int(np.argmax(spread))]
 
 
-def _safe(values: Floats) -> Floats:
-    return np.where(np.isfinite(values), values, 0.0)
-
-
 def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
+    """Find time and angle in a table without headings."""
     free = [k for k in range(table.values.shape[1]) if k not in places.values()]
     said = []
     if not timed:  # the rate is known: what counts the readings tells nothing
@@ -318,19 +309,106 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
             places["time"] = k
             free.remove(k)
             said.append(f"column {k + 1} is the time in s")
-    if free and not any(channel in places for channel in ANGLES):
+    if free and not any(channel in places for channel in ANGLE_CHANNELS):
         places["angle"] = free[0]
         said.append(f"column {free[0] + 1} is the angle")
     return [Finding("columns-guessed", f"no line of names: {', '.join(said)}")] if said else []
 
 
 def _orders(values: Floats) -> bool:
-    """Whether numbers may be times that are out of order: in order they are evenly spaced."""
+    """Return whether numbers may be times out of order: sorted, they are evenly spaced."""
     steps = np.diff(np.sort(values[np.isfinite(values)]))
     usual = float(np.median(steps)) if steps.size else 0.0
     return usual > 0 and bool(np.mean(np.abs(steps - usual) < 0.5 * usual) > 0.5)
 
 
 def _rises(values: Floats) -> bool:
+    """Return whether nearly all steps of a column are positive."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(steps.size and np.mean(steps > 0) > 0.9)
+
+
+def position_of(table: Table, places: Mapping[str, int]) -> int | None:
+    """Return the column called position that is the angle, or None.
+
+    A velocity beside it must be its slope: a cart has a position, too.
+    """
+    split = [name_and_unit(head) for head in table.names]
+    found = [
+        k
+        for k, (name, unit) in enumerate(split)
+        if k not in places.values()
+        and re.fullmatch(POSITION_NAME, plain(name))
+        and (unit is None or CHANNELS["angle"].has(unit))
+    ]
+    if len(found) != 1:
+        return None
+    if "velocity" not in places:
+        return found[0]
+    both = table.values[:, [found[0], places["velocity"]]]
+    both = both[np.isfinite(both).all(axis=1)]
+    if both.shape[0] < 5:
+        return None
+    one, other = _bent(both[:, 0]), _bent(np.cumsum(both[:, 1]))
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return found[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
+
+
+def _bent(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return values less their least-squares line."""
+    place = np.arange(values.size)
+    return np.asarray(values - np.polyval(np.polyfit(place, values, 1), place))
+
+
+def head_of(table: Table, place: int) -> str:
+    """Return the heading of a column."""
+    return table.names[place] or f"column {place + 1}"
+
+
+def changes(values: NDArray[np.float64]) -> bool:
+    """Return whether a column has two different numbers."""
+    seen = values[np.isfinite(values)]
+    return bool(seen.size) and float(np.ptp(seen)) > 0
+
+
+def _unused(
+    table: Table, used: Collection[int], channels: Collection[str], plan: RunPlan
+) -> tuple[tuple[str, ...], list[Finding]]:
+    """Return the headings of unused columns, and the findings about them."""
+    rest = [k for k in range(table.values.shape[1]) if k not in used]
+    rest = [k for k in rest if table.names[k] or np.isfinite(table.values[:, k]).any()]
+    names = tuple(head_of(table, k) for k in rest)
+    if not rest:
+        return (), []
+    more = f", ... ({len(names)} in all)" if len(names) > MOST_UNUSED else ""
+    findings = [
+        Finding("columns-unused", f"not used: {', '.join(map(repr, names[:MOST_UNUSED]))}{more}")
+    ]
+    for k in rest:
+        if changes(table.values[:, k]):
+            findings += _asked(head_of(table, k), channels, plan)
+    seen = {found.what: found for found in reversed(findings)}  # the first of each kind is enough
+    return names, list(reversed(seen.values()))
+
+
+def _asked(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]:
+    """Return what a heading suggests: a motor, an angle or a pivot."""
+    name, unit = name_and_unit(head)
+    name, unit = plain(name), spelling(unit or "")
+    said = plain(head)
+    if (MOTOR_NAMES.search(name) or unit in MOTOR_UNITS) and plan.kind == "free":
+        text = f"{head!r} looks like a motor's: a driven record is no free decay"
+        return [Finding("motor-column", text)]
+    bare = "angle" not in channels and "peaks" not in channels
+    if bare and (ANGLE_NAMES.fullmatch(name) or unit in {"rad", "deg", "°"}):
+        text = f"{head!r} may be the angle itself: angle = {{ name = {head!r} }} in [columns]"
+        return [Finding("angle-column", f"{text} of experiment.toml takes it")]
+    if PIVOT_NAMES.search(said) and plan.pivot is None:
+        kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, said)), "m")
+        unit = ASKED_PIVOT_UNITS.get(unit, kind)
+        text = (
+            f'{head!r} may be the pivot\'s: pivot = {{ horizontal = "{head}", unit = "{unit}" }}'
+            " (or vertical) in [[run]] of experiment.toml takes it"
+        )
+        return [Finding("pivot-column", text)]
+    return []

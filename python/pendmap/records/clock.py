@@ -1,4 +1,8 @@
-"""The clock: stamps that are missing, repeat, jump, run backwards or jitter."""
+"""The clock: stamps that are missing, repeated, backwards or jittering, and slips of time.
+
+At a slip, readings are lost while the stamps go on: the reading jumps by the velocity times the
+interval. A polynomial with a term ``d v`` from each sample on, fitted around it, shows the slip d.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,8 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, moment
-from pendmap.records.edges import logs_edges, spread
 from pendmap.records.noise import fastest
+from pendmap.records.resolution import logs_edges, spread_stamps
 from pendmap.signal.local_polynomial import even_weights
 from pendmap.signal.robust import intervals_of, normal_scale
 
@@ -24,37 +28,63 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-RESET: Final = 10
-"""Intervals that a clock falls back by when it starts again, and the samples each part has."""
+RESTART: Final = 10
+"""Intervals that a restarted clock falls back by; samples that each part has."""
 
-JITTER: Final = 0.02
-"""Spread of the intervals over their median that is worth saying: at 2 % of 10 ms a pendulum of
-6 rad/s is 0.03 degrees elsewhere at the bottom of a swing of half a radian."""
+REPORTED_JITTER: Final = 0.02
+"""Spread of the intervals over their median from which jitter is reported."""
 
-MOST_OUT: Final = 0.3
-"""Share of the stamps out of order beyond which what is left is no record."""
+MOST_UNORDERED: Final = 0.3
+"""Share of unordered stamps from which the record is refused."""
 
-STOPPED: Final = 50
-"""Readings with one stamp, besides ten times what is usual, from which the clock stands still."""
+STOPPED_READINGS: Final = 50
+"""Readings with one stamp, besides ten times the usual, that stop a clock."""
 
-COARSE: Final = 0.2
+COARSE_STAMPS: Final = 0.2
 """Share of repeated stamps from which the clock is coarser than the sampling."""
 
 SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))
 """Findings about intervals."""
 
-WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
-"""Seconds after which counters of 16 and 32 bits in us, ms (or s) begin again."""
+COUNTER_WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
+"""Seconds after which counters of 16 and 32 bits in us, ms or s wrap."""
+
+SLIP_DEGREE: Final = 7
+"""Degree of the polynomials that slips are seen with."""
+
+SLIP_PHASE: Final = 2.0
+"""Radians of phase to either side that such a polynomial follows within 6e-3."""
+
+SHORTEST_SIDE: Final = 8
+"""Samples to either side of a slip at least, to know both velocities."""
+
+LONGEST_SIDE: Final = 150
+"""Samples to either side of a slip at most."""
+
+FEWEST_SLIPS: Final = 3
+"""Slips of one size that make it a fault of the clock."""
+
+CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)
+"""Standard errors of a slip in each pass; large slips hide small ones beside them."""
+
+MOST_INTERVALS: Final = 4
+"""Intervals of the longest slip."""
+
+SLOW_POWER: Final = 1e-3
+"""Power over its median below which the motion is too slow to show a slip."""
+
+OFF_INTERVAL: Final = 0.25
+"""Intervals by which a slip may miss a whole number."""
+
+MOST_OTHER_JUMPS: Final = 0.2
+"""Share of the jumps that may be no slips."""
+
+_BLOCK: Final = 4000
+"""Windows that are solved at a time."""
 
 
 def mend(work: Work) -> None:
-    """Make the times strictly increasing, and say what was wrong.
-
-    Raises
-    ------
-    InputError
-        If no two stamps are in order.
-    """
+    """Make the times strictly increasing and report it; raise InputError if none increase."""
     _finite(work)
     if work.time.size < 2:
         work.refuse_short()
@@ -69,12 +99,12 @@ def mend(work: Work) -> None:
 
 
 def cut_at_pauses(work: Work) -> None:
-    """Keep the side with more samples of a pause that is longer than the rest of the record."""
+    """Keep the side with more samples of a pause longer than the rest of the record."""
     while work.time.size > 2:
         steps = np.diff(work.time)
         pause = int(np.argmax(steps))
         rest = float(work.time[-1] - work.time[0] - steps[pause])
-        if steps[pause] <= max(rest, RESET * float(np.median(steps))):
+        if steps[pause] <= max(rest, RESTART * float(np.median(steps))):
             return
         before = pause + 1 >= work.time.size - pause - 1
         kept = np.arange(pause + 1) if before else np.arange(pause + 1, work.time.size)
@@ -87,6 +117,7 @@ def cut_at_pauses(work: Work) -> None:
 
 
 def _finite(work: Work) -> None:
+    """Leave out rows without a time."""
     missing = np.flatnonzero(~np.isfinite(work.time))
     if missing.size == work.time.size:
         raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
@@ -97,14 +128,14 @@ def _finite(work: Work) -> None:
 
 
 def _stopped(work: Work) -> None:
-    """Leave out readings that go on while the clock stands still."""
+    """Leave out readings that continue while the clock stands still."""
     edges = np.flatnonzero(np.diff(work.time, prepend=np.nan, append=np.nan) != 0)
     each = np.diff(edges)
     usual = int(np.median(each))
-    stops = np.flatnonzero(each > max(STOPPED, RESET * usual))
+    stops = np.flatnonzero(each > max(STOPPED_READINGS, RESTART * usual))
     if not stops.size or stops.size == each.size:
         return
-    # What falls back to a time that was before has not even the first of its stamps.
+    # After a step backwards not even the first of the equal stamps is right.
     own = work.time[edges[stops]] >= work.time[np.maximum(edges[stops] - 1, 0)]
     begin, end = edges[stops] + usual * own, edges[stops + 1]
     out = np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])
@@ -118,10 +149,10 @@ def _stopped(work: Work) -> None:
 
 
 def _wrapped(work: Work) -> None:
-    """Continue a counter of the clock that began again at 0."""
+    """Continue a counter of the clock that wrapped to 0."""
     steps = np.diff(work.time)
     usual = float(np.median(np.abs(steps)))
-    for wrap in WRAPS:
+    for wrap in COUNTER_WRAPS:
         slack = max(20 * usual, 1e-9)
         at = np.flatnonzero(np.abs(steps + wrap) < slack)
         if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
@@ -138,15 +169,15 @@ def _restarted(work: Work) -> None:
     if not rising.size:
         return
     usual = float(np.median(rising))
-    falls = np.flatnonzero(steps < -RESET * usual) + 1
+    falls = np.flatnonzero(steps < -RESTART * usual) + 1
     edges = [0, *falls.tolist(), work.time.size]
-    # One false stamp falls back too; it is no start: what follows runs from where it left off.
+    # A single false stamp is no restart: the stamps after it continue those before.
     starts = [0]
     for k, low in enumerate(edges[1:-1], 1):
         part = work.time[low : edges[k + 1]]
         before = work.time[starts[-1] : low]
-        again = part.size > RESET and np.median(part[:RESET]) < np.median(before[-RESET:])
-        if again and before.size > RESET:
+        again = part.size > RESTART and np.median(part[:RESTART]) < np.median(before[-RESTART:])
+        if again and before.size > RESTART:
             starts.append(low)
     if len(starts) == 1:
         return
@@ -166,11 +197,11 @@ def _coarse(work: Work) -> None:
     steps = np.diff(work.time)
     same = np.mean(steps == 0) if steps.size else 0.0
     if 0 < same < 1 and np.all(steps >= 0) and logs_edges(work.theta):
-        work.time = spread(work.time)
+        work.time = spread_stamps(work.time)
         text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
         work.say("time-coarse", text, mended=True)
         return
-    if same < COARSE or same == 1 or np.any(steps < 0):
+    if same < COARSE_STAMPS or same == 1 or np.any(steps < 0):
         return
     rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)
     if np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9:
@@ -189,7 +220,8 @@ def _coarse(work: Work) -> None:
 
 
 def _ordered(work: Work) -> None:
-    # Stamps that are as near as this are one, rounded.
+    # Stamps that differ by rounding alone are equal.
+    """Reverse, sort or leave out rows whose times do not increase."""
     near = 2 * float(np.spacing(np.max(np.abs(work.time))))
     steps = np.diff(work.time)
     if np.all(steps > near):
@@ -217,7 +249,7 @@ def _ordered(work: Work) -> None:
         work.say("time-backwards", text, mended=True, at=out)
         _keep_apart(work, order, near)
         return
-    if out.size > MOST_OUT * work.time.size:
+    if out.size > MOST_UNORDERED * work.time.size:
         raise InputError(
             f"{work.where}: the times must be in order, {out.size} of {work.time.size} are out"
             " of order, and in order the angles make no motion"
@@ -228,13 +260,13 @@ def _ordered(work: Work) -> None:
 
 
 def _keep_apart(work: Work, places: NDArray[np.intp], near: float) -> None:
-    """Keep the rows at these places, in order of time, the first of each stamp."""
+    """Keep the rows at these places, and the first of each stamp."""
     work.keep(places)
     work.keep(np.concatenate([[True], np.diff(work.time) > near]))
 
 
 def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
-    """Whether samples that were moved fit between their new neighbours as all others do."""
+    """Return whether moved samples fit between their new neighbours as all others do."""
     if theta.size < 5 or not np.all(np.isfinite(theta)):
         return False
     bend = np.abs(np.diff(theta, 2))
@@ -246,7 +278,7 @@ def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
 
 
 def _longest_rising(time: Floats) -> NDArray[np.intp]:
-    """Return the places of the longest strictly rising subsequence: the fewest are left out."""
+    """Return the places of the longest strictly rising subsequence."""
     tails: list[float] = []
     ends: list[int] = []
     before = np.full(time.size, -1, np.intp)
@@ -267,7 +299,7 @@ def _longest_rising(time: Floats) -> NDArray[np.intp]:
 
 
 def _spacing(work: Work) -> None:
-    """Say what the intervals show: gaps, jitter."""
+    """Report gaps, uneven intervals and jitter."""
     steps = np.diff(work.time)
     found = intervals_of(work.time)
     usual, gaps = found.tick, found.gaps
@@ -285,101 +317,41 @@ def _spacing(work: Work) -> None:
         work.say("time-gap", text, at=gaps, span=span)
     even = np.delete(steps, gaps)
     spread = math.sqrt(float(np.mean((even - usual) ** 2)))
-    if spread > JITTER * usual:
+    if spread > REPORTED_JITTER * usual:
         share = 100 * spread / usual
         text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
         work.say("time-jitter", text)
 
 
-# Slips of time: readings that are lost while the stamps go on as if nothing were missing.
-#
-# A controller that misses a reading now and then and counts the stamps itself writes, from there
-# on,
-# what the pendulum does an interval later. The reading jumps by the velocity times the interval. An
-# encoder that misses counts jumps by their size, however quick the motion is.
-#
-# Around each sample a polynomial is fitted to the readings, with ``d v`` added to all that follow.
-# That shows ``d`` also near a turning point, where the reading does not jump but the velocity does.
-
-
-DEGREE: Final = 7
-
-PHASE: Final = 2.0
-"""Radians of phase to either side that such a polynomial follows: the next term is 6e-3 of the
-swing at its quickest."""
-
-SHORTEST: Final = 8
-"""Samples to either side at least: fewer do not tell the velocity on both sides."""
-
-LONGEST: Final = 150
-
-FEWEST: Final = 3
-"""Slips with one constant that make it the clock's."""
-
-CERTAIN: Final = (7.0, 7.0, 6.0, 6.0, 6.0)
-"""Standard errors of a slip, time after time that slips are looked for: beside a large one a small
-one does not show. White noise reaches 6 once in 5e8 samples."""
-
-MOST: Final = 4
-"""Intervals of the longest slip."""
-
-SLOW: Final = 1e-3
-"""Power over its median below which nothing moves, and no slip is seen."""
-
-WHOLE: Final = 0.25
-"""Share by which a slip may miss a whole number of intervals."""
-
-ODD: Final = 0.2
-"""Share of the jumps that may be no slips."""
-
-_BLOCK: Final = 4000
-
-
 @dataclasses.dataclass(frozen=True)
 class Slips:
-    """Where a clock slipped.
+    """Where a clock slipped, the corrected times, and the mean slip of one interval."""
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Mended times, s.
-    places : ndarray of int
-        First sample after each slip.
-    slip, stderr : float
-        Mean of the slips of one interval, s, as the readings show it.
-    """
-
-    time: Floats
-    places: NDArray[np.intp]
-    slip: float
-    stderr: float
+    time: Floats  # corrected, s
+    places: NDArray[np.intp]  # first sample after each slip
+    slip: float  # s
+    stderr: float  # s
 
 
 def slips_of(time: Floats, theta: Floats) -> Slips | None:
-    """Return the slips of a clock by whole intervals; None where the readings show none.
-
-    Parameters
-    ----------
-    time, theta : ndarray, shape (N,)
-        s, increasing; readings, rad.
-    """
+    """Return the slips of a clock by whole intervals; None where the readings show none."""
     from scipy.interpolate import CubicSpline
 
     interval = float(np.median(np.diff(time)))
-    reach = min(int(PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST)
-    if reach < SHORTEST or time.size < 20 * reach:
+    reach = min(int(SLIP_PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST_SIDE)
+    if reach < SHORTEST_SIDE or time.size < 20 * reach:
         return None
     shown = _shown(reach)
     mended, places = time.copy(), list[int]()
     slip = stderr = 0.0
-    for limit in CERTAIN:
+    for limit in CERTAIN_SLIP:
         grid = np.arange(mended[0], mended[-1] + interval / 2, interval)
         at, lag = _found(CubicSpline(mended, theta)(grid), reach, limit)
         number = 1 + np.argmin(np.abs(lag[:, None] - shown), axis=1)
         each = lag / shown[number - 1]
-        good = np.abs(each - 1) < WHOLE
+        good = np.abs(each - 1) < OFF_INTERVAL
         if not places:
-            if np.count_nonzero(good) < FEWEST or np.mean(~good) > ODD:
+            if np.count_nonzero(good) < FEWEST_SLIPS or np.mean(~good) > MOST_OTHER_JUMPS:
                 return None
             slip = interval * float(np.mean(each[good]))
             stderr = interval * float(np.std(each[good])) / math.sqrt(np.count_nonzero(good))
@@ -393,20 +365,20 @@ def slips_of(time: Floats, theta: Floats) -> Slips | None:
 
 
 def _shown(reach: int) -> Floats:
-    """Return what slips of 1, 2, ... intervals look like: the jump spoils the velocity near it."""
+    """Return the apparent sizes of slips of 1, 2, ... intervals; a jump spoils the velocity."""
     place = np.arange(-3 * reach, 3 * reach + 1)
-    lines = [place + number * (place >= 0.0) for number in range(1, MOST + 1)]
+    lines = [place + number * (place >= 0.0) for number in range(1, MOST_INTERVALS + 1)]
     lags = [gain / power for gain, power in (_tried(line, reach) for line in lines)]
     return np.array([lag[3 * reach] for lag in lags])
 
 
 def _found(values: Floats, reach: int, limit: float) -> tuple[NDArray[np.intp], Floats]:
-    """Return the first samples after slips, and what each looks like, in intervals."""
+    """Return the first samples after slips, and the apparent slips in intervals."""
     from scipy.ndimage import maximum_filter1d
 
     gain, power = _tried(values, reach)
     inside = slice(2 * reach, -2 * reach)
-    told = power > SLOW * float(np.median(power[inside]))
+    told = power > SLOW_POWER * float(np.median(power[inside]))
     told[: 2 * reach] = told[-2 * reach :] = False
     score = np.where(told, np.abs(gain) / np.sqrt(np.maximum(power, 1e-300)), 0.0)
     noise = normal_scale(gain[told] / np.sqrt(power[told]))
@@ -416,13 +388,13 @@ def _found(values: Floats, reach: int, limit: float) -> tuple[NDArray[np.intp], 
 
 
 def _tried(values: Floats, reach: int) -> tuple[Floats, Floats]:
-    """Return gain and power of a slip before each sample: least squares give their ratio."""
-    _, weights = even_weights(DEGREE, 2 * reach + 1)
+    """Return gain and power of a slip before each sample; their ratio is the least-squares slip."""
+    _, weights = even_weights(SLIP_DEGREE, 2 * reach + 1)
     speed = np.zeros(values.size)
     speed[reach:-reach] = np.correlate(values, weights, "valid")
     gain, power = np.zeros(values.size), np.ones(values.size)
     offset = np.arange(-reach, reach + 1)
-    basis = np.linalg.qr(np.vander(offset / reach, DEGREE + 1))[0]
+    basis = np.linalg.qr(np.vander(offset / reach, SLIP_DEGREE + 1))[0]
     for low in range(2 * reach, values.size - 2 * reach, _BLOCK):
         rows = np.arange(low, min(low + _BLOCK, values.size - 2 * reach))
         around = rows[:, None] + offset

@@ -1,4 +1,4 @@
-"""``experiment.toml``: what somebody who did the experiment says about it."""
+"""``experiment.toml``: the description of an experiment."""
 
 from __future__ import annotations
 
@@ -36,25 +36,21 @@ _RUN: Final = (
 _DRIVE: Final = ("p", "Omega", "phi")
 _PIVOT: Final = ("vertical", "horizontal", "unit", "scale", "sign")
 _DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
-_MEASURED: Final = (
+_MEASURED_DRIVE: Final = (
     *("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
     *("frequency_hz", "frequency", "f_hz", "f"),
 )
-"""What a drive is measured in, and people write."""
+"""Names of measured quantities of a drive, which are refused with advice."""
 _PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
 _MOST_SKIPPED: Final = 1_000_000
 _MOST_COUNTS: Final = 10**9
 _LARGEST: Final = 1e12
-"""Largest number of a description: thirty thousand years in s, and powers of it are numbers."""
+"""Largest number of a description."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """Where a channel stands: the column's name, its unit, rad (or other SI) a unit, zero.
-
-    ``place`` is where an accelerometer sits; of a trigger ``edge`` is the edge that counts and
-    ``phase`` the drive's phase ``Omega t + phi`` there, rad.
-    """
+    """Where a channel is read from: column, unit, scale (SI a unit), zero, place, edge, phase."""
 
     name: str | None = None
     unit: str | None = None
@@ -67,7 +63,7 @@ class Column:
 
 @dataclasses.dataclass(frozen=True)
 class Reader:
-    """How files are written, where it cannot be seen from them."""
+    """How files are written, where they do not show it."""
 
     delimiter: str | None = None
     decimal: str | None = None
@@ -76,7 +72,7 @@ class Reader:
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """One ``[[run]]``; ``pivot_scale`` is the pivot's unit per unit of its columns, signed."""
+    """One ``[[run]]``; ``pivot_scale`` is the signed pivot unit per unit of its columns."""
 
     file: str
     kind: Kind = "free"
@@ -91,7 +87,7 @@ class RunPlan:
 
 @dataclasses.dataclass(frozen=True)
 class Description:
-    """All of the file; ``rate_hz`` is the clock of records without times, samples a second."""
+    """Content of the file; ``rate_hz`` is the clock of records without times, Hz."""
 
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     columns: Mapping[str, Column] = dataclasses.field(default_factory=dict)
@@ -101,20 +97,11 @@ class Description:
 
 
 ALONE: Final = Description()
-"""What is known of a file that comes without a description."""
+"""Description of a file without an ``experiment.toml``."""
 
 
 def read_description(path: Path) -> Description:
-    """Read an ``experiment.toml``.
-
-    Raises
-    ------
-    InputError
-        On one line that names the file: not TOML, a key that is not known (with the one that was
-        perhaps meant), a value of the wrong kind or outside its range.
-    OSError
-        If it cannot be read.
-    """
+    """Read an ``experiment.toml``; raise InputError, with the path, for what is not allowed."""
     content = read_toml(path)
     try:
         return _description(content)
@@ -123,6 +110,7 @@ def read_description(path: Path) -> Description:
 
 
 def _description(content: dict[str, Any]) -> Description:
+    """Return the description that the tables of the file make."""
     _keys(content, _TOP, "", "[rig], [columns], [reader] and [[run]]")
     runs = content.get("run")
     if not isinstance(runs, list) or not runs:
@@ -143,6 +131,7 @@ def _description(content: dict[str, Any]) -> Description:
 
 
 def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, among: str = "") -> None:
+    """Refuse unknown keys and suggest the nearest known one."""
     for key in table:
         if key in known:
             continue
@@ -157,6 +146,7 @@ def _keys(table: Mapping[str, Any], known: tuple[str, ...], where: str, among: s
 
 
 def _table(value: object, where: str, example: str = "") -> dict[str, Any]:
+    """Return a value that must be a table."""
     if not isinstance(value, dict):
         like = f" like {example}" if example else ""
         raise InputError(f"{where} must be a table{like}, got {short_repr(value)}")
@@ -164,14 +154,14 @@ def _table(value: object, where: str, example: str = "") -> dict[str, Any]:
 
 
 def _rig(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the checked numbers of ``[rig]``."""
     _keys(table, _RIG, "[rig]")
-    known: dict[str, Any] = {}
-    for name, value in table.items():
-        if name == "encoder_counts":
-            known[name] = check_whole(f"[rig]: {name}", value, 1, _MOST_COUNTS)
-        else:
-            known[name] = _positive(f"[rig]: {name}", value)
-    return known
+    return {
+        name: check_whole(f"[rig]: {name}", value, 1, _MOST_COUNTS)
+        if name == "encoder_counts"
+        else _positive(f"[rig]: {name}", value)
+        for name, value in table.items()
+    }
 
 
 def _number(name: str, value: object) -> float:
@@ -195,6 +185,7 @@ def _text(name: str, value: object) -> str:
 
 
 def _column(channel: str, value: object) -> Column:
+    """Return the checked column of a channel."""
     where = f"[columns]: {channel}"
     if isinstance(value, str):
         return Column(name=_text(where, value))
@@ -224,6 +215,7 @@ def _column(channel: str, value: object) -> Column:
 
 
 def _reader(table: dict[str, Any]) -> Reader:
+    """Return the checked ``[reader]``."""
     _keys(table, _READER, "[reader]")
     delimiter, decimal = table.get("delimiter"), table.get("decimal")
     if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1):
@@ -244,6 +236,7 @@ def _reader(table: dict[str, Any]) -> Reader:
 
 
 def _run(table: dict[str, Any], where: str) -> RunPlan:
+    """Return the checked ``[[run]]``."""
     _keys(table, _RUN, where)
     if "file" not in table:
         raise InputError(f'{where}: file must be given, like file = "run_00.csv"')
@@ -276,8 +269,9 @@ def _run(table: dict[str, Any], where: str) -> RunPlan:
 
 
 def _drive(value: object, where: str) -> dict[str, float | None]:
+    """Return the checked drive ``p``, ``Omega``, ``phi`` (None: to be fitted)."""
     table = _table(value, f"{where}: drive", _DRIVE_LIKE)
-    for name in _MEASURED:
+    for name in _MEASURED_DRIVE:
         if name in table:
             raise InputError(
                 f"{where}: drive: {name} is not known: it must be given as p = Y Omega^2/g, of the"
@@ -296,7 +290,7 @@ def _drive(value: object, where: str) -> dict[str, float | None]:
 
 
 def _pivot(value: object, where: str) -> tuple[dict[str, str], float]:
-    """Return what names columns and unit, and the factor of the columns."""
+    """Return names of columns and unit of the pivot, and the factor of the columns."""
     table = _table(value, f"{where}: pivot", _PIVOT_LIKE)
     _keys(table, _PIVOT, f"{where}: pivot")
     if not {"vertical", "horizontal"} & set(table):

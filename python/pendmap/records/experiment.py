@@ -1,4 +1,4 @@
-"""What an experiment holds: runs, and what was found in them."""
+"""An experiment: runs, and the findings about them."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ if TYPE_CHECKING:
 
 Kind = Literal["free", "forced"]
 
-NOTHING: Final = frozenset(("no-motion", "peaks-undeclared"))
-"""Findings that leave nothing to fit."""
+NOTHING_TO_FIT: Final = frozenset(("no-motion", "peaks-undeclared"))
+"""Findings of runs without anything to fit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """Something about a record that its owner should know.
+    """A fault or an assumption about a record.
 
     Parameters
     ----------
     what : str
-        A key that stays, like ``"time-gap"``.
+        Stable key, like ``"time-gap"``.
     text : str
         One line for people.
     mended : bool
-        Whether the arrays of the run have it mended. What is not mended is as in the file.
+        Whether the arrays of the run are corrected; otherwise they are as in the file.
     where : str
-        Run, rows of the file or times, as far as it can be placed.
+        Run, rows of the file or times, as far as they are known.
     from_s, to_s : float or None
-        The times that it spans, where it can be drawn.
+        Time span, s, if the finding has one.
     """
 
     what: str
@@ -53,7 +53,7 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Segment:
-    """A stretch of a record and what the pendulum does there.
+    """A stretch of a record with one state of the pendulum.
 
     Parameters
     ----------
@@ -74,14 +74,14 @@ class Segment:
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One record, in SI, cleaned as far as that is certain.
+    """One record in SI, corrected where the correction is unambiguous.
 
     Parameters
     ----------
     name : str
-        How messages call it.
+        Name in messages.
     file : str
-        The file it comes from.
+        File that it is read from.
     kind : str
         ``"free"`` or ``"forced"``.
     time : ndarray, shape (N,)
@@ -92,7 +92,7 @@ class Run:
         False where a sample is not for fitting: outlier, missed count, clipped, held by hand, at
         rest, handled between two releases; everywhere where nothing moves.
     lab_time_s : float
-        When the run began in the laboratory.
+        Start of the run on the laboratory's clock, s.
     hold_out : bool
         Whether it is kept back from fits.
     velocity : ndarray, shape (N,), or None
@@ -100,26 +100,26 @@ class Run:
     acceleration : ndarray, shape (N,), or None
         m/s^2 (or rad/s^2), where it was measured.
     accelerometer : Accelerometer or None
-        Where it was measured, if the angle was made of it alone.
+        Place of the accelerometer, if the angle was made from it alone.
     gyroscope : Gyroscope or None
-        What read the velocity, if the angle was made of it alone.
+        The gyroscope, if the angle was made from it alone.
     drive : mapping or None
         ``p``, ``Omega`` and ``phi`` (``None``: to be fitted) of a(t) = p cos(Omega t + phi).
     pivot : mapping of str to ndarray, or None
         Recorded motion of the pivot in SI: ``vertical`` and ``horizontal``, each (N,), positive
         upward and toward positive theta.
     pivot_unit : str or None
-        ``"m/s2"``, ``"m/s"`` or ``"m"``: what the pivot's columns are.
+        Unit of the pivot's motion: ``"m/s2"``, ``"m/s"`` or ``"m"``.
     findings : tuple of Finding
-        What was found in it.
+        Findings about this run.
     peaks_only : bool
         Whether the samples are turning points alone.
     segments : tuple of Segment
         Its stretches in order.
     channels : mapping of str to str
-        Which channel comes from which column.
+        Column of each channel.
     unused : tuple of str
-        The columns that no channel comes from.
+        Columns without a channel.
     count_rad : float
         Smallest step of the readings, rad; 0 where none can be seen.
     sha256 : str
@@ -151,28 +151,28 @@ class Run:
 
     @property
     def moves(self) -> bool:
-        """Whether anything in it is for fitting."""
+        """Whether any sample is for fitting."""
         return bool(self.trusted.any())
 
     @property
     def copied(self) -> bool:
-        """Whether its readings are those of another run, and count there."""
+        """Whether its readings are copies of another run, where they count."""
         return not self.moves and any(found.what == "same-record" for found in self.findings)
 
     @property
     def rod_sensor(self) -> Accelerometer | Gyroscope | None:
-        """What read in place of a sensor of the angle, whose readings a fit compares."""
+        """The accelerometer or gyroscope whose readings a fit compares instead of the angle."""
         return self.accelerometer or self.gyroscope
 
     @property
     def read(self) -> Floats:
-        """What was read: the angle, or what it was made of, in the unit of its sensor."""
+        """The readings that a fit compares, in the unit of their sensor, shape (N,)."""
         made_of = self.acceleration if self.accelerometer else self.velocity
         return self.theta if self.rod_sensor is None or made_of is None else made_of
 
     @property
     def rate_hz(self) -> float:
-        """Samples a second, from the whole record without its gaps."""
+        """Sampling rate of the whole record without its gaps, Hz."""
         from pendmap.signal.robust import intervals_of
 
         return 1 / intervals_of(self.time).tick if self.time.size > 1 else 0.0
@@ -189,11 +189,10 @@ class Experiment:
     runs : tuple of Run
         In the order of the experiment.
     known : mapping
-        What ``[rig]`` says: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``; ``max_angle``
-        (rad), ``max_velocity`` and ``max_frequency`` (rad/s) that it can do.
+        Content of ``[rig]``: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``; the limits
+        ``max_angle`` (rad), ``max_velocity`` and ``max_frequency`` (rad/s).
     findings : tuple of Finding
-        What concerns the experiment and no run alone: of a file with several releases also what was
-        found in all of it.
+        Findings about the experiment or a whole file with several releases.
     sha256 : mapping of str to str
         Of each file that was read.
     """
@@ -206,26 +205,22 @@ class Experiment:
 
     @property
     def w0(self) -> float | None:
-        """The ``w0`` of ``[rig]``, rad/s, unless the period of a record speaks against it."""
+        """The ``w0`` of ``[rig]``, rad/s; None if a record has an unlike period."""
         doubtful = any(f.what == "period-unlike-rig" for f in self._said())
         return None if doubtful or "w0" not in self.known else float(self.known["w0"])
 
     @property
     def gravity(self) -> float:
-        """The ``gravity`` of ``[rig]``, m/s^2; 9.81 where nothing is said."""
+        """The ``gravity`` of ``[rig]``, m/s^2; 9.81 by default."""
         return float(self.known.get("gravity", GRAVITY))
 
     def refuse_still(self, runs: Iterable[Run]) -> None:
-        """Refuse runs of which none moves.
-
-        Raises
-        ------
-        InputError
-            If none of ``runs`` has samples for fitting.
-        """
+        """Raise InputError if none of the runs has samples for fitting."""
         if any(run.moves for run in runs):
             return
-        why = next((f.text for f in self._said() if f.what in NOTHING), "no sample is trusted")
+        why = next(
+            (f.text for f in self._said() if f.what in NOTHING_TO_FIT), "no sample is trusted"
+        )
         raise InputError(f"{self.path}: must be a record of a motion, got nothing to fit: {why}")
 
     def _said(self) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""What the pendulum does in a free record: held, released, swinging, at rest, released again."""
+"""Stretches of a free record: held, released, swinging, at rest, released again."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pendmap.records.scale import middle_of, periods_of
 from pendmap.records.swinging import let_go, swinging
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import normal_scale, true_runs
+from pendmap.signal.robust import normal_scale, stretches
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,35 +30,28 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Places = tuple[int, int]
 
-STILL: Final = 8.0
-"""Standard deviations of noise within which a whole period must stay to be no motion: white
-noise spans 5 or 6 in a hundred samples."""
+STILL_SPAN: Final = 8.0
+"""Standard deviations of noise within which a whole period shows no motion."""
 
-SMALL: Final = 0.1
-"""Radians within which readings that are no smoother than noise are no motion."""
+NOISE_SPAN: Final = 0.1
+"""Radians within which readings as rough as noise show no motion."""
 
 MOST_LISTED: Final = 6
-"""Releases whose times a message lists."""
+"""Releases whose times a message lists at most."""
 
-CERTAIN: Final = 4.0
-"""Standard errors that an offset must have to be said."""
+CERTAIN_OFFSET: Final = 4.0
+"""Standard errors from which an offset is reported."""
 
 
 def moves(work: Work) -> bool:
-    """Whether anything moves; if not, that is said.
-
-    Raises
-    ------
-    InputError
-        If all readings are the same.
-    """
+    """Return whether anything moves; report rest; raise InputError for a constant angle."""
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
         raise InputError(f"{work.where}: must be a motion, the angle never changes")
     noise, limit = _limits(work)
     good = work.theta[work.trusted]
-    still = good.size < 4 or (noise > 0.7 * float(np.std(good)) and np.ptp(good) < SMALL)
+    still = good.size < 4 or (noise > 0.7 * float(np.std(good)) and np.ptp(good) < NOISE_SPAN)
     if not still and np.ptp(good) > limit:
         return True
     spread = float(np.ptp(good)) if good.size else 0.0
@@ -69,18 +62,18 @@ def moves(work: Work) -> bool:
 
 
 def _limits(work: Work) -> tuple[float, float]:
-    """Return the noise, and the span within which nothing moves."""
+    """Return the noise, and the span within which nothing moves, rad."""
     noise = _noise(work)
-    # Where the sampling is slow the residuals are motion: they must not hide it.
+    # The residuals of slow sampling contain motion, which must not count as noise.
     reach = 0.4 * float(np.ptp(work.theta))
-    return noise, min(reach, max(STILL * noise, 2.5 * work.count))
+    return noise, min(reach, max(STILL_SPAN * noise, 2.5 * work.count))
 
 
 def check(work: Work) -> None:
     """Divide a free record into stretches and trust those that swing freely."""
     if work.plan.kind != "free":
         return
-    # An angle made of an acceleration folds: there the readings tell, over their gain.
+    # An angle made of an acceleration folds: its readings over the gain are used instead.
     told = work if work.made_of is None else _felt(work, work.made_of)
     noise, limit = _limits(told)
     good = told.theta[told.trusted]
@@ -95,7 +88,10 @@ def check(work: Work) -> None:
     if work.made_of is not None:
         parts = _let_swing(told, middle, limit, span)
     else:
-        parts = _moving(span, _still(work, period, limit, span))
+        still = _still(work, period, limit, span)
+        edges = [span[0], *(place for stretch in still for place in stretch), span[1]]
+        pairs = zip(edges[::2], edges[1::2], strict=True)
+        parts = [(a, b) for a, b in pairs if b - a > 5]
         parts = releases(work, parts, middle, limit, period, noise)
     if not parts:
         return
@@ -120,7 +116,7 @@ def _felt(work: Work, sensor: Accelerometer) -> Work:
 
 
 def _let_swing(told: Work, middle: float, limit: float, span: Places) -> list[Places]:
-    """Return where an accelerometer feels free swings."""
+    """Return the stretches of free swings that an accelerometer shows."""
     time, readings = told.time[slice(*span)], told.theta[slice(*span)]
     noise = noise_of(time, readings).sigma
     pieces = [
@@ -135,15 +131,19 @@ def _let_swing(told: Work, middle: float, limit: float, span: Places) -> list[Pl
 
 
 def _period(work: Work, middle: float) -> float | None:
-    """Return the period of small swings, s, roughly."""
+    """Return the approximate period of small swings, s."""
     if work.made_of is not None:
         return 2 * math.pi / work.made_of.w0
-    found = periods_of(work, middle)
-    return found.small if found else _known_period(work)
+    if (found := periods_of(work, middle)) is not None:
+        return found.small
+    w0 = work.known.get("w0")
+    if not w0 and "gravity" in work.known and "length_m" in work.known:
+        w0 = math.sqrt(work.known["gravity"] / work.known["length_m"])
+    return 2 * math.pi / w0 if w0 else None
 
 
 def _noise(work: Work) -> float:
-    """Return the noise of an angle; of an integrated one how far it walks in a period."""
+    """Return the noise of an angle; of an integrated one, its random walk over a period."""
     if work.integrated:
         rate = work.extra["velocity"]
         seen = gyroscope_of(work.time, work.theta, rate)
@@ -154,15 +154,8 @@ def _noise(work: Work) -> float:
     return normal_scale(fit.residual)
 
 
-def _known_period(work: Work) -> float | None:
-    w0 = work.known.get("w0")
-    if not w0 and "gravity" in work.known and "length_m" in work.known:
-        w0 = math.sqrt(work.known["gravity"] / work.known["length_m"])
-    return 2 * math.pi / w0 if w0 else None
-
-
 def _still(work: Work, period: float, limit: float, span: Places) -> list[Places]:
-    """Return stretches within ``span``, of a period and more, in which nothing moves."""
+    """Return stretches within ``span`` of a period and more in which nothing moves."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     theta, time = work.theta[slice(*span)].copy(), work.time[slice(*span)]
@@ -177,21 +170,14 @@ def _still(work: Work, period: float, limit: float, span: Places) -> list[Places
     still = np.asarray(spread <= limit, bool)
     half = width // 2
     still[:half], still[-half:] = still[half], still[-half - 1]
-    low, high = true_runs(still)
     return [
-        (span[0] + max(int(a) - half, 0), span[0] + min(int(b) + half, theta.size))
-        for a, b in zip(low, high, strict=True)
+        (span[0] + max(a - half, 0), span[0] + min(b + half, theta.size))
+        for a, b in stretches(still)
     ]
 
 
-def _moving(span: Places, still: list[Places]) -> list[Places]:
-    edges = [span[0], *(place for stretch in still for place in stretch), span[1]]
-    pairs = zip(edges[::2], edges[1::2], strict=True)
-    return [(a, b) for a, b in pairs if b - a > 5]
-
-
 def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, span: Places) -> None:
-    """Name the stretches, trust the releases that are used, and say so."""
+    """Set the segments, trust the used releases, and report both."""
     trusted = np.zeros(work.time.size, bool)
     segments = []
     if span[0] > 0:
@@ -224,7 +210,7 @@ def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, sp
 
 
 def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
-    """Say which releases are taken, and which are too short."""
+    """Report which releases are used, and which are too short."""
 
     def listed(which: list[Places]) -> str:
         spans = [
@@ -235,7 +221,7 @@ def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
     taken = [part for part, use in zip(parts, used, strict=True) if use]
     short = [part for part, use in zip(parts, used, strict=True) if not use]
     each = "each taken as a run" if len(taken) > 1 else "one is used"
-    # The end of a hold is late rather than early: what is said is what is used.
+    # The times are those of the used samples; holds end late rather than early.
     text = f"{counted(len(parts), 'release')}, used from {listed(taken)}: {each}"
     if short:
         text += f"; {len(short)} of fewer than three swings left out: {listed(short)}"
@@ -244,7 +230,7 @@ def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
 
 
 def _between(work: Work, low: int, high: int, middle: float, *, first: bool) -> Segment:
-    """Name what is no swing: at the rest or held elsewhere."""
+    """Return the segment of a stretch without a swing: rest, held or handled."""
     reach = float(np.max(np.abs(work.theta[work.trusted] - middle)))
     level = work.theta[low:high]
     far = abs(float(np.median(level)) - middle) > 0.1 * reach
@@ -254,11 +240,12 @@ def _between(work: Work, low: int, high: int, middle: float, *, first: bool) -> 
 
 
 def _segment(work: Work, what: str, low: int, high: int, *, used: bool) -> Segment:
+    """Return the segment of a range of samples."""
     return Segment(what, float(work.time[low]), float(work.time[high - 1]), used)
 
 
 def check_zero(work: Work) -> None:
-    """Say where a free run rests, or about what it swings, if that is not 0."""
+    """Report the rest of a free run, or the middle of its swing, if it is not 0."""
     if work.plan.kind != "free" or not work.releases or work.made_of is not None or work.integrated:
         return  # of a sensor on the rod: the middle was taken for 0 as the angle was made
     _, limit = _limits(work)
@@ -286,9 +273,10 @@ def check_zero(work: Work) -> None:
         error = max(error, work.count / math.sqrt(12 * middles.size))
         said = f"it swings about {value:+.3g} +- {error:.1g} rad: an offset of the zero"
     known = any(finding.what == "zero-offset" for finding in work.findings)
-    if abs(_folded(value)) > max(CERTAIN * error, 1e-5) and not known:
+    if abs(_folded(value)) > max(CERTAIN_OFFSET * error, 1e-5) and not known:
         work.say("zero-offset", f"{said}; left to the fit")
 
 
 def _folded(angle: float) -> float:
+    """Return an angle within half a turn of 0."""
     return angle - 2 * math.pi * round(angle / (2 * math.pi))

@@ -1,22 +1,16 @@
 """The noise of a record, without a model of the pendulum.
 
-A polynomial through nine neighbouring samples follows the motion; what remains, over the filter's
-gain, is noise. Three things spoil that, and each has its remedy here:
+Polynomials through neighbouring samples follow the motion; the residual over the filter's gain is
+noise. Three faults are treated:
 
-- Sampling that is slow against the motion leaves some of the motion in the residual: polynomials
-  of higher degree are taken until a higher one no longer gives less.
-- Counts coarser than the noise, read so quickly that neighbours share a count: neighbouring errors
-  are then alike and the residual does not see them. Samples further apart are taken, where the
-  pendulum passes at least a count from one to the next; slower than that nothing can be said but
-  that an even error within a count has the standard deviation count/sqrt(12), and that is the
-  least that is reported. Where nothing moves, how often each count is shown says more
-  (:mod:`pendmap.records.resolution`).
-- Outliers: what is beyond eight standard deviations (robust, from quantiles, among samples of
-  similar speed) is left out with all windows that it is part of, then a plain root mean square is
-  taken. The median alone would be wrong by a tenth for the even errors of a counter.
+- Slow sampling leaves motion in the residual: the degree rises until a higher one leaves no less.
+- Readings that share a coarse count err alike: samples at least a count apart are taken instead.
+  Slower motion shows only count/sqrt(12), the least that is reported. At rest the shares of the
+  counts show more (:func:`pendmap.records.resolution.still_noise`).
+- Outliers beyond eight robust standard deviations, among samples of similar speed, are left out
+  with their windows; the noise is the root mean square of the others.
 
-Noise that is not white is read too small: ``colour`` says by how much the reading depends on the
-filter.
+Correlated noise is underestimated: ``colour`` shows how the reading depends on the filter.
 """
 
 from __future__ import annotations
@@ -29,84 +23,95 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
-from pendmap.records.local_fits import FEWEST, apart, clean, followed, only, rms, stderr
 from pendmap.records.resolution import step_of, still_noise
 from pendmap.signal.local_polynomial import LocalFit, local_fit
+from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.experiment import Run
-
-    Floats = NDArray[np.float64]
     from pendmap.records.work import Work
     from pendmap.signal.local_polynomial import LocalFit
 
+    Floats = NDArray[np.float64]
 
-EVERY: Final = 0.06
-"""Radians of its own phase that a motion may pass between samples and be followed by a quartic:
-the next term, x^6/720 over nine samples, is then under 1e-8 of the amplitude."""
 
-LAG: Final = 0.25
-"""Radians of phase over which a way is measured, where that is more than an interval."""
+SLOW_SAMPLING: Final = 0.06
+"""Radians of phase between samples from which quartics leave some motion."""
+
+WAY_PHASE: Final = 0.25
+"""Radians of phase over which a way is measured, if longer than an interval."""
 
 DITHERED: Final = 0.55
-"""Noise over count above which neighbouring readings err independently: sqrt(1/4 + 1/12) less
-some room, from where the error of a rounded sum is that of its parts to a percent."""
+"""Noise over count above which neighbouring readings err independently."""
 
-CLEAR: Final = 4
-"""Counts of way from which a speed is taken: rounding then changes it by a quarter at most."""
+CLEAR_WAY: Final = 4
+"""Counts of way from which a speed is taken."""
 
-FEW: Final = 0.3
-"""Radians of its own phase between samples beyond which polynomials leave some of the motion: about
-20 samples a period. It is largest where the motion is quick, which looks like a clock's fault."""
+TOO_FEW: Final = 0.3
+"""Radians of phase between samples from which all polynomials leave some motion."""
 
-RANGES: Final = 4
-"""Ranges of speed, with equally many samples."""
+SPEED_RANGES: Final = 4
+"""Ranges of speed with equally many samples."""
+
+OUTLIER: Final = 8.0
+"""Standard deviations from which a residual is an outlier."""
+
+FEWEST_RESIDUALS: Final = 40
+"""Residuals from which a standard deviation is taken."""
+
+OUTLIER_RANGES: Final = 16
+"""Ranges of speed, with equally many samples, with outliers of their own."""
+
+CLEARLY_LESS: Final = 1.02
+"""Ratio of two noise readings from which one is less."""
+
+DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
+"""Degree and samples of the polynomials in the order in which they are tried."""
+
+FARTHEST: Final = 0.25
+"""Radians of phase between samples that coarse counts move apart, at most."""
+
+MORE_STRIDES: Final = 4
+"""Strides beyond the shortest that are read too."""
+
+STIFF_STRIDE: Final = 2.0
+"""Factor by which samples of the highest degree may be farther apart."""
 
 
 @dataclasses.dataclass(frozen=True)
 class SpeedRange:
-    """The noise among samples of similar speed.
+    """Noise among samples of similar speed."""
 
-    Parameters
-    ----------
-    speed_from, speed_to : float
-        rad/s.
-    sigma, stderr : float
-        rad.
-    samples : int
-        How many residuals it comes from.
-    """
-
-    speed_from: float
-    speed_to: float
-    sigma: float
-    stderr: float
-    samples: int
+    speed_from: float  # rad/s
+    speed_to: float  # rad/s
+    sigma: float  # rad
+    stderr: float  # rad
+    samples: int  # residuals that it comes from
 
 
 @dataclasses.dataclass(frozen=True)
 class NoiseFloor:
-    """The standard deviation of the readings about the motion.
+    """Standard deviation of readings about a smooth motion.
 
     Parameters
     ----------
     sigma, stderr : float
-        rad, the rounding to counts included; ``nan`` where there are too few samples.
+        rad, rounding to counts included; ``nan`` where there are too few samples.
     by_speed : tuple of SpeedRange
         From slow to fast.
     limited_by_count : bool
-        Whether ``sigma`` is count/sqrt(12) because the record cannot show more.
+        Whether ``sigma`` is count/sqrt(12) because the record cannot show less.
     colour : float
         Reading of the quartic over that of the next degree: 1 for white noise, more where noise
         is correlated from sample to sample or the motion is not followed.
     samples : int
-        How many residuals it comes from.
+        Number of residuals.
     law : SpeedLaw or None
-        How the noise grows with speed, where the record shows that it does.
+        Growth of the noise with speed, where the record shows it.
     bound : bool
-        Whether ``sigma`` is an upper bound: of so few samples a period some motion is left in it.
+        Whether ``sigma`` is an upper bound: few samples a period leave some motion in it.
     """
 
     sigma: float
@@ -120,10 +125,26 @@ class NoiseFloor:
 
 
 def noise_floor(run: Run) -> NoiseFloor:
-    """Return the noise of a run, from the samples that are trusted; see :func:`noise_of`.
+    """Return the noise of a run, without a model of the pendulum.
 
-    Of a gyroscope alone it is that of the rate, in rad/s, by its change in rad/s^2.
-    Where no sample is trusted, since nothing moves, all show it.
+    Polynomials through neighbouring trusted samples follow the motion; the root mean square of
+    their residuals, over the filter's gain, is the noise. If no sample is trusted, all are used.
+
+    Parameters
+    ----------
+    run : Run
+        A run of :func:`read_experiment`.
+
+    Returns
+    -------
+    NoiseFloor
+        In rad against the speed in rad/s; of a gyroscope alone in rad/s against its change in
+        rad/s^2. ``nan`` where only turning points are known or there are too few samples.
+
+    Examples
+    --------
+    >>> floor = pendmap.records.noise_floor(experiment.runs[0])  # doctest: +SKIP >>> floor.sigma,
+    floor.stderr  # doctest: +SKIP
     """
     if run.peaks_only:
         return NoiseFloor(math.nan, math.nan)
@@ -142,17 +163,10 @@ def noise_of(
     trusted: NDArray[np.bool_] | None = None,
     count: float = 0.0,
 ) -> NoiseFloor:
-    """Return the noise of readings of any smooth motion.
+    """Return the noise of readings, shape (N,), of any smooth motion.
 
-    Parameters
-    ----------
-    time, theta : ndarray, shape (N,)
-        s, increasing; rad.
-    trusted : ndarray of bool, shape (N,), optional
-        Windows that hold a sample that is not trusted are left out; where too few remain all
-        samples count.
-    count : float
-        Step of the readings, rad, 0 if there is none.
+    Windows with untrusted samples are left out unless too few remain. ``count`` is the step of the
+    readings, rad; 0 for none.
     """
     bad = np.zeros(time.size, bool) if trusted is None else ~trusted
     found = _noise(time, theta, bad, count)
@@ -162,23 +176,26 @@ def noise_of(
 
 
 def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) -> NoiseFloor | None:
-    if time.size < FEWEST:
+    """Return the noise from the windows without bad samples; None if there are too few."""
+    if time.size < FEWEST_RESIDUALS:
         return None
     interval = float(np.median(np.diff(time)))
     swing, phase = fastest(time, theta, count)
     speed = speed_of(time, theta, phase)
     first = clean(local_fit(time, theta), bad, speed)
-    if first.middle.size < FEWEST:
+    if first.middle.size < FEWEST_RESIDUALS:
         return None
     fit = first
-    if swing * interval > EVERY:
+    if swing * interval > SLOW_SAMPLING:
         fit = followed(time, theta, bad, speed, first)
     next_fit = clean(local_fit(time, theta, degree=6, points=11), bad, speed)
-    colour = rms(first) / max(rms(next_fit), 1e-300) if next_fit.middle.size >= FEWEST else 1.0
+    colour = (
+        rms(first) / max(rms(next_fit), 1e-300) if next_fit.middle.size >= FEWEST_RESIDUALS else 1.0
+    )
     least = count / math.sqrt(12)
     slowest = 0.0
     if count and rms(fit) < DITHERED * count:
-        nearest = fit if swing * interval > EVERY else None
+        nearest = fit if swing * interval > SLOW_SAMPLING else None
         far = apart(time, theta, bad, speed, count, interval, swing, nearest)
         if far is None:
             still = still_noise(theta if bad.all() else theta[~bad], count)
@@ -188,13 +205,13 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
         fit, slowest = far
         law = None
     else:
-        # A residual holds the noise of all its window, each with its own speed.
+        # A residual has the noise of all samples of its window, each with its own speed.
         square = np.convolve(speed**2, fit.shares, "same")[fit.middle]
         law = law_of(
             fit.residual, square, worth=fit.sum_of_squares, fastest=phase, count=count,
             interval=interval,
         )  # fmt: skip
-    few = phase * interval > FEW
+    few = phase * interval > TOO_FEW
     sigma, error = rms(fit), stderr(fit)
     limited = sigma < least
     sigma = max(sigma, least)
@@ -204,15 +221,15 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
 
 
 def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
-    """Return the fastest phase of the motion, rad/s: that of the swing, or of the rotation.
+    """Return the largest phase velocities, rad/s.
 
-    First with large swings counted for rotations, whose bends are as sharp; then without.
+    The first counts large swings as rotations, whose bends are as sharp; the second does not.
     """
     interval = float(np.median(np.diff(time)))
     lag = 1
     while True:
         way = float(np.quantile(np.abs(theta[lag:] - theta[:-lag]), 0.98))
-        if way >= CLEAR * count or 8 * lag > theta.size:
+        if way >= CLEAR_WAY * count or 8 * lag > theta.size:
             break
         lag *= 2
     reach = max(float(np.quantile(np.abs(theta - np.median(theta)), 0.99)), 1e-300)
@@ -220,8 +237,8 @@ def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
     length = min(reach, 1.0) if float(np.ptp(theta)) > math.pi else reach
     slowest = 1.0 / float(time[-1] - time[0])
     phase = max(way / (lag * interval * length), slowest)
-    # What noise makes of neighbours looks like speed: over longer ways it is less.
-    while lag < (longer := min(int(LAG / (phase * interval)), theta.size // 8)):
+    # Noise between neighbours looks like speed: longer ways reduce it.
+    while lag < (longer := min(int(WAY_PHASE / (phase * interval)), theta.size // 8)):
         lag = longer
         way = float(np.quantile(np.abs(theta[lag:] - theta[:-lag]), 0.98))
         phase = max(way / (lag * interval * length), slowest)
@@ -230,9 +247,9 @@ def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
 
 
 def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
-    """Return the noise in ranges of speed; below ``slowest`` the count is all that is known."""
+    """Return the noise in ranges of speed; below ``slowest`` it is that of the count."""
     speed = np.abs(fit.slope)
-    number = max(min(RANGES, fit.middle.size // FEWEST), 1)
+    number = max(min(SPEED_RANGES, fit.middle.size // FEWEST_RESIDUALS), 1)
     edges = np.quantile(speed, np.linspace(0, 1, number + 1))
     found = []
     if slowest > 0:
@@ -246,11 +263,8 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
     return found
 
 
-# What the noise itself tells: a clock that is not what its stamps say.
-
-
 def check(work: Work) -> None:
-    """Say so where noise grows with speed."""
+    """Report noise that grows with speed."""
     if work.integrated:
         return  # a late reading of a rate errs with the acceleration
     floor = noise_of(
@@ -260,3 +274,121 @@ def check(work: Work) -> None:
         interval = float(np.median(np.diff(work.time)))
         part = f"{100 * floor.law.tau / interval:.0f} % of the interval"
         work.say("noise-grows-with-speed", f"{floor.law} ({part})")
+
+
+def clean(fit: LocalFit, bad: NDArray[np.bool_], speed: Floats) -> LocalFit:
+    """Leave out windows with bad samples, then those with outliers."""
+    fit = only(fit, ~_near(bad, fit.neighbours)[fit.middle])
+    return only(fit, ~_outlying(fit, speed)[fit.middle])
+
+
+def _outlying(fit: LocalFit, speed: Floats) -> NDArray[np.bool_]:
+    """Return which samples share a window with an outlier among similar speeds."""
+    false = np.zeros(speed.size, bool)
+    sizes = np.abs(fit.residual)
+    whole = broad_scale(sizes)
+    order = np.argsort(speed[fit.middle], kind="stable")
+    for part in np.array_split(
+        order, max(min(OUTLIER_RANGES, order.size // (5 * FEWEST_RESIDUALS)), 1)
+    ):
+        # Noise that grows with speed is largest among the quickest samples.
+        scale = max(whole, broad_scale(sizes[part]))
+        false[fit.middle[part[sizes[part] > OUTLIER * scale]]] = scale > 0
+    return _near(false, fit.neighbours)
+
+
+def _near(marked: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Return which places are within ``reach`` of a marked one."""
+    sums = np.concatenate([[0], np.cumsum(marked)])
+    place = np.arange(marked.size)
+    low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, marked.size)
+    near: NDArray[np.bool_] = sums[high] > sums[low]
+    return near
+
+
+def less(fit: LocalFit, other: LocalFit) -> bool:
+    """Return whether a fit's residual is significantly less than another's."""
+    enough = CLEARLY_LESS + 2 * stderr(fit) / max(rms(fit), 1e-300)
+    return fit.middle.size >= FEWEST_RESIDUALS and rms(other) > enough * rms(fit)
+
+
+def only(fit: LocalFit, which: NDArray[np.bool_]) -> LocalFit:
+    """Return a fit with some of its residuals."""
+    return dataclasses.replace(
+        fit, middle=fit.middle[which], residual=fit.residual[which], slope=fit.slope[which]
+    )
+
+
+def rms(fit: LocalFit) -> float:
+    """Return the root mean square of the residuals, rad."""
+    return float(np.sqrt(np.mean(fit.residual**2)))
+
+
+def stderr(fit: LocalFit) -> float:
+    """Return the standard error of the root mean square of residuals that share samples."""
+    return rms(fit) * math.sqrt(fit.sum_of_squares / (2 * fit.middle.size))
+
+
+def followed(
+    time: Floats, theta: Floats, bad: NDArray[np.bool_], speed: Floats, first: LocalFit
+) -> LocalFit:
+    """Return the fit of the lowest degree above which no degree leaves less."""
+    chosen = first
+    for degree, points in DEGREES[1:]:
+        higher = clean(local_fit(time, theta, degree=degree, points=points), bad, speed)
+        if higher.middle.size < FEWEST_RESIDUALS:
+            break
+        if not less(higher, chosen):
+            break
+        chosen = higher
+    return chosen
+
+
+def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
+    time: Floats,
+    theta: Floats,
+    bad: NDArray[np.bool_],
+    speed: Floats,
+    count: float,
+    interval: float,
+    swing: float,
+    nearest: LocalFit | None,
+) -> tuple[LocalFit, float] | None:
+    """Return a fit of samples at least a count apart, and the slowest speed where they are.
+
+    ``nearest`` is the fit of neighbours that follows the motion where sampling is slow.
+    """
+    most = max(int(FARTHEST / (swing * interval)), 1)
+    stride = 1
+    while True:
+        # Neighbours of slower motion are within a count and have equal errors.
+        slowest = count / (stride * interval)
+        fit = clean(local_fit(time, theta, degree=6, points=11, stride=stride), bad, speed)
+        if stride == 1 and nearest is not None and less(nearest, fit):
+            fit = nearest
+        quick = np.abs(fit.slope) >= slowest
+        if np.count_nonzero(quick) >= max(FEWEST_RESIDUALS, quick.size // 3) or stride >= most:
+            break
+        stride = min(2 * stride, most)
+    if np.count_nonzero(quick) < FEWEST_RESIDUALS:
+        return None
+    found = [only(fit, quick)]
+    farthest = max(int(STIFF_STRIDE * FARTHEST / (swing * interval)), 1)
+    for longer in range(stride + 1, min(stride + MORE_STRIDES, farthest) + 1):
+        degree, points = DEGREES[1] if fit is not nearest and longer <= most else DEGREES[-1]
+        more = local_fit(time, theta, degree=degree, points=points, stride=longer)
+        more = clean(more, bad, speed)
+        found.append(only(more, np.abs(more.slope) >= slowest))
+    return _pooled(found), slowest
+
+
+def _pooled(fits: list[LocalFit]) -> LocalFit:
+    """Return the residuals of several fits to the same samples, worth those of the first."""
+    middle, residual, slope = (
+        np.concatenate([getattr(fit, name) for fit in fits])
+        for name in ("middle", "residual", "slope")
+    )
+    worth = fits[0].sum_of_squares * middle.size / fits[0].middle.size
+    return dataclasses.replace(
+        fits[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
+    )

@@ -12,31 +12,27 @@ from pendmap.formatting import counted
 from pendmap.records import (
     angle,
     clock,
-    edges,
+    cross_checks,
     motion,
     noise,
-    pivot,
-    resampled,
     resolution,
     samples,
     scale,
-    signs,
     trigger,
-    unmarked_peaks,
 )
 from pendmap.records.across import checked_together
-from pendmap.records.channels import Channels, channels_of
+from pendmap.records.channels import channels_of
 from pendmap.records.description import ALONE, NAME, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
 from pendmap.records.rod_sensors import gyroscope_of
-from pendmap.records.table import read_table
-from pendmap.records.work import Work
+from pendmap.records.tables import read_table
 
 if TYPE_CHECKING:
     import os
 
     from pendmap.records.description import Description
     from pendmap.records.text import Table
+    from pendmap.records.work import Work
 
 
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
@@ -44,7 +40,7 @@ TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".x
 
 LEAST_RATE: Final = 1e-3
 MOST_RATE: Final = 1e9
-"""Hz that a record may have: one reading in a quarter of an hour to one in a nanosecond."""
+"""Range of a sampling rate, Hz."""
 
 
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
@@ -53,18 +49,18 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     Parameters
     ----------
     path : str or path
-        As of :func:`read_experiment`.
+        File or folder, as in :func:`read_experiment`.
 
     Returns
     -------
     list of Path
-        The file, or ``experiment.toml`` and those that it names, which need not exist; without
-        one all that may be records.
+        The file, or ``experiment.toml`` and the files that it names, which need not exist; without
+        one all files that may be records.
 
     Raises
     ------
     InputError
-        If the ``experiment.toml`` is none.
+        If the ``experiment.toml`` is not valid.
     """
     place = Path(path)
     if not place.is_dir():
@@ -76,22 +72,22 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
 
 
 def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = None) -> Experiment:
-    """Read a record or a folder of records, and say what is odd about them.
+    """Read a record or a folder of records, and report its faults.
 
     A file (CSV, other text, Parquet, Excel) with a time and an angle is an experiment of one free
-    decay. A folder is one with an ``experiment.toml``; without it each of its files is a free
+    decay. A folder is an experiment with an ``experiment.toml``; without it each file is a free
     decay. Each free release of a file is a run of its own, named ``decay 1/3``. Nothing is written.
-    What is certain is mended (turns that a sensor wraps are unwrapped, milliseconds become seconds,
-    ...), and that is said; all else is only said.
-    ``Run.trusted`` marks the samples that are for fitting.
+    Each fault is a finding under a stable key. Data are corrected only where the correction is
+    unambiguous: wrapped turns are unwrapped, milliseconds become seconds. ``Run.trusted`` marks the
+    samples for fitting.
 
     Parameters
     ----------
     path : str or path
         The file or folder.
     rate_hz : float, optional
-        Readings a second, Hz, for files without a column of times: ``t = k / rate_hz``. It goes
-        before ``rate_hz`` of [columns].
+        Sampling rate, Hz, of files without a column of times: ``t = k / rate_hz``. It overrides
+        ``rate_hz`` of [columns].
 
     Returns
     -------
@@ -101,43 +97,34 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
     Raises
     ------
     InputError
-        If there is no record in it, on one line that says what, where and what is allowed.
+        If there is no record in it, on one line that names fault, place and what is allowed.
     OSError
         If a file cannot be read.
 
     Examples
     --------
-    >>> experiment = pendmap.read_experiment("lab")  # doctest: +SKIP
-    >>> experiment.runs[0].theta  # doctest: +SKIP
+    >>> experiment = pendmap.read_experiment("lab")  # doctest: +SKIP >>> experiment.runs[0].theta
+    # doctest: +SKIP
     """
     place = Path(path)
     alone = ALONE if rate_hz is None else dataclasses.replace(ALONE, rate_hz=_rate(rate_hz))
+    description = alone
     if not place.is_dir():
-        found, findings = _runs(place, RunPlan(place.name), alone, {}, place.stem)
-        checked, together = checked_together(found)
-        digest = {place.name: found[0].sha256}
-        return Experiment(place, checked, {}, (*findings, *together), digest)
-    if not (place / NAME).is_file():
-        return _plain(place, alone)
-    description = read_description(place / NAME)
-    if rate_hz is not None:
-        description = dataclasses.replace(description, rate_hz=alone.rate_hz)
-    tables: dict[str, tuple[Table, str]] = {}
-    names = _names([plan.file for plan in description.runs])
-    runs: list[Run] = []
-    shared: list[Finding] = []
-    for count, (plan, name) in enumerate(zip(description.runs, names, strict=True), 1):
-        if not (place / plan.file).exists():
-            raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
-        found, findings = _runs(place / plan.file, plan, description, tables, name)
-        runs += found
-        shared += findings
+        runs, findings = _runs(place, RunPlan(place.name), alone, {}, place.stem)
+    elif not (place / NAME).is_file():
+        runs, findings = _plain(place, alone)
+    else:
+        description = read_description(place / NAME)
+        if rate_hz is not None:
+            description = dataclasses.replace(description, rate_hz=alone.rate_hz)
+        runs, findings = _described(place, description)
     digests = {run.file: run.sha256 for run in runs}
     checked, together = checked_together(runs)
-    return Experiment(place, checked, description.known, (*shared, *together), digests)
+    return Experiment(place, checked, description.known, (*findings, *together), digests)
 
 
 def _rate(value: float) -> float:
+    """Return a sampling rate in Hz, within its range."""
     rate = check_number("rate_hz", value)
     if not LEAST_RATE <= rate <= MOST_RATE:
         raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
@@ -145,12 +132,12 @@ def _rate(value: float) -> float:
 
 
 def _tables(folder: Path) -> list[Path]:
-    """Return the files of a folder that may be records, in the order of their names."""
+    """Return the files of a folder that may be records, sorted by name."""
     files = sorted(file for file in folder.iterdir() if file.suffix.lower() in TABLES)
     return [file for file in files if file.is_file() and not file.name.startswith((".", "~"))]
 
 
-def _plain(folder: Path, description: Description) -> Experiment:
+def _plain(folder: Path, description: Description) -> tuple[list[Run], list[Finding]]:
     """Read a folder without a description: each of its files is one free run."""
     files = _tables(folder)
     runs: list[Run] = []
@@ -172,13 +159,26 @@ def _plain(folder: Path, description: Description) -> Experiment:
             f"{folder}: has no {NAME}: there must be one, or files that are records, got"
             f" {count}{first}"
         )
-    checked, together = checked_together(runs)
-    digests = {run.file: run.sha256 for run in runs}
-    return Experiment(folder, checked, {}, (*findings, *together), digests)
+    return runs, findings
+
+
+def _described(folder: Path, description: Description) -> tuple[list[Run], list[Finding]]:
+    """Read the runs of an ``experiment.toml``."""
+    tables: dict[str, tuple[Table, str]] = {}
+    runs: list[Run] = []
+    findings: list[Finding] = []
+    names = _names([plan.file for plan in description.runs])
+    for count, (plan, name) in enumerate(zip(description.runs, names, strict=True), 1):
+        if not (folder / plan.file).exists():
+            raise InputError(f"{folder / NAME}: [[run]] {count}: no file {plan.file!r}")
+        found, shared = _runs(folder / plan.file, plan, description, tables, name)
+        runs += found
+        findings += shared
+    return runs, findings
 
 
 def _names(files: list[str]) -> list[str]:
-    """Name runs after their files, apart where several share one or a stem."""
+    """Return run names: stems of files, made distinct where several files share one."""
     stems = {file: file.rsplit(".", 1)[0] for file in files}
     alike, every, before = Counter(stems.values()), Counter(files), Counter[str]()
     names = []
@@ -189,19 +189,18 @@ def _names(files: list[str]) -> list[str]:
     return names
 
 
-def _runs(
+def _runs(  # noqa: C901 (a step each)
     path: Path,
     plan: RunPlan,
     description: Description,
     tables: dict[str, tuple[Table, str]],
     name: str,
 ) -> tuple[list[Run], list[Finding]]:
-    """Return the runs of a file, one for each release, and what was found in none of them alone."""
+    """Return the runs of a file, one a release, and the findings that belong to none of them."""
     if plan.file not in tables:
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
-    channels = channels_of(table, description, plan, str(path))
-    work = Work.begin(str(path), plan, description.known, channels, table)
+    work = channels_of(table, description, plan, str(path))
     if plan.kind == "forced" and plan.drive is None and plan.pivot is None:
         text = 'kind is "forced" and there is neither drive nor pivot: what drives it is not known'
         work.say("drive-missing", text)
@@ -209,30 +208,30 @@ def _runs(
     work.cut(plan.from_s, plan.to_s)
     if not work.peaks_only:
         clock.cut_at_pauses(work)
-    unmarked_peaks.check(work, channels.columns)
+    angle.check_peaks(work)
     angle.make(work)
+    if not work.peaks_only:
+        resolution.put_on_edges(work)
+    if work.peaks_only or work.edges:
+        # The intervals are periods of the pendulum or of the encoder's edges, no clock's.
+        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
     if work.peaks_only:
-        # Their intervals are periods, no clock's.
-        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
         work.refuse_short()
-        return [_run(work, name, channels, digest)], []
-    edges.check(work)
-    if work.edges:
-        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
-    else:
-        resampled.check(work)
+        return [_run(work, name, digest)], []
+    if not work.edges:
+        samples.keep_readings(work)
     samples.check(work)
     moves = motion.moves(work)
     if moves and work.made_of is None:
         scale.check(work)
     samples.say_steps(work)
-    edges.say(work)
+    resolution.say_edges(work)
     if moves:
         motion.check(work)
         trigger.check_drive(work)
-        signs.check(work)
+        cross_checks.check(work)
         resolution.check(work)
-    pivot.smooth(work)
+    cross_checks.smooth_pivot(work)
     work.refuse_short()
     works, shared = work.apart()
     runs = []
@@ -241,11 +240,12 @@ def _runs(
             motion.check_zero(part)
             noise.check(part)
         own = f"{name} {k}/{len(works)}" if len(works) > 1 else name
-        runs.append(_run(part, own, channels, digest))
+        runs.append(_run(part, own, digest))
     return runs, [dataclasses.replace(found, where=found.where or name) for found in shared]
 
 
-def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
+def _run(work: Work, name: str, digest: str) -> Run:
+    """Return the run of a record that is read and checked."""
     plan = work.plan
     gyroscope = None
     if work.integrated:
@@ -269,12 +269,8 @@ def _run(work: Work, name: str, channels: Channels, digest: str) -> Run:
         findings=tuple(dataclasses.replace(f, where=f.where or name) for f in work.findings),
         peaks_only=work.peaks_only,
         segments=tuple(work.segments),
-        channels=_columns(channels),
-        unused=channels.unused,
+        channels=work.columns,
+        unused=work.unused,
         count_rad=0.0 if work.edges else work.count,
         sha256=digest,
     )
-
-
-def _columns(channels: Channels) -> dict[str, str]:
-    return {channel: str(column) for channel, column in channels.columns.items()}

@@ -1,4 +1,4 @@
-"""Releases of a free record: where a motion begins and ends that nobody touches."""
+"""Releases of a free record: where a motion begins and ends that no hand touches."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import normal_scale, true_runs
+from pendmap.signal.robust import even_times, normal_scale, stretches
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,25 +20,47 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-RISE: Final = 0.1
-"""Share of the largest swing by which a free swing grows only if somebody helps."""
+RELEASE_RISE: Final = 0.1
+"""Growth of a swing over the largest that only a hand causes."""
 
-HELD: Final = 1.5
-"""Times longer than a release from rest takes to be seen, from where it was held before."""
+HELD_LONGER: Final = 1.5
+"""Delay over that of a release from rest from which a hold is seen."""
 
-UPRIGHT: Final = 0.05
-"""Sine of an angle below which a pendulum leaves so slowly that a hold cannot be told."""
+NEAR_UPRIGHT: Final = 0.05
+"""Sine of an angle below which a pendulum leaves too slowly to show a hold."""
 
-BEFORE: Final = ((0.5, 0.2), (0.7, 0.4))
-"""Periods before a motion between which a hold is looked for: from near the top it leaves slowly,
-and is seen to move later."""
+HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))
+"""Periods before a motion between which a hold is searched."""
 
 FEWEST_HELD: Final = 10
-"""Samples of a hold that show whether it is quiet."""
+"""Samples of a hold from which quiet is judged."""
 
-FEWEST: Final = 5
-"""Half cycles of a release that is worth a run: three swings from a hand have five between its
-first and last passage of the middle."""
+FEWEST_HALF_CYCLES: Final = 5
+"""Half cycles from which a release is a run: three swings from a hand."""
+
+HAND_SHARE: Final = 0.3
+"""Torque over the greatest restoring torque nearby that only a hand adds."""
+
+DERIVATIVE_SPAN: Final = 0.2
+"""Periods over which a second derivative is taken."""
+
+CERTAIN_HAND: Final = 6.0
+"""Standard deviations of the second derivative from which it is no noise."""
+
+USUAL_REMAINDER: Final = 4.0
+"""Median remainders from which a hand acts."""
+
+FEWEST_A_PERIOD: Final = 20.0
+"""Samples a period from which a second derivative is taken."""
+
+FREE_SHARE: Final = 0.6
+"""Share of the samples that least trimmed squares keep."""
+
+CONCENTRATIONS: Final = 12
+"""Concentration steps; half as many are enough."""
+
+SHORTEST_HOLD: Final = 0.5
+"""Periods that a hand holds at least."""
 
 
 def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motion)
@@ -49,22 +71,11 @@ def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motio
     period: float,
     noise: float,
 ) -> list[Places]:
-    """Divide motions into stretches that nobody touches, in order.
+    """Return the stretches of motions that nobody touches, in order.
 
-    Parameters
-    ----------
-    work : Work
-        A free record.
-    parts : list of (int, int)
-        Where it moves: first place and the one after the last.
-    middle : float
-        What it swings about, rad.
-    limit : float
-        Within what nothing moves, rad.
-    period : float
-        Of small swings, s.
-    noise : float
-        Of a reading, rad.
+    ``parts`` are the motions, ``middle`` (rad) is the middle of the swing, ``limit`` (rad) the span
+    within which nothing moves, ``period`` (s) that of small swings, ``noise`` (rad) that of a
+    reading.
     """
     hand = touched(work, period, parts)
     free = [
@@ -84,7 +95,7 @@ def _let_go(  # noqa: PLR0913, PLR0917 (a motion, and what is known of it)
 ) -> int:
     """Return where a motion that begins with a quiet hold has clearly left it."""
     low, high = part
-    for shares in BEFORE:
+    for shares in HOLD_WINDOWS:
         before, sure = (
             int(np.searchsorted(work.time, work.time[low] - share * period)) for share in shares
         )
@@ -93,7 +104,7 @@ def _let_go(  # noqa: PLR0913, PLR0917 (a motion, and what is known of it)
         if left is None:
             continue
         if hand[before:low].all():
-            # A hand is known to let go only later.
+            # The hand holds the pendulum until the motion begins.
             found = held_short(work, (before, high), middle, period, noise)
             return low if found is None else min(low, found)
         return max(low, left)
@@ -101,11 +112,11 @@ def _let_go(  # noqa: PLR0913, PLR0917 (a motion, and what is known of it)
 
 
 def _quiet(work: Work, low: int, high: int, noise: float) -> float | None:
-    """Return the level that readings keep; none if they do not."""
+    """Return the level of quiet readings; None if they are not quiet."""
     hold = work.theta[low:high][work.trusted[low:high]]
     if hold.size < FEWEST_HELD:
         return None
-    # A hand that trembles drifts more than noise does.
+    # A trembling hand drifts more than noise.
     early, late = np.array_split(hold, 2)
     drift = abs(float(np.mean(early) - np.mean(late)))
     spread = float(np.diff(np.quantile(hold, [0.05, 0.95]))[0])
@@ -115,15 +126,12 @@ def _quiet(work: Work, low: int, high: int, noise: float) -> float | None:
 
 
 def _seen(work: Work, noise: float) -> float:
-    """Return how far from a hold no reading of it is, rad."""
+    """Return the distance from a hold that none of its readings has, rad."""
     return max(6 * noise, 1.5 * work.count, 1e-4)
 
 
 def _left(work: Work, part: Places, level: float, noise: float) -> int | None:
-    """Return from which place on the angle is clearly off a level, several readings in a row.
-
-    All before may be held; of a release some readings of the first tenth of a second are lost.
-    """
+    """Return where three readings in a row begin to be off a level, on one side."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
     off = work.theta[good] - level
     seen = _seen(work, noise)
@@ -133,18 +141,20 @@ def _left(work: Work, part: Places, level: float, noise: float) -> int | None:
 
 
 def enough(work: Work, part: Places, middle: float, limit: float) -> bool:
-    """Whether a release has the swings to be worth a run."""
+    """Return whether a release has enough half cycles for a run."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
     if not good.size:
         return False
     theta = work.theta[good] - middle
     theta -= 2 * math.pi * round(float(np.median(theta)) / (2 * math.pi))  # carried round once
     start = after_turns(theta)
-    return swings(work.time[good][start:], theta[start:], least=limit).peak.size >= FEWEST
+    return (
+        swings(work.time[good][start:], theta[start:], least=limit).peak.size >= FEWEST_HALF_CYCLES
+    )
 
 
 def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]:
-    """Divide a motion where the swing grows: somebody took the pendulum and let it go again."""
+    """Divide a motion where the swing grows: a hand took the pendulum and released it again."""
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low
     if good.size < 5:
@@ -154,9 +164,9 @@ def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]
     size = np.abs(half.peak)
     if size.size < 4:
         return [part]
-    # Neighbours together: an offset makes every other half cycle larger.
+    # Pairs of neighbours: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
-    rise = max(RISE * float(size.max()), 2 * limit)
+    rise = max(RELEASE_RISE * float(size.max()), 2 * limit)
     cuts: list[Places] = []
     least, at = pairs[0], 0
     k = 1
@@ -179,14 +189,14 @@ def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]
 
 
 def held_short(work: Work, part: Places, middle: float, period: float, noise: float) -> int | None:
-    """Return where a motion has left a level that it was held at for less than a period before.
+    """Return where a motion left a level at which it was held for less than a period.
 
-    Nothing is returned where it leaves as soon as a release from rest does.
+    Returns None where it leaves as soon as a release from rest does.
     """
     low = part[0]
     if not work.trusted[low : low + 5].all():
         return None
-    # The first readings say where it is held, then all that are near them.
+    # The first readings give the level of the hold, then all readings near it.
     level = float(np.median(work.theta[low : low + 5]))
     left = _left(work, part, level, noise)
     if left is None:
@@ -194,71 +204,32 @@ def held_short(work: Work, part: Places, middle: float, period: float, noise: fl
     level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
     left = _left(work, part, level, noise)
     pull = abs(math.sin(level - middle))
-    if left is None or pull < UPRIGHT:
+    if left is None or pull < NEAR_UPRIGHT:
         return None
     w0 = 2 * math.pi / period
     usual = math.sqrt(2 * _seen(work, noise) / (w0**2 * pull))
     interval = float(np.median(np.diff(work.time)))
-    if work.time[left] - work.time[low] <= HELD * usual + 4 * interval:
+    if work.time[left] - work.time[low] <= HELD_LONGER * usual + 4 * interval:
         return None
     return left
-
-
-# Where a hand holds or carries the pendulum: there gravity alone does not explain its motion.
-
-
-SHARE: Final = 0.3
-"""Share of the greatest restoring torque nearby that only a hand adds: friction is some per cent of
-it while the pendulum swings, and an angle at which it is held shows all of it."""
-
-WINDOW: Final = 0.2
-"""Periods that a second derivative is taken over: a cubic bends it by a few per cent then."""
-
-CERTAIN: Final = 6.0
-"""Standard deviations of the second derivative beyond which it is not noise."""
-
-USUAL: Final = 4.0
-"""Times the median remainder, which is what all that is no hand leaves."""
-
-SAMPLES: Final = 20.0
-"""Samples a period under which a second derivative says too little."""
-
-KEPT: Final = 0.6
-"""Share of the samples that are taken for free: a hand has the others at most."""
-
-STEPS: Final = 12
-"""Concentration steps; half as many are enough."""
-
-LONG: Final = 0.5
-"""Periods that a hand holds for at least: knocks and magnets act for less."""
 
 
 def touched(work: Work, period: float, parts: list[Places]) -> NDArray[np.bool_]:
     """Return which samples of a free record a hand moves, shape (N,).
 
-    The remainder of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large there, with
-    coefficients from the samples that agree best (least trimmed squares).
-
-    Parameters
-    ----------
-    work : Work
-        A free record; readings that are not trusted are passed over by straight lines.
-    period : float
-        Of small swings, s, roughly.
-    parts : list of (int, int)
-        Where it moves: first place and the one after the last. A long hold would outvote the rest.
+    The remainder of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large there; the
+    coefficients are least trimmed squares over the moving ``parts``. ``period`` (s) is that of
+    small swings.
     """
     from scipy.ndimage import binary_dilation, maximum_filter1d
     from scipy.signal import savgol_filter
 
     none = np.zeros(work.time.size, bool)
     good = work.trusted
-    interval = float(np.median(np.diff(work.time)))
-    count = math.floor((work.time[-1] - work.time[0]) / interval) + 1
-    window = max(round(WINDOW * period / interval), 5) | 1
-    if period / interval < SAMPLES or count > 10 * work.time.size or count < 4 * window:
+    interval, even = even_times(work.time)
+    count, window = even.size, max(round(DERIVATIVE_SPAN * period / interval), 5) | 1
+    if period / interval < FEWEST_A_PERIOD or count < 4 * window:
         return none
-    even = work.time[0] + interval * np.arange(count)
     theta = np.interp(even, work.time[good], work.theta[good])
     bend = savgol_filter(theta, window, 3, deriv=2, delta=interval)
     speed = savgol_filter(theta, window, 3, deriv=1, delta=interval)
@@ -274,7 +245,7 @@ def touched(work: Work, period: float, parts: list[Places]) -> NDArray[np.bool_]
         return none
     rest = np.abs(bend + columns @ fitted)
     pull = np.abs(columns[:, :2] @ fitted[:2])
-    # Of the swing before and of the swing after the smaller one: a hand is between unlike ones.
+    # The smaller of the torques of the swings before and after: a hand separates unlike swings.
     half = round(period / interval / 2)
     sides = [
         maximum_filter1d(pull, 2 * half + 1, mode="nearest", origin=side * half) for side in (-1, 1)
@@ -283,9 +254,9 @@ def touched(work: Work, period: float, parts: list[Places]) -> NDArray[np.bool_]
     noise = normal_scale(local_fit(work.time[good], work.theta[good]).residual)
     # A second derivative by least squares over n samples: sigma sqrt(720 / n^5) / dt^2.
     error = max(noise, work.count / math.sqrt(12)) * math.sqrt(720 / window**5) / interval**2
-    usual = USUAL * float(np.median(rest[moving]))
-    moved = rest > np.maximum(np.maximum(SHARE * restoring, CERTAIN * error), usual)
-    # Within a gap there are no readings that could tell.
+    usual = USUAL_REMAINDER * float(np.median(rest[moving]))
+    moved = rest > np.maximum(np.maximum(HAND_SHARE * restoring, CERTAIN_HAND * error), usual)
+    # A gap has no readings that show a hand.
     places = np.flatnonzero(good)
     gaps = np.flatnonzero(np.diff(work.time[good]) > window * interval / 4)
     for k in gaps:
@@ -305,9 +276,9 @@ def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
     29, from a pendulum of about the right period.
     """
     answer = np.array([gravity, *[0.0] * (columns.shape[1] - 1)])
-    for _ in range(STEPS):
+    for _ in range(CONCENTRATIONS):
         away = np.abs(target - columns @ answer)
-        agree = away <= np.quantile(away, KEPT)
+        agree = away <= np.quantile(away, FREE_SHARE)
         answer = np.linalg.lstsq(columns[agree], target[agree], rcond=None)[0]
     return answer
 
@@ -315,36 +286,23 @@ def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
 def without_hand(
     time: NDArray[np.float64], parts: list[Places], hand: NDArray[np.bool_], period: float
 ) -> list[Places]:
-    """Return the stretches of motions in which nobody holds the pendulum.
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    parts : list of (int, int)
-        First place of each and the one after the last.
-    hand : ndarray of bool, shape (N,)
-        As of :func:`touched`.
-    period : float
-        Of small swings, s.
-    """
+    """Return the stretches of motions in which no hand holds the pendulum."""
     touches: list[Places] = []
-    for a, b in zip(*(ends.tolist() for ends in true_runs(hand)), strict=True):
-        # A hand that trembles lets go for a moment.
-        if touches and time[a] - time[touches[-1][1] - 1] < LONG * period / 2:
+    for a, b in stretches(hand):
+        # A trembling hand lets go for a moment.
+        if touches and time[a] - time[touches[-1][1] - 1] < SHORTEST_HOLD * period / 2:
             touches[-1] = (touches[-1][0], b)
         else:
             touches.append((a, b))
     held = np.zeros(time.size, bool)
     for a, b in touches:
-        if time[b - 1] - time[a] >= LONG * period:
-            # One that begins to carry may move for a while as the pendulum would.
+        if time[b - 1] - time[a] >= SHORTEST_HOLD * period:
+            # A carried pendulum may move like a free one for a moment.
             near = [
                 t for t in touches if time[a] - time[t[1] - 1] < period > time[t[0]] - time[b - 1]
             ]
             held[near[0][0] : near[-1][1]] = True
     free = []
     for low, high in parts:
-        begin, end = true_runs(~held[low:high])
-        free += [(low + a, low + b) for a, b in zip(begin.tolist(), end.tolist(), strict=True)]
-    return [(a, b) for a, b in free if b - a > 5 and time[b - 1] - time[a] > LONG * period]
+        free += [(low + a, low + b) for a, b in stretches(~held[low:high])]
+    return [(a, b) for a, b in free if b - a > 5 and time[b - 1] - time[a] > SHORTEST_HOLD * period]

@@ -1,4 +1,12 @@
-"""Whether the readings of a run are enough: for the drive, for the sensor's gain, for a fit."""
+"""The resolution of readings: their step, encoder edges, and whether they suffice for a fit.
+
+At rest, a sensor with noise ``s`` below a count shows two or three counts around the angle ``x``:
+``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. Their shares give ``x`` and
+``s``; the noise is averaged over uniform priors of ``x`` and ``log s``.
+
+An encoder that writes a line at each edge has no readings between edges; the stamp has the error:
+``theta_k = (n_k - sign(n_k - n_(k-1)) / 2) * step``.
+"""
 
 from __future__ import annotations
 
@@ -18,21 +26,45 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-RESOLVED: Final = 2.0
-"""Readings in a period of the drive under which it is taken for a slower one (Nyquist)."""
+NYQUIST: Final = 2.0
+"""Readings in a period of the drive that resolve it at least."""
 
-KNOWN: Final = 0.1
-"""Half of the 95 % interval of the gain, from which on sizes in rad are said to be unsure."""
+GAIN_KNOWN: Final = 0.1
+"""Half of the 95 % interval of the gain from which it is reported."""
 
-USED: Final = 0.1
-"""Share of the readings in motion that a fit uses at least, or it is said before any number."""
+LEAST_USED: Final = 0.1
+"""Share of the readings in motion that a fit uses without a warning."""
 
 RESTING: Final = ("held", "rest")
-"""Stretches whose readings are not missed: nothing moves there."""
+"""Segments without motion."""
+
+ON_STEPS: Final = 0.12
+"""Root mean square distance from multiples of a step that shows it; 0.29 is chance."""
+
+SPREADS: Final = np.geomspace(0.02, 1.0, 80)
+"""Standard deviations of noise before the rounding, in counts."""
+
+PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5
+"""Places of the angle between the edges of its count, in counts."""
+
+MOST_COUNTS: Final = 9
+"""Counts that readings at rest show at most."""
+
+REST_PARTS: Final = 4
+"""Parts of a record at rest whose means agree."""
+
+REST_DRIFT: Final = 4.0
+"""Standard errors by which such means may differ."""
+
+EDGE_SHARE: Final = 0.95
+"""Share of the lines that are one count from the line before, at edges."""
+
+FEWEST_EDGES: Final = 50
+"""Readings from which edges are recognised."""
 
 
 def check(work: Work) -> None:
-    """Say where readings are too few for the drive or a fit, and swings too small for the gain."""
+    """Report too few readings for a fit or the drive, and swings too small for the gain."""
     _few(work)
     _drive(work)
     if work.plan.kind == "free" and work.made_of is None and not work.integrated:
@@ -40,12 +72,13 @@ def check(work: Work) -> None:
 
 
 def _few(work: Work) -> None:
+    """Report a run of which a fit uses few readings in motion."""
     moving = np.ones(work.time.size, bool)
     for part in work.segments:
         if part.what in RESTING:
             moving &= (work.time < part.from_s) | (work.time > part.to_s)
     used, whole = int(work.trusted.sum()), int((moving | work.trusted).sum())
-    if 0 < used < USED * whole:
+    if 0 < used < LEAST_USED * whole:
         text = (
             f"only {used} of {counted(whole, 'reading')} in motion are for fitting: what is fitted "
             "says little about the others"
@@ -54,28 +87,30 @@ def _few(work: Work) -> None:
 
 
 def _drive(work: Work) -> None:
+    """Report a sampling rate that does not resolve the drive."""
     omega = (work.plan.drive or {}).get("Omega")
     if not omega:
         return
     rate = 1 / float(np.median(np.diff(work.time)))
     drive = float(omega) / math.tau
-    if rate >= RESOLVED * drive:
+    if rate >= NYQUIST * drive:
         return
     slow = abs(drive - rate * round(drive / rate))
     text = (
         f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a "
-        f"period do not resolve it, {RESOLVED:g} and more would; it looks like one of "
+        f"period do not resolve it, {NYQUIST:g} and more would; it looks like one of "
         f"{slow:.3g} Hz"
     )
     work.say("drive-unresolved", text)
 
 
 def _gain(work: Work) -> None:
+    """Report small swings that do not show the gain of the sensor."""
     gain = gain_of(work)
     if gain is None:
         return
     low, high = gain
-    if high - low <= 2 * KNOWN:
+    if high - low <= 2 * GAIN_KNOWN:
         return
     between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
     text = (
@@ -85,24 +120,17 @@ def _gain(work: Work) -> None:
     work.say("gain-unknown", text)
 
 
-# The step that a sensor's readings come in, and what it does to the noise of a mean.
-
-
-LATTICE: Final = 0.12
-"""Root mean square distance from multiples of a step, in steps, that shows it; 0.29 is chance."""
-
-
 def step_of(theta: Floats) -> float:
-    """Return the step that readings come in, rad; 0 where there is none to be seen.
+    """Return the step of readings, rad; 0 where none is seen.
 
-    The least distance between different readings is tried, then refined by all of them; a step is
-    believed where the readings repeat and lie on its multiples.
+    The least distance between different readings is refined by all; it is a step if readings repeat
+    and lie on its multiples.
     """
     values = np.unique(np.round(theta, 12))
     if values.size < 3 or values.size > 0.7 * theta.size:
         return 0.0
     apart = np.diff(values)
-    # Written digits round multiples of a step: neighbours differ by it, give or take a digit.
+    # Written digits round multiples of a step: neighbours differ by the step and a digit.
     least = float(np.quantile(apart, 0.02))
     near = apart[(apart >= 0.5 * least) & (apart < 1.5 * least)]
     step = float(np.median(near)) if near.size else least
@@ -116,77 +144,37 @@ def step_of(theta: Floats) -> float:
     phase = np.angle(np.mean(np.exp(2j * np.pi * away))) / (2 * np.pi)
     away = away - phase
     away -= np.round(away)
-    return step if float(np.sqrt(np.mean(away**2))) < LATTICE else 0.0
+    return step if float(np.sqrt(np.mean(away**2))) < ON_STEPS else 0.0
 
 
 def levels_shared(theta: Floats, step: float) -> float:
-    """Return how much larger the noise of a mean is because readings share their step.
+    """Return the factor by which a shared step increases the noise of a mean.
 
-    Readings on one step have one error: three independent ones are counted for each step that is
-    seen.
+    Readings on one step share an error: three independent ones are counted for each step.
     """
     levels = np.unique(np.round(theta / step)).size
     return math.sqrt(max(theta.size / (3 * max(levels, 1)), 1.0))
 
 
-# The noise of a sensor that shows a few counts of one angle.
-#
-# At rest a sensor whose noise is less than a count goes to and fro between two or three. How often
-# it
-# shows each depends on where between two edges the angle is, ``x``, and on the noise ``s`` before
-# the
-# rounding: ``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. The root mean
-# square
-# of such readings is anything from 0 to half a count. Three counts tell ``x`` and ``s``; two leave
-# a
-# range of both, over which is averaged, all ``x`` and all ``log s`` being as likely before.
-
-
-SPREADS: Final = np.geomspace(0.02, 1.0, 80)
-"""Noise before the rounding that is tried, in counts; beyond, readings are as those of a value."""
-
-PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5
-"""Places of the angle between the edges of its count."""
-
-MOST: Final = 9
-"""Counts that are shown at most."""
-
-PARTS: Final = 4
-"""Parts of a record whose means agree where nothing moves."""
-
-SURE: Final = 4.0
-"""Standard errors by which they may differ."""
-
-
 def still_noise(theta: NDArray[np.float64], count: float) -> tuple[float, float] | None:
-    """Return the noise of readings of one angle, the rounding included, and its standard error.
+    """Return the noise of readings at rest, rounding included, and its standard error, rad.
 
-    Parameters
-    ----------
-    theta : ndarray of float, shape (N,)
-        Readings, rad.
-    count : float
-        The step of the readings, rad.
-
-    Returns
-    -------
-    tuple of float, or None
-        Both in rad: mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. None where one
-        count alone is shown, or something moves.
+    These are mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. Returns None where one
+    count alone is shown, or something moves.
     """
     from scipy.special import log_ndtr, logsumexp, ndtr
 
     steps = np.rint((theta - np.median(theta)) / count).astype(int)
     low, high = int(steps.min()), int(steps.max())
-    if low == high or high - low >= MOST:
+    if low == high or high - low >= MOST_COUNTS:
         return None
-    error = float(np.std(steps)) * math.sqrt(PARTS / steps.size)
-    means = [float(np.mean(part)) for part in np.array_split(steps, PARTS)]
-    if max(means) - min(means) > 2 * SURE * error:
+    error = float(np.std(steps)) * math.sqrt(REST_PARTS / steps.size)
+    means = [float(np.mean(part)) for part in np.array_split(steps, REST_PARTS)]
+    if max(means) - min(means) > 2 * REST_DRIFT * error:
         return None
     shown = np.bincount(steps - low)
     centre = int(np.argmax(shown)) + low
-    # Above the middle of a count the far tail is the smaller: digits are kept there.
+    # Above the middle of a count the smaller tail is computed, which keeps digits.
     level = np.arange(low, high + 1)[:, None, None] - centre - PLACES[None, :, None]
     far, near = (np.abs(level) + side for side in (0.5, -0.5))
     spread = SPREADS[None, None, :]
@@ -199,3 +187,46 @@ def still_noise(theta: NDArray[np.float64], count: float) -> tuple[float, float]
     sigma = np.sqrt(SPREADS**2 + 1 / 12)
     mean = float(weight @ sigma)
     return count * mean, count * math.sqrt(float(weight @ (sigma - mean) ** 2))
+
+
+def logs_edges(theta: Floats) -> bool:
+    """Return whether nearly every reading is one count from the one before it."""
+    good = theta[np.isfinite(theta)]
+    step = step_of(good) if good.size >= FEWEST_EDGES else 0.0
+    if not step:
+        return False
+    return bool(np.mean(np.abs(np.abs(np.diff(good)) / step - 1) < 0.25) > EDGE_SHARE)
+
+
+def spread_stamps(time: Floats) -> Floats:
+    """Return times of which those that share a stamp fill its tick evenly, s, shape (N,)."""
+    stamps, first, number = np.unique(time, return_index=True, return_counts=True)
+    tick = float(np.min(np.diff(stamps))) if stamps.size > 1 else 0.0
+    place = np.arange(time.size) - np.repeat(first, number)
+    share = (place + 0.5) / np.repeat(number, number) - 0.5
+    return np.asarray(time + share * tick)
+
+
+def put_on_edges(work: Work) -> None:
+    """Put the readings of a log of edges on the edges."""
+    if work.plan.pivot is not None or not logs_edges(work.theta):
+        return
+    step = step_of(work.theta)
+    way = np.sign(np.round(np.diff(work.theta) / step))
+    work.edges, work.seen = True, step
+    # A log of the edges themselves shows an edge twice at a turning point.
+    if np.count_nonzero(way == 0) <= np.count_nonzero(way[1:] * way[:-1] < 0):
+        work.theta[1:] -= 0.5 * step * way
+        work.theta[0] -= 0.5 * step * way[0]
+        work.trusted[0] = False  # it may be what stood there as the log began
+
+
+def say_edges(work: Work) -> None:
+    """Report that the readings are edges, once their unit is certain."""
+    if work.edges:
+        text = (
+            f"an encoder of {2 * math.pi / work.seen:.5g} counts a turn writes a line at each edge:"
+            f" the angles are those of {counted(work.theta.size, 'edge')}, their errors those of"
+            " the stamps; none is missing between two of them"
+        )
+        work.say("edges-logged", text, mended=True)

@@ -1,12 +1,13 @@
-"""Where an accelerometer sits on the rod, and what it reads there.
+"""Accelerometers and gyroscopes on the rod, and what they read there.
 
-It measures the specific force, acceleration less gravity. At the distance r from the pivot that is
+An accelerometer measures acceleration less gravity. At the distance r from the pivot that is
 
     tangential, toward positive theta    r th'' + g sin(th)
     radial, toward the pivot             r th'^2 + g cos(th)
 
-and where the phone has taken gravity out ("linear acceleration") the same without g. An angular
-acceleration th'' (two sensors, or a differentiated gyroscope) needs no place.
+and without g if the phone removes gravity ("linear acceleration"). An angular acceleration th''
+needs no place. A gyroscope reads th' and a bias; white noise of the rate is a random walk of its
+integral, so that a fit compares the rate.
 """
 
 from __future__ import annotations
@@ -30,18 +31,25 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-LIKE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
-"""What a place looks like in [columns]."""
+PLACE_EXAMPLE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
+"""Example of a place in [columns]."""
 
 DIRECTIONS: Final = ("tangential", "radial", "angular")
-_LONGEST: Final = 100.0
+_FARTHEST: Final = 100.0
+"""Distance of a sensor from the pivot at most, m."""
 
 Direction = Literal["tangential", "radial", "angular"]
+
+OVER_THE_TOP: Final = 4 * math.pi
+"""Radians from the middle from which a record turns over the top."""
+
+FEWEST_PEAKS: Final = 4
+"""Turning points from which a drift is taken."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """What [columns] says of an accelerometer, as far as it says it."""
+    """Place of an accelerometer as [columns] gives it."""
 
     direction: Direction | None = None
     distance_m: float | None = None
@@ -50,45 +58,26 @@ class Place:
 
 @dataclasses.dataclass(frozen=True)
 class Accelerometer:
-    """An accelerometer on the rod whose place is known.
+    """An accelerometer on the rod whose place is known."""
 
-    Parameters
-    ----------
-    direction : str
-        ``"tangential"`` (toward positive theta), ``"radial"`` (toward the pivot) or ``"angular"``.
-    distance_m : float
-        From the pivot, m; 1 of an angular acceleration, whose readings are rad/s^2.
-    gravity : float
-        m/s^2; 0 where the readings are without it.
-    w0 : float
-        Natural frequency as the zero crossings of the readings show it, rad/s: it makes angles of
-        small readings. Not a number where no angle was made.
-    """
-
-    direction: Direction
-    distance_m: float
-    gravity: float
-    w0: float = math.nan
+    direction: Direction  # toward positive theta, toward the pivot, or about it
+    distance_m: float  # from the pivot; 1 of an angular acceleration
+    gravity: float  # m/s^2; 0 where the readings are without it
+    w0: float = math.nan  # rad/s, from crossings; NaN where no angle was made
 
     @property
     def gain(self) -> float:
-        """Reading of a small free swing over its angle, ``g - r w0**2``; m/s^2 (or rad/s^2)."""
+        """Reading of a small free swing over its angle, ``g - r w0**2``; m/s^2 or rad/s^2."""
         return self.gravity - self.distance_m * self.w0**2
 
     @property
     def unit(self) -> str:
-        """Of the readings."""
+        """Unit of the readings."""
         return "rad/s2" if self.direction == "angular" else "m/s2"
 
 
 def place_of(table: Mapping[str, object], where: str) -> Place:
-    """Return what a table of [columns] says of the place.
-
-    Raises
-    ------
-    InputError
-        If a value is none that it may be, or two exclude each other.
-    """
+    """Return the place in a table of [columns]; raise InputError for values not allowed."""
     direction, distance = table.get("direction"), table.get("distance_m")
     removed = table.get("gravity_removed")
     if direction is not None and direction not in DIRECTIONS:
@@ -97,9 +86,9 @@ def place_of(table: Mapping[str, object], where: str) -> Place:
         raise InputError(f"{where}: direction must be one of {known}, got {shown}")
     if distance is not None:
         distance = check_number(f"{where}: distance_m", distance)
-        if not 0 < distance <= _LONGEST:
+        if not 0 < distance <= _FARTHEST:
             raise InputError(
-                f"{where}: distance_m must be more than 0, up to {_LONGEST:g}, from the pivot to"
+                f"{where}: distance_m must be more than 0, up to {_FARTHEST:g}, from the pivot to"
                 f" the sensor in m, got {distance:g}"
             )
     if removed is not None:
@@ -122,20 +111,9 @@ def place_of(table: Mapping[str, object], where: str) -> Place:
 def accelerometer_of(
     place: Place, unit: str | None, heading: str, gravity: float, *, scaled: bool
 ) -> tuple[Accelerometer | None, str]:
-    """Return the accelerometer of a column, or why its place is not known.
+    """Return the accelerometer of a column, or the keys that its place lacks.
 
-    Parameters
-    ----------
-    place : Place
-        What [columns] says.
-    unit : str or None
-        Of the readings, as [columns] or the heading has it.
-    heading : str
-        Of the column: a "linear acceleration" is one without gravity.
-    gravity : float
-        m/s^2.
-    scaled : bool
-        Whether [columns] gives a scale.
+    ``heading`` may say "linear acceleration", without gravity; ``gravity`` is in m/s^2.
     """
     direction = place.direction
     if direction is None and not scaled and unit and spelling(unit) in ANGULAR_ACCELERATIONS:
@@ -152,36 +130,12 @@ def accelerometer_of(
     return Accelerometer(direction, place.distance_m, 0.0 if removed else gravity), ""
 
 
-# A gyroscope alone: the angle that its rate integrates to, and what is not known of the sensor.
-#
-# It reads th' and a bias. White noise of the rate becomes a random walk of the integrated angle,
-# which no independent errors describe: a fit compares the rate, and the angle made here is where it
-# begins and what pictures show.
-
-
-OVER: Final = 4 * math.pi
-"""Radians from the middle from which a record turns over the top."""
-
-FEWEST: Final = 4
-"""Turning points that a drift is taken from."""
-
-
 @dataclasses.dataclass(frozen=True)
 class Gyroscope:
-    """A gyroscope of whose readings alone the angle was made.
+    """A gyroscope from whose readings alone the angle was made."""
 
-    Parameters
-    ----------
-    w0 : float
-        Natural frequency, rad/s, as speeds in the middle of swings show it beside their angles: it
-        makes angles of readings.
-    bias : float
-        What it reads of nothing, rad/s, as the integrated angle drifts; not a number where no drift
-        was told from the motion. The fit has a bias of its own.
-    """
-
-    w0: float
-    bias: float = math.nan
+    w0: float  # rad/s, from speeds in the middle of swings
+    bias: float = math.nan  # rad/s, from the drift of the angle; NaN without one
 
     @property
     def gain(self) -> float:
@@ -190,25 +144,18 @@ class Gyroscope:
 
     @property
     def unit(self) -> str:
-        """Of the readings."""
+        """Unit of the readings."""
         return "rad/s"
 
 
 def angle_of_rate(time: Floats, rate: Floats, good: NDArray[np.bool_] | None = None) -> Floats:
-    """Return the integral of a rate, rad, shape (N,): its zero is the middle of the swing.
+    """Return the integral of a rate, rad, shape (N,); 0 is the middle of the swing.
 
-    A straight line that the sensor's bias adds is taken out. Of a record that turns over the top
-    neither is seen: there the last angle is 0.
-
-    Parameters
-    ----------
-    time, rate : ndarray, shape (N,)
-        s, increasing; rad/s.
-    good : ndarray of bool, shape (N,), optional
-        Which readings are not false; a spline passes the others over.
+    The line that the bias adds is removed. Of a record over the top the last angle is 0. A spline
+    replaces readings that are not ``good``.
     """
     theta = _integral(time, rate, good)
-    if np.ptp(theta - np.median(theta)) > OVER:
+    if np.ptp(theta - np.median(theta)) > OVER_THE_TOP:
         return np.asarray(theta - theta[-1])
     middle = _middles(time, theta)
     if middle is None:
@@ -218,16 +165,17 @@ def angle_of_rate(time: Floats, rate: Floats, good: NDArray[np.bool_] | None = N
 
 
 def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
-    """Return what a rate and the angle of :func:`angle_of_rate` say of the sensor."""
+    """Return the gyroscope that a rate and the angle of :func:`angle_of_rate` show."""
     found = swings(time, theta)
     bias = math.nan
-    if np.ptp(theta - np.median(theta)) <= OVER and found.peak_time.size >= FEWEST:
-        # A line was taken out: by its slope readings are above the angle's own, but for false ones.
+    if np.ptp(theta - np.median(theta)) <= OVER_THE_TOP and found.peak_time.size >= FEWEST_PEAKS:
+        # The removed line has the slope of the bias; the median ignores false readings.
         bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
     return Gyroscope(_frequency(found, time, np.abs(rate - np.nan_to_num(bias))), bias)
 
 
 def _integral(time: Floats, rate: Floats, good: NDArray[np.bool_] | None) -> Floats:
+    """Return the integral of a rate by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
     if good is not None and np.count_nonzero(good) > 1:
@@ -241,16 +189,16 @@ def _middles(time: Floats, theta: Floats) -> tuple[Floats, Floats] | None:
     """Return times and values halfway between turning points of either side."""
     trend = np.polyval(np.polyfit(time, theta, 1), time)
     found = swings(time, theta - trend)
-    if found.peak_time.size < FEWEST:
+    if found.peak_time.size < FEWEST_PEAKS:
         return None
     peaks = found.peak + np.interp(found.peak_time, time, trend)
-    # Halves of (1, 2, 1): what the decay does to a plain mean of two turns cancels.
+    # Weights (1, 2, 1) cancel the bias that the decay gives to a mean of two turns.
     value = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
     return found.peak_time[1:-1], value
 
 
 def _frequency(found: Swings, time: Floats, speed: Floats) -> float:
-    """Return ``w0`` from the energy of swings: th' = 2 w0 sin(A/2) where they pass the middle."""
+    """Return ``w0`` from the energy of swings: th' = 2 w0 sin(A/2) in the middle."""
     size = np.abs(found.peak)
     middle = (size[:-1] + size[1:]) / 2
     swung = (size[:-1] < math.pi) & (size[1:] < math.pi)

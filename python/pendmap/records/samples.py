@@ -1,4 +1,8 @@
-"""Samples that lie: readings that clip or freeze; the step they come in."""
+"""Samples that are no readings: drawn between readings, clipped, frozen; the step of readings.
+
+Between two readings a resampled record is a polynomial of low degree: differences of the next order
+vanish there, at the same places in every interval, and not across a reading.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +14,13 @@ import numpy as np
 
 from pendmap.formatting import counted
 from pendmap.records import outliers
-from pendmap.records.noise import noise_of
+from pendmap.records.noise import DITHERED, FARTHEST, fastest, noise_of
 from pendmap.records.outliers import find_spikes
 from pendmap.records.resolution import step_of
 from pendmap.records.rod_sensors import angle_of_rate
 from pendmap.records.swinging import swinging
-from pendmap.signal.robust import equal_runs
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import equal_runs, normal_scale
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,23 +30,53 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-SAME: Final = 5
-"""Equal readings in a row that may be a clipped or frozen sensor."""
+EQUAL_READINGS: Final = 5
+"""Equal readings in a row that may be clipped or frozen."""
 
 FINEST: Final = 3e-5
-"""A step under this, in rad, says nothing: it is how many digits were written."""
+"""Steps in rad below which they are written digits."""
 
-FIT: Final = 3.0
-"""What is left over by a parabola, times which a motion must go beyond a plateau."""
+BEYOND_FIT: Final = 3.0
+"""Residuals of a parabola by which a motion exceeds a clipped plateau."""
 
-PLAIN: Final = 0.05
-"""Share of the whole way that no step of readings hides: what goes beyond is cut off."""
+CLEARLY_CUT: Final = 0.05
+"""Share of the span from which a motion beyond a plateau is clipped."""
+
+VANISHING_ORDER: Final = {"held": 1, "straight lines": 2, "cubics": 4}
+"""Order of the differences that vanish between readings, by kind of interpolation."""
+
+VANISHED: Final = 0.1
+"""Differences between readings over those across from which they vanish."""
+
+FEWEST_SAMPLES: Final = 200
+"""Samples from which interpolation is searched."""
+
+INTERVALS: Final = 60
+"""Intervals between readings that are examined."""
+
+READINGS_A_PERIOD: Final = 5.0
+"""Readings a period at least; fewer confuse phases with places."""
+
+SMOOTH_NEIGHBOURS: Final = 0.3
+"""Noise of neighbours over the most at any spacing that interpolation leaves."""
+
+INDEPENDENT: Final = 0.7
+"""Noise over the most at any spacing from which readings are independent."""
+
+DIGITS: Final = 3e-6
+"""Noise over the span below which it is that of digits."""
+
+FOLLOWED: Final = 1.3
+"""Residual of a quartic over that of a sextic from which motion is left."""
+
+_EVEN: Final = 1e-3
+"""Relative error of an even interval."""
 
 
 def check(work: Work) -> None:
-    """Mark what is not for fitting, mend missed counts that are certain, and say so."""
+    """Mark clipped, frozen and false samples, correct missed counts, and report all."""
     if work.made_of is not None:
-        # What may be false is the acceleration: the angle made of it has corners of its own.
+        # The acceleration is checked: the angle made of it has corners.
         readings = work.extra["acceleration"]
         moves = swinging(work.time, readings, noise_of(work.time, readings).sigma)
         find_spikes(work, readings, work.made_of.unit, moves.free)
@@ -61,7 +96,7 @@ def check(work: Work) -> None:
 
 
 def _count(work: Work) -> float:
-    """Return the step of the readings: as it is known, or as it can be seen."""
+    """Return the step of the readings as known or as seen, rad."""
     counts = work.known.get("encoder_counts")
     if counts is None:
         return work.seen
@@ -70,7 +105,7 @@ def _count(work: Work) -> float:
 
 
 def say_steps(work: Work) -> None:
-    """Say what steps the readings come in, once their unit is certain."""
+    """Report the step of the readings, once their unit is certain."""
     if work.integrated or work.edges:
         return  # an integral has none; of edges they are said already
     counts, seen = work.known.get("encoder_counts"), work.seen
@@ -89,19 +124,19 @@ def say_steps(work: Work) -> None:
 
 
 def _clipped(work: Work, unit: str) -> None:
-    """Mark plateaus at the ends of the range that the motion runs into at speed."""
+    """Mark plateaus at the ends of the range that the motion reaches at speed."""
     marked = np.zeros(work.theta.size, bool)
     ends = []
     for end in (float(work.theta.max()), float(work.theta.min())):
-        low, high = equal_runs(work.theta, SAME)
+        low, high = equal_runs(work.theta, EQUAL_READINGS)
         ended = np.abs(work.theta - end) <= 1e-9 * max(abs(end), 1.0)
         hits = [
             (a, b)
             for a, b in zip(low[ended[low]], high[ended[low]], strict=True)
-            if a > 0 and b < work.theta.size and b - a > SAME - 0.5
+            if a > 0 and b < work.theta.size and b - a > EQUAL_READINGS - 0.5
             if _abrupt(work, a, b) and _cut_off(work, a, b)
         ]
-        if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * SAME):
+        if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * EQUAL_READINGS):
             ends.append(f"{end:.4g}")
             marked |= ended  # the shorter ones, too
     if marked.any():
@@ -115,12 +150,12 @@ def _clipped(work: Work, unit: str) -> None:
 
 
 def _cut_off(work: Work, low: int, high: int) -> bool:
-    """Whether the motion on both sides goes on beyond a plateau, by a parabola through them."""
+    """Return whether a parabola through both sides exceeds a plateau."""
     if low < 3 or work.theta.size - high < 3:
         return False
-    if _missed(work, low, high) > PLAIN * float(np.ptp(work.theta)):
+    if _missed(work, low, high) > CLEARLY_CUT * float(np.ptp(work.theta)):
         return True
-    begin, end = equal_runs(work.theta, SAME)
+    begin, end = equal_runs(work.theta, EQUAL_READINGS)
     reach = max(high - low, 4)
     first = max(low - reach, int(np.max(end[end < low], initial=0)))
     last = min(high + reach, int(np.min(begin[begin > high], initial=work.theta.size)))
@@ -132,12 +167,12 @@ def _cut_off(work: Work, low: int, high: int) -> bool:
     answer = np.polyfit(time, away, 2)
     noise = float(np.sqrt(np.mean((away - np.polyval(answer, time)) ** 2)))
     beyond = float(answer[2]) * -math.copysign(1, float(np.median(away)))
-    return beyond > 2 * work.count + FIT * noise
+    return beyond > 2 * work.count + BEYOND_FIT * noise
 
 
 def _frozen(work: Work) -> None:
     """Mark stretches without change in the middle of a motion."""
-    low, high = equal_runs(work.theta, SAME)
+    low, high = equal_runs(work.theta, EQUAL_READINGS)
     marked = np.zeros(work.theta.size, bool)
     for a, b in zip(low, high, strict=True):
         if a < 3 or b > work.theta.size - 3 or not work.trusted[a]:
@@ -155,17 +190,16 @@ def _frozen(work: Work) -> None:
 
 
 def _abrupt(work: Work, low: int, high: int) -> bool:
-    """Whether a plateau is flatter than a turn can be.
+    """Return whether a plateau is flatter than a turn can be.
 
-    Before a turn with velocity v and after a time tau the angle is within v tau/2 of its extreme:
-    a sensor with steps shows a plateau where that is a step or so.
+    With speed v beside it, a turn is within v tau/2 of its extreme after a time tau.
     """
     noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
     return _missed(work, low, high) > 2 * work.count + 3 * min(noise, 0.01)
 
 
 def _missed(work: Work, low: int, high: int) -> float:
-    """Return how far a motion goes during a plateau, by its speed beside it, rad."""
+    """Return how far the motion goes during a plateau, by its speed beside it, rad."""
     before = slice(max(low - 4, 0), low)
     after = slice(high, high + 4)
     slopes = [
@@ -177,3 +211,103 @@ def _missed(work: Work, low: int, high: int) -> float:
         return -1.0
     half = float(work.time[high - 1] - work.time[low]) / 2
     return min(slopes) * half / 2
+
+
+@dataclasses.dataclass(frozen=True)
+class Resampled:
+    """Where the readings of a resampled record are."""
+
+    made: str  # a key of VANISHING_ORDER; empty where only the noise shows it
+    ratio: int  # samples a reading
+    places: NDArray[np.intp]
+
+
+def measured(time: Floats, theta: Floats) -> Resampled | None:
+    """Return where the readings of a record are, if most samples are drawn between them.
+
+    Returns None where every sample may be a reading: uneven times, no whole ratio, equal
+    differences.
+    """
+    if theta.size < FEWEST_SAMPLES or np.ptp(theta) == 0:
+        return None
+    steps = np.diff(time)
+    interval = float(np.median(steps))
+    if np.max(np.abs(steps / interval - 1)) > _EVEN:
+        return None
+    quickest = fastest(time, theta, 0.005 * float(np.ptp(theta)))[0]
+    most = int(min(math.tau / (READINGS_A_PERIOD * quickest * interval), theta.size / 20))
+    begin = int(np.argmax(np.abs(theta - theta[0]) > 0.05 * np.ptp(theta)))
+    for made, order in VANISHING_ORDER.items():
+        # Divisors of a ratio show it as well: the largest is taken.
+        for ratio in range(most, order, -1):
+            if _share(theta[begin:], ratio, order)[0] < VANISHED:
+                share, first = _share(theta, ratio, order, blocks=theta.size)
+                if share < VANISHED:
+                    return Resampled(made, ratio, np.arange(first, theta.size, ratio))
+    stride = _independent(time[begin:], theta[begin:], FARTHEST / (quickest * interval))
+    return Resampled("", stride, np.arange(0, theta.size, stride)) if stride > 1 else None
+
+
+def _share(theta: Floats, ratio: int, order: int, blocks: int = INTERVALS) -> tuple[float, int]:
+    """Return the difference within an interval over the largest; the place of the reading."""
+    stride = ratio // (order + 1)
+    change = theta[: blocks * ratio + order * stride]
+    for _ in range(order):
+        change = change[stride:] - change[:-stride]
+    count = change.size // ratio
+    if count < 10:
+        return 1.0, 0
+    sizes = np.abs(change[: count * ratio]).reshape(count, ratio).mean(axis=0)
+    # The last sample of a held reading differs from the next.
+    alike = ratio - order * stride + (0 if order == 1 else 1)
+    around = np.concatenate((sizes, sizes[: alike - 1]))
+    within = np.lib.stride_tricks.sliding_window_view(around, alike).max(axis=1)
+    first, largest = int(np.argmin(within)), float(sizes.max())
+    return (float(within[first]) / largest if largest > 0 else 1.0), first
+
+
+def _independent(time: Floats, theta: Floats, farthest: float) -> int:
+    """Return the spacing in samples from which the noise no longer grows; 1 if it does not."""
+    strides = [1 << k for k in range(12) if 1 << k <= min(farthest, theta.size / FEWEST_SAMPLES)]
+    noise, whole = [], []
+    for stride in strides:
+        part = slice(0, max(10, 2 * stride) * FEWEST_SAMPLES)
+        t, x = time[part], theta[part]
+        low, high = (
+            normal_scale(local_fit(t, x, degree=degree, points=points, stride=stride).residual)
+            for degree, points in ((4, 9), (6, 11))
+        )  # fmt: skip
+        # Motion is left by a quartic but not by a sextic.
+        noise.append(high if low < FOLLOWED * high else 0.0)
+        whole.append(high)
+    most = max(noise, default=0.0)
+    count = step_of(theta)
+    if (
+        most <= max(DITHERED * count, DIGITS * float(np.ptp(theta)))
+        or whole[0] > SMOOTH_NEIGHBOURS * most
+    ):
+        return 1
+    return strides[next((k for k, one in enumerate(noise) if one > INDEPENDENT * most), 0)]
+
+
+def keep_readings(work: Work) -> None:
+    """Keep the readings of a record with samples drawn between them, and report it."""
+    found = measured(work.time, work.theta)
+    if found is None or not found.made:
+        return
+    samples = work.time.size
+    rate = (samples - 1) / float(work.time[-1] - work.time[0])
+    how = "each held" if found.made == "held" else f"{found.made} between"
+    text = f"the record repeats {_hertz(rate / found.ratio)} at {_hertz(rate)}, {how}"
+    if work.pivot() is not None:
+        # The pivot may have been read at every sample.
+        work.say("interpolated", f"{text}: errors that count samples are too small")
+        return
+    work.keep(found.places)
+    kept = counted(found.places.size, "reading")
+    work.say("interpolated", f"{text}: {kept} kept of {samples} samples", mended=True)
+
+
+def _hertz(rate: float) -> str:
+    """Return a frequency in words."""
+    return f"{rate / 1000:.4g} kHz" if rate >= 1000 else f"{rate:.4g} Hz"

@@ -1,10 +1,9 @@
-"""The scale of angle and time, from what only a pendulum does: its period grows with its swing.
+"""Scale and zero of a record, from the period of a pendulum, which grows with its swing.
 
     T(A) = T0 (2/pi) K(sin(A/2))
 
-A pendulum of 1 rad takes 6.6 % longer for a period than one of small swings. Readings in degrees
-that are taken for radians show the period of a small swing at all sizes, and sizes that no swing
-has.
+A swing of 1 rad has a period 6.6 % longer than a small one. Degrees taken for radians show no
+growth, and sizes that no swing has.
 """
 
 from __future__ import annotations
@@ -29,55 +28,65 @@ if TYPE_CHECKING:
 
 DEGREE: Final = math.pi / 180
 
-LONGEST: Final = 60.0
-"""Seconds of a period that no pendulum in a laboratory has: it would hang 900 m high."""
+LONGEST_PERIOD: Final = 60.0
+"""Seconds of a pendulum period at most in a laboratory."""
 
-SHORTEST: Final = 0.02
-"""Seconds of a period that no pendulum has: 0.1 mm of length."""
+SHORTEST_PERIOD: Final = 0.02
+"""Seconds of a pendulum period at least: 0.1 mm of length."""
 
-SAMPLES: Final = 8.0
-"""Samples a period under which the shape of a swing is lost; 2 are the least of any frequency."""
+SAMPLES_A_PERIOD: Final = 8.0
+"""Samples a period below which sampling is slow."""
 
-UNLIKE: Final = 0.25
-"""Share by which a period may miss what is known of the rig: a starting value may be wrong."""
+UNLIKE_RIG: Final = 0.25
+"""Relative difference of the period from that of [rig] that is reported."""
 
-FEWEST: Final = 6
-"""Periods that a relation is taken from."""
+FEWEST_PERIODS: Final = 6
+"""Periods from which a relation is taken."""
 
-LARGEST: Final = 3.0
-"""Swings, rad, up to which the period grows smoothly: near the top it does without bounds."""
+LARGEST_SWING: Final = 3.0
+"""Swings in rad up to which the growth of the period is used."""
 
-LEAST: Final = 1e-3
-"""Share by which a factor errs at least: a swing shrinks within the period that it is seen for."""
+LEAST_ERROR: Final = 1e-3
+"""Relative error of a factor at least."""
 
 Z95: Final = 1.959963984540054
 """The 97.5 % point of the standard normal distribution."""
 
+FAR_ZERO: Final = 0.15
+"""Radians from 0 at which friction alone (Tr/w0^2) holds no pendulum."""
+
+OFF_QUARTER: Final = 0.1
+"""Radians by which a turned gauge may miss a multiple of 90 degrees."""
+
+CERTAIN_MIDDLE: Final = 10
+"""Half cycles about one middle that make it certain."""
+
+AT_REST: Final = 0.02
+"""Span of the last tenth over the whole, at rest."""
+
+BEFORE_REST: Final = 4
+"""Half cycles before a rest that is not a hold."""
+
+MIDDLES_AGREE: Final = 0.1
+"""Share of the swing within which its middles agree."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Periods:
-    """Periods of a free swing against its size.
+    """Periods of a free swing against its size."""
 
-    Parameters
-    ----------
-    amplitude : ndarray, shape (M,)
-        Of the reading, from its middle.
-    period : ndarray, shape (M,)
-        s.
-    """
-
-    amplitude: Floats
-    period: Floats
+    amplitude: Floats  # of the reading, from its middle, shape (M,)
+    period: Floats  # s, shape (M,)
 
     @property
     def small(self) -> float:
-        """The period of the smallest swings, s: the median of the last third by size."""
+        """The median period of the smallest third of the swings, s."""
         third = np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
         return float(np.median(self.period[third]))
 
 
 def check(work: Work) -> None:
-    """Mend milliseconds and degrees where nothing else is possible; say what does not agree."""
+    """Correct milliseconds and degrees where nothing else is possible; report disagreements."""
     if work.plan.kind != "free":
         _slow_sampling(work, None)
         return
@@ -95,25 +104,15 @@ def check(work: Work) -> None:
 
 
 def periods_of(work: Work, middle: float) -> Periods | None:
-    """Return the periods of a record about its middle; none where there are too few."""
+    """Return the periods of a record about its middle; None where there are too few."""
     good = work.trusted
     return _periods(work.time[good], work.theta[good] - middle, work.count)
 
 
 def small_period(time: Floats, theta: Floats, count: float) -> float:
-    """Return the period of small swings, s, by the swings of a free record about its middle.
+    """Return the period of small swings of a free record, s.
 
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s, and rad.
-    count : float
-        The step of the readings, rad.
-
-    Returns
-    -------
-    float
-        No number where there are too few swings, or none of less than half a turn.
+    Returns NaN where there are too few swings, or none below half a turn.
     """
     middle = middle_of(time, theta)
     found = _periods(time, theta - (0.0 if middle is None else middle), count)
@@ -123,7 +122,7 @@ def small_period(time: Floats, theta: Floats, count: float) -> float:
 
 
 def _small(found: Periods) -> float:
-    """Return the period of small swings, by how that of the smallest ones has grown."""
+    """Return the period of small swings, s, from the smallest ones and their growth."""
     if float(np.min(found.amplitude)) >= math.pi:
         return found.small
     smallest = found.amplitude[np.argsort(found.amplitude)[: max(found.period.size // 3, 1)]]
@@ -131,34 +130,35 @@ def _small(found: Periods) -> float:
 
 
 def _periods(time: Floats, theta: Floats, count: float) -> Periods | None:
+    """Return the periods of readings about 0; None where there are too few."""
     start = after_turns(theta)
     time, theta = time[start:], theta[start:]
-    if time.size < 4 * FEWEST:
+    if time.size < 4 * FEWEST_PERIODS:
         return None
     noise = float(np.median(np.abs(np.diff(theta, 2)))) if theta.size > 2 else 0.0
     reach = float(np.quantile(np.abs(theta), 0.98))
     least = max(2.5 * count, min(4 * noise, 0.3 * reach), 0.02 * reach)
     half = swings(time, theta, least=least)
-    if half.peak.size < FEWEST + 2:
+    if half.peak.size < FEWEST_PERIODS + 2:
         return None
     size = np.abs(half.peak)
-    # The mean of neighbours takes out a middle that is a little off, for odd and even half cycles.
+    # The weighted mean of neighbours removes a small offset of the middle.
     amplitude = (size[:-2] + 2 * size[1:-1] + size[2:]) / 4
     period = half.period
     steady = np.abs(period / np.median(period) - 1) < 0.6
     inside = steady & (amplitude > 4 * least)
-    if np.count_nonzero(inside) >= FEWEST:
+    if np.count_nonzero(inside) >= FEWEST_PERIODS:
         steady = inside
-    if np.count_nonzero(steady) < FEWEST:
+    if np.count_nonzero(steady) < FEWEST_PERIODS:
         return None
     return Periods(amplitude[steady], period[steady])
 
 
 def _seconds(work: Work, found: Periods) -> Periods:
-    """Take milliseconds (or less) for what they are."""
+    """Convert times in milliseconds or less to seconds."""
     small = found.small
     for name, factor in (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)):
-        if small <= LONGEST or not SHORTEST < small * factor < LONGEST:
+        if small <= LONGEST_PERIOD or not SHORTEST_PERIOD < small * factor < LONGEST_PERIOD:
             continue
         if "time" in work.declared:
             text = f"a period of {small:.4g} s: times look like {name}, [columns] says otherwise"
@@ -170,13 +170,13 @@ def _seconds(work: Work, found: Periods) -> Periods:
         size = factor if work.integrated else 1.0
         work.theta *= size
         return Periods(found.amplitude * size, found.period * factor)
-    if not SHORTEST < small < LONGEST:
+    if not SHORTEST_PERIOD < small < LONGEST_PERIOD:
         work.say("time-unit", f"a period of {small:.4g} s is no pendulum's: the unit is doubtful")
     return found
 
 
 def _radians(work: Work, found: Periods) -> Periods:
-    """Take degrees for what they are; say what scale the periods speak for."""
+    """Convert degrees to radians; report the scale that the periods show."""
     largest = float(np.max(found.amplitude))
     about = float(np.median(found.amplitude))
     if largest > math.pi and about > 0:
@@ -186,7 +186,11 @@ def _radians(work: Work, found: Periods) -> Periods:
         if not degrees or declared:
             work.say("angle-unit", f"{text}: the unit or the scale is wrong")
             return found
-        _rescale(work, DEGREE)
+        work.theta *= DEGREE
+        if work.integrated:
+            work.extra["velocity"] = work.extra["velocity"] * DEGREE
+        work.count *= DEGREE
+        work.seen *= DEGREE
         read = "velocities are degrees a second" if work.integrated else "angles are degrees"
         work.say("angle-unit", f"the {read}: {text}", mended=True)
         return Periods(found.amplitude * DEGREE, found.period)
@@ -194,18 +198,10 @@ def _radians(work: Work, found: Periods) -> Periods:
     return found
 
 
-def _rescale(work: Work, factor: float) -> None:
-    work.theta *= factor
-    if work.integrated:
-        work.extra["velocity"] = work.extra["velocity"] * factor
-    work.count *= factor
-    work.seen *= factor
-
-
 def _curvature(work: Work, found: Periods, largest: float) -> None:
-    """Say so where the period does not grow with the swing as a pendulum's does."""
+    """Report periods that do not grow with the swing as a pendulum's do."""
     grown = _growth(found.amplitude)
-    if largest > LARGEST or np.ptp(grown) < 2e-3 or found.period.size < FEWEST + 2:
+    if largest > LARGEST_SWING or np.ptp(grown) < 2e-3 or found.period.size < FEWEST_PERIODS + 2:
         return
     share, error = _share(found, grown)
     if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
@@ -225,9 +221,9 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
 
 
 def _share(found: Periods, grown: Floats) -> tuple[float, float]:
-    """Return how much of a pendulum's growth the periods show, with its standard error.
+    """Return the growth of the periods over a pendulum's, and its standard error.
 
-    1 for radians; readings that are k times the angle show about 1/k^2.
+    It is 1 for radians; readings that are k times the angle show about 1/k^2.
     """
     columns = np.column_stack([np.ones(grown.size), grown - 1])
     answer, spread = _robust_line(columns, found.period)
@@ -235,25 +231,14 @@ def _share(found: Periods, grown: Floats) -> tuple[float, float]:
 
 
 def gain_of(work: Work) -> tuple[float, float] | None:
-    """Return between which factors the readings are the angle, by the periods of a free run.
+    """Return the 95 % interval of reading over angle, by the periods of a free run; None without.
 
-    The motion of small swings has no scale: the period alone grows with the square of the angle.
-
-    Parameters
-    ----------
-    work : Work
-        A run whose angle is in rad about its rest.
-
-    Returns
-    -------
-    tuple of float or None
-        Ends of the interval of 95 %, the upper one infinite where nothing bounds it; none where
-        there are too few periods, or none of half a turn or less.
+    The period alone depends on the scale: it grows with the square of the angle.
     """
     good = work.trusted
     middle = middle_of(work.time[good], work.theta[good])
     found = periods_of(work, 0.0 if middle is None else middle)
-    if found is None or float(np.max(found.amplitude)) > LARGEST:
+    if found is None or float(np.max(found.amplitude)) > LARGEST_SWING:
         return None
     share, error = _share(found, _growth(found.amplitude))
     least, most = share - Z95 * error, share + Z95 * error
@@ -263,14 +248,14 @@ def gain_of(work: Work) -> tuple[float, float] | None:
 
 
 def _factor(found: Periods) -> tuple[float, float]:
-    """Return what the readings are to be multiplied by for a pendulum's periods, and its error."""
+    """Return the factor of the readings that gives a pendulum's periods, and its error."""
     best, least = 1.0, math.inf
     for factor in np.geomspace(0.01, 3.0 / float(np.max(found.amplitude)), 300).tolist():
         away = found.period / _growth(factor * found.amplitude)
         spread = normal_scale(away - np.median(away)) / float(np.median(away))
         if spread < least:
             best, least = factor, spread
-    # The grid is 2 % wide: lines about what it says find the rest.
+    # The grid has steps of 2 %: Gauss-Newton steps refine its best factor.
     error = 0.02 * best
     for _ in range(4):
         grown = _growth(best * found.amplitude)
@@ -278,7 +263,7 @@ def _factor(found: Periods) -> tuple[float, float]:
         answer, spreads = _robust_line(np.column_stack([grown, slope]), found.period)
         step = float(np.clip(answer[1] / answer[0], -0.02 * best, 0.02 * best))
         best, error = best + step, float(spreads[1] / answer[0])
-    return best, math.hypot(error, LEAST * best)
+    return best, math.hypot(error, LEAST_ERROR * best)
 
 
 def _growth(amplitude: Floats) -> Floats:
@@ -290,7 +275,7 @@ def _growth(amplitude: Floats) -> Floats:
 
 
 def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return coefficients and standard errors with outliers weighed down (Huber)."""
+    """Return coefficients and standard errors by Huber weights."""
     weights = np.ones(values.size)
     for _ in range(8):
         root = np.sqrt(weights)[:, None]
@@ -303,7 +288,7 @@ def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _known(work: Work, found: Periods) -> None:
-    """Compare the period of small swings with each thing that is known of the rig."""
+    """Compare the period of small swings with that of [rig]."""
     expected = {}
     if "w0" in work.known:
         expected[f"w0 = {work.known['w0']:g} rad/s"] = 2 * math.pi / work.known["w0"]
@@ -312,14 +297,15 @@ def _known(work: Work, found: Periods) -> None:
         expected[f"length_m = {length:g} m"] = 2 * math.pi * math.sqrt(length / gravity)
     seen = _small(found)
     for said, period in expected.items():
-        if abs(seen / period - 1) > UNLIKE:
+        if abs(seen / period - 1) > UNLIKE_RIG:
             text = f"small swings take {seen:.4g} s, by {said} {period:.4g} s: one of them is wrong"
             work.say("period-unlike-rig", text)
 
 
 def _slow_sampling(work: Work, found: Periods | None) -> None:
+    """Report sampling that is slow against the motion."""
     interval = float(np.median(np.diff(work.time)))
-    if found is not None and found.small / interval < SAMPLES:
+    if found is not None and found.small / interval < SAMPLES_A_PERIOD:
         text = f"{found.small / interval:.1f} samples a period: the shape of the swing is lost"
         work.say("sampling-slow", text)
         return
@@ -329,31 +315,8 @@ def _slow_sampling(work: Work, found: Periods | None) -> None:
         work.say("sampling-slow", text)
 
 
-# Where the reading is zero: a gauge that is turned round, a rest that is not at 0.
-
-
-FAR: Final = 0.15
-"""Radians from 0 at which no pendulum rests for friction alone (Tr/w0^2 is 0.002 to 0.02): the
-gauge has its zero elsewhere. Less is left to the fit, which estimates the offset."""
-
-QUARTER: Final = 0.1
-"""Radians by which a gauge may miss a multiple of 90 degrees and count as turned by it."""
-
-ENOUGH: Final = 10
-"""Half cycles about one middle that make it certain."""
-
-STILL: Final = 0.02
-"""Share of the whole way that the last tenth of a record stays within at rest."""
-
-CROSSED: Final = 4
-"""Half cycles about a rest, without which the end may be held by hand."""
-
-AGREE: Final = 0.1
-"""Share of the swing within which the middles of a free swing agree."""
-
-
 def middle_of(time: Floats, theta: Floats) -> float | None:
-    """Return what a free swing ends around, rad: its last quarter's, of whole half cycles."""
+    """Return the middle of the last quarter of a free swing, rad; None for larger swings."""
     start = time[0] + 0.75 * (time[-1] - time[0])
     late = theta[time >= start]
     if late.size < 20:
@@ -364,26 +327,26 @@ def middle_of(time: Floats, theta: Floats) -> float | None:
 
 
 def turn_to_rest(work: Work) -> None:
-    """Take a zero that is far from the rest to it; the rest is where a free pendulum ends."""
+    """Move a zero that is far from the rest of a free pendulum to it."""
     good = work.trusted
     middle = middle_of(work.time[good], work.theta[good])
     if middle is None:
         return
-    # Whole turns are the pendulum's own: it went over the top before.
+    # Whole turns are those of a pendulum that went over the top.
     turns = 2 * math.pi * round(middle / (2 * math.pi))
     off = middle - turns
-    if abs(off) < FAR:
+    if abs(off) < FAR_ZERO:
         return
     if not _certain(work.time[good], work.theta[good] - middle):
         text = "too few whole swings to tell what it swings about: the zero is left to the fit"
         work.say("zero-uncertain", text)
         return
-    if "angle" in work.declared and abs(off) < math.pi / 2 - QUARTER:
+    if "angle" in work.declared and abs(off) < math.pi / 2 - OFF_QUARTER:
         work.say("zero-offset", f"it swings about {off:.4g} rad: the zero that is given is off")
         return
     quarters = round(off / (math.pi / 2))
     gauge = quarters * math.pi / 2
-    if quarters and abs(off - gauge) < QUARTER:
+    if quarters and abs(off - gauge) < OFF_QUARTER:
         work.theta -= turns + gauge
         text = f"the gauge is turned by {90 * quarters} degrees: it swings about {off:.4g} rad"
         work.say("gauge-turned", f"{text}, turned back", mended=True)
@@ -394,19 +357,19 @@ def turn_to_rest(work: Work) -> None:
 
 
 def _certain(time: Floats, theta: Floats) -> bool:
-    """Whether a free swing is seen to have its middle at 0: at its rest, or by many swings."""
+    """Return whether the middle of a free swing is certainly 0: at rest, or by many swings."""
     start = after_turns(theta)
     time, theta = time[start:], theta[start:]
     if theta.size < 20:
         return False
     reach = float(np.max(np.abs(theta)))
-    peaks = swings(time, theta, least=STILL * reach).peak
+    peaks = swings(time, theta, least=AT_REST * reach).peak
     tail = theta[-max(theta.size // 10, 10) :]
-    if float(np.ptp(tail)) < STILL * reach and float(np.abs(tail).max()) < STILL * reach:
-        return peaks.size >= CROSSED
-    if peaks.size < ENOUGH:
+    if float(np.ptp(tail)) < AT_REST * reach and float(np.abs(tail).max()) < AT_REST * reach:
+        return peaks.size >= BEFORE_REST
+    if peaks.size < CERTAIN_MIDDLE:
         return False
-    peaks = peaks[-2 * ENOUGH :]
+    peaks = peaks[-2 * CERTAIN_MIDDLE :]
     middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
     size = float(np.median(np.abs(peaks)))
-    return float(np.median(np.abs(middles))) < AGREE * size
+    return float(np.median(np.abs(middles))) < MIDDLES_AGREE * size

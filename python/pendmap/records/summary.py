@@ -1,4 +1,4 @@
-"""What a record holds, as JSON and as text."""
+"""Content of a record as JSON and as text."""
 
 from __future__ import annotations
 
@@ -18,22 +18,21 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
-UNITS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
-"""Findings that a unit or a scale is wrong: unless that is mended, so is all that is fitted."""
+UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
+"""Findings of a wrong unit or scale; unless corrected, results are wrong."""
 
-DOUBTS: Final = UNITS | {"few-used", "motor-column", "rigs-differ"}
-"""Findings that are told before any number: with them a model may not be that of the records."""
+DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "motor-column", "rigs-differ"}
+"""Findings that are reported before any number."""
 
-SCALE: Final = "angle-scale"
-"""Of these the one that an effect may bring about just as well."""
+SCALE_FINDING: Final = "angle-scale"
+"""The one of these that an effect can cause, too."""
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
     """Return the JSON object of ``pendmap look``.
 
-    Each of ``runs`` has ``channels``, ``rate_hz``, ``noise``, ``segments`` and ``findings``. So has
-    the whole: of one run, its own; of several, the median rate, the largest noise, and everything
-    with the run that it belongs to.
+    The top level repeats the fields of one run; of several, the median rate, the largest noise, and
+    all channels, segments and findings with their run.
     """
     runs = [_run(run) for run in experiment.runs]
     whole: dict[str, Any] = {"path": str(experiment.path), "known": dict(experiment.known)}
@@ -48,12 +47,13 @@ def as_json(experiment: Experiment) -> dict[str, Any]:
         whole["noise"] = loudest["noise"] | {"run": loudest["name"]}
         whole["segments"] = [{"run": r["name"], **s} for r in runs for s in r["segments"]]
     findings = [{"run": r["name"], **found} for r in runs for found in r["findings"]]
-    whole["findings"] = [_finding(found) for found in experiment.findings] + findings
+    whole["findings"] = [dataclasses.asdict(found) for found in experiment.findings] + findings
     whole["runs"] = runs
     return whole
 
 
 def _run(run: Run) -> dict[str, Any]:
+    """Return the JSON object of a run."""
     noise = dataclasses.asdict(noise_floor(run)) | {"unit": noise_unit(run)}
     used = run.theta[run.trusted]
     return {
@@ -78,16 +78,12 @@ def _run(run: Run) -> dict[str, Any]:
         "noise": noise,
         "gyroscope_bias": _bias(run),
         "segments": [dataclasses.asdict(segment) for segment in run.segments],
-        "findings": [_finding(found) for found in run.findings],
+        "findings": [dataclasses.asdict(found) for found in run.findings],
     }
 
 
-def _finding(found: Finding) -> dict[str, Any]:
-    return dataclasses.asdict(found)
-
-
 def as_text(experiment: Experiment) -> str:
-    """Return what a record holds, in lines for people."""
+    """Return the content of a record as text."""
     lines = []
     if experiment.known:
         known = ", ".join(f"{name} {value:g}" for name, value in experiment.known.items())
@@ -101,6 +97,7 @@ def as_text(experiment: Experiment) -> str:
 
 
 def _lines(run: Run) -> Iterator[str]:
+    """Yield the lines about a run."""
     held = ", held out" if run.hold_out else ""
     yield f"{run.name} ({run.kind}{held})"
     channels = ", ".join(f"{channel} from {column!r}" for channel, column in run.channels.items())
@@ -108,8 +105,11 @@ def _lines(run: Run) -> Iterator[str]:
     span = f"{moment(run.time[0])} to {moment(run.time[-1])} s"
     what = "turning point" if run.peaks_only else "sample"
     rate = "" if run.peaks_only else f" at {run.rate_hz:.5g} Hz"
+    count = run.count_rad
+    turn = f"{2 * math.pi / count:.5g} a turn" if count > FINEST else ""
+    steps = f", in steps of {count:.4g} rad ({turn})" if turn else ""
     yield f"  samples   {run.time.size} {what}s{rate}, {span}; {run.trusted.sum()} for fitting"
-    yield f"  angle     {run.theta.min():.4g} to {run.theta.max():.4g} rad{_steps(run)}"
+    yield f"  angle     {run.theta.min():.4g} to {run.theta.max():.4g} rad{steps}"
     if run.drive is not None:
         phi = run.drive["phi"]
         phase = "phi to be fitted" if phi is None else f"phi = {phi:g}"
@@ -130,20 +130,21 @@ def _lines(run: Run) -> Iterator[str]:
         used = "for fitting" if segment.used else "not for fitting"
         yield f"  {segment.what:<9} {moment(segment.from_s)} to {moment(segment.to_s)} s, {used}"
     mended = sum(found.mended for found in run.findings)
-    count = counted(len(run.findings), "finding")
-    yield f"  {count}, {mended} of them mended" if run.findings else "  nothing odd was found"
+    many = counted(len(run.findings), "finding")
+    yield f"  {many}, {mended} of them mended" if run.findings else "  nothing odd was found"
     for found in run.findings:
         yield f"  {_line(found)}"
 
 
 def _line(found: Finding) -> str:
+    """Return the line of a finding."""
     mark = "mended: " if found.mended else ""
     where = f" ({found.where})" if found.where.startswith(("row", "line")) else ""
     return f"- {mark}{found.text}{where}  [{found.what}]"
 
 
 def doubts(experiment: Experiment, *runs: Run) -> list[str]:
-    """Return each doubt about a unit or the records: to be read before any result."""
+    """Return each doubt about a unit or the records."""
     said = _said_of(experiment, runs)
     return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
 
@@ -155,28 +156,29 @@ def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
 
 
 def doubted(experiment: Experiment, *runs: Run) -> bool:
-    """Whether a unit of these runs is wrong, or they are of several rigs, as far as can be seen."""
+    """Return whether a unit of these runs is wrong, or they are of several rigs."""
     said = (found for _, found in _said_of(experiment, runs))
-    return any(_doubted(found) and found.what != SCALE for found in said)
+    return any(_doubted(found) and found.what != SCALE_FINDING for found in said)
 
 
 def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
-    """Whether a unit of these runs is wrong: what a fit misses is in that unit, too."""
+    """Return whether a unit of these runs is wrong, and with it the unit of any residual."""
     said = (found for _, found in _said_of(experiment, runs))
-    return any(found.what in UNITS and found.what != SCALE and not found.mended for found in said)
+    return any(
+        found.what in UNIT_FINDINGS and found.what != SCALE_FINDING and not found.mended
+        for found in said
+    )
 
 
 def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
-    """Yield a line for what else was found in an experiment and in some of its runs.
-
-    What says how the record was understood is left to ``pendmap look``.
-    """
+    """Yield a line for each finding that is no doubt."""
     for where, found in _said_of(experiment, runs):
         if not _doubted(found):
             yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
 
 
 def _said_of(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
+    """Yield the findings of an experiment and of some runs, with their places."""
     for found in experiment.findings:
         yield str(experiment.path), found
     for run in runs:
@@ -185,13 +187,8 @@ def _said_of(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str,
 
 
 def _doubted(found: Finding) -> bool:
-    return found.what in DOUBTS and not found.mended
-
-
-def _steps(run: Run) -> str:
-    if run.count_rad <= FINEST:
-        return ""
-    return f", in steps of {run.count_rad:.4g} rad ({2 * math.pi / run.count_rad:.5g} a turn)"
+    """Return whether a finding is a doubt."""
+    return found.what in DOUBTFUL and not found.mended
 
 
 def noise_unit(run: Run) -> str:
@@ -200,6 +197,7 @@ def noise_unit(run: Run) -> str:
 
 
 def _bias(run: Run) -> float | None:
+    """Return the bias of a gyroscope, rad/s; None without one."""
     bias = math.nan if run.gyroscope is None else run.gyroscope.bias
     return bias if math.isfinite(bias) else None
 

@@ -1,8 +1,7 @@
-"""Where a pendulum swings and where it is held, as an accelerometer on it feels it.
+"""Free swings and holds of a pendulum, as an accelerometer on it shows them.
 
-An angle that is made of its readings folds at a quarter turn, so that what a hand does is told from
-the readings themselves: held they stay the same, swinging freely they come back in nearly equal
-times, and never larger.
+An angle made of its readings folds at a quarter turn, so that holds are found in the readings: held
+they are constant, swinging they recur in nearly equal times and do not grow.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.signal.half_cycles import swings
-from pendmap.signal.robust import true_runs
+from pendmap.signal.robust import stretches
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,77 +21,58 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Places = tuple[int, int]
 
-QUIET: Final = 5.0
+LEAST_SWING: Final = 5.0
 """Standard errors below which a reading is no swing."""
 
-STILL: Final = 8.0
-"""Standard deviations of noise within which a whole period must stay to be no motion ..."""
+STILL_SPAN: Final = 8.0
+"""Standard deviations of noise within which a whole period shows no motion."""
 
-SCATTER: Final = 1.5
-"""... or times the noise that half a period may scatter: a sine of 3.6 standard deviations does,
-which a whole period calls still anyway."""
+STILL_SCATTER: Final = 1.5
+"""Noise by which half a period may scatter without motion."""
 
-STEADY: Final = 0.1
-"""Share of its distance from the middle by which a whole period of readings scatters only where
-a hand holds, were it to tremble: a swing is on both sides."""
+STEADY_HOLD: Final = 0.1
+"""Scatter of a whole period over its distance from the middle in a trembling hold."""
 
 FEWEST_QUIET: Final = 10
-"""Samples of half a period that show whether it is quiet."""
+"""Samples of half a period from which quiet is judged."""
 
-FEWEST: Final = 3
+FEWEST_HALF_SWINGS: Final = 3
 """Half swings that are more than a hand on its way."""
 
 UNEVEN: Final = 0.15
-"""Share by which a half swing may miss the one of the same side before it in time ..."""
+"""Relative difference in time of half swings of one side, at most."""
 
-LARGER: Final = 1.1
-"""... and times which it may be larger ..."""
+GROWTH: Final = 1.1
+"""Half swing over the one of the same side before, at most."""
 
-SMALLER: Final = 0.6
-"""... or at least is: nothing but a hand stops a swing sooner."""
+DECAY: Final = 0.6
+"""Half swing over the one of the same side before, at least."""
 
-STEP: Final = 2.5
-"""Times the fastest change of a free swing: where the hand lets go the reading jumps by what the
-rod's own acceleration adds to it."""
+RELEASE_STEP: Final = 2.5
+"""Fastest changes of a free swing from which a step is a release."""
 
-SMALL: Final = 0.05
-"""Share of the largest swing below which a motion has decayed: what follows it is the rest."""
+DECAYED: Final = 0.05
+"""Swing over the largest below which a motion has decayed."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Swinging:
-    """Stretches of a record, as first place and the one after the last.
+    """Stretches of a record, as first place and the one after the last."""
 
-    Parameters
-    ----------
-    free : list of (int, int)
-        Free swings, in order.
-    held : list of (int, int)
-        Quiet stretches from which the pendulum is let go.
-    """
-
-    free: list[Places]
-    held: list[Places]
+    free: list[Places]  # free swings, in order
+    held: list[Places]  # quiet stretches before a release
 
 
 def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
-    """Return where a pendulum swings freely and where it is held.
-
-    Parameters
-    ----------
-    time, reading : ndarray, shape (N,)
-        s, increasing; of an accelerometer, or an angular acceleration.
-    noise : float
-        Standard error of a reading.
-    """
+    """Return where a pendulum swings freely and where it is held, from an acceleration."""
     from scipy.ndimage import median_filter
 
-    least = max(QUIET * noise, 1e-12)
+    least = max(LEAST_SWING * noise, 1e-12)
     # A lone false reading is neither a step nor the end of a hold.
     reading = np.asarray(median_filter(reading, 3, mode="nearest"))
     crossing = swings(time, reading - middle_over(time, reading, least), least=least).crossing
     whole = [(0, time.size)]
-    if crossing.size < FEWEST:
+    if crossing.size < FEWEST_HALF_SWINGS:
         return Swinging(whole, [])
     period = float(np.median(crossing[2:] - crossing[:-2]))
     quiet = _quiet(time, reading, period, noise)
@@ -103,22 +83,21 @@ def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
         if high - low <= 5:
             continue
         part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
-        if swings(time[low:high], part, least=least).peak.size < FEWEST:
+        if swings(time[low:high], part, least=least).peak.size < FEWEST_HALF_SWINGS:
             continue
         largest = max(largest, float(np.max(np.abs(part))))
         low += let_go(time[low:high], part, noise)
         part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
-        end = low + _untouched(time[low:high], part, least, SMALL * largest, more=high < time.size)
+        end = low + _untouched(
+            time[low:high], part, least, DECAYED * largest, more=high < time.size
+        )
         held += [stretch for stretch in quiet if stretch[1] == edge]
         free.append((low, end))
     return Swinging(free or whole, held)
 
 
 def middle_over(time: Floats, reading: Floats, least: float) -> float:
-    """Return the mean over whole swings, the later half of them.
-
-    This is the sensor's bias, and gravity on a leaning axis.
-    """
+    """Return the mean over the later half of the whole swings: the sensor's bias."""
     middle = float(np.median(reading))
     for _ in range(3):
         crossing = swings(time, reading - middle, least=least).crossing
@@ -142,29 +121,24 @@ def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[P
     if width >= reading.size:
         return []
     spread = maximum_filter1d(reading, width) - minimum_filter1d(reading, width)
-    limit = min(STILL * noise, 0.4 * float(np.ptp(reading)))
+    limit = min(STILL_SPAN * noise, 0.4 * float(np.ptp(reading)))
     still = _all_of(spread <= limit, width)
     short = (width // 2) | 1
     if short < FEWEST_QUIET:
-        return _runs(still)
-    middle = middle_over(time, reading, QUIET * noise)
+        return stretches(still)
+    middle = middle_over(time, reading, LEAST_SWING * noise)
     values = reading - middle
     away, square = (uniform_filter1d(x, short) for x in (values, values**2))
-    still |= _all_of(square - away**2 <= (SCATTER * noise) ** 2, short)
+    still |= _all_of(square - away**2 <= (STILL_SCATTER * noise) ** 2, short)
     away, square = (uniform_filter1d(x, width) for x in (values, values**2))
-    limits = np.where(np.abs(away) > QUIET * noise, (STEADY * away) ** 2, -1.0)
+    limits = np.where(np.abs(away) > LEAST_SWING * noise, (STEADY_HOLD * away) ** 2, -1.0)
     found = []
-    for low, high in _runs(still | _all_of(square - away**2 <= limits, width)):
-        # Where nothing trembles the release is seen to a sample.
+    for low, high in stretches(still | _all_of(square - away**2 <= limits, width)):
+        # A hold without trembling shows the release to a sample.
         sure = low + np.flatnonzero(still[low:high]) + 1
         exact = sure.size and sure[-1] > high - width // 2
         found.append((low, int(sure[-1]) if exact else high))
     return found
-
-
-def _runs(mask: NDArray[np.bool_]) -> list[Places]:
-    low, high = true_runs(mask)
-    return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
 def _all_of(middles: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
@@ -178,41 +152,33 @@ def _all_of(middles: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
 
 
 def let_go(time: Floats, values: Floats, noise: float) -> int:
-    """Return where a hold ends that is too short to be seen quiet; 0 if there is none.
-
-    Parameters
-    ----------
-    time, values : ndarray, shape (N,)
-        s; a motion, its middle taken off.
-    noise : float
-        Standard error of a reading.
-    """
-    crossing = swings(time, values, least=max(QUIET * noise, 1e-12)).crossing
-    if crossing.size < FEWEST + 3:
+    """Return where a hold ends that is too short to be seen quiet; 0 if there is none."""
+    crossing = swings(time, values, least=max(LEAST_SWING * noise, 1e-12)).crossing
+    if crossing.size < FEWEST_HALF_SWINGS + 3:
         return 0
-    # Carried from the rest the readings may pass the middle twice before it is let go.
+    # A pendulum carried from rest may cross the middle twice before its release.
     begin, after = (int(np.searchsorted(time, crossing[k])) for k in (2, 5))
     steps = np.abs(np.diff(values[:after]))
     at = int(np.argmax(steps[:begin]))
     fastest = float(np.max(np.delete(steps, slice(max(at - 1, 0), at + 2)), initial=0.0))
-    return at + 1 if steps[at] > max(STEP * fastest, STILL * noise) else 0
+    return at + 1 if steps[at] > max(RELEASE_STEP * fastest, STILL_SPAN * noise) else 0
 
 
 def _untouched(time: Floats, values: Floats, least: float, small: float, *, more: bool) -> int:
-    """Return where a free swing ends, the place after the last: a hand may take it before.
+    """Return where a free swing ends (exclusive): a hand may take the pendulum before.
 
-    ``more`` says that something quiet follows.
+    ``more`` is true if something quiet follows.
     """
     found = swings(time, values, least=least)
     halves, tops = np.diff(found.crossing), np.abs(found.peak)
     last = tops.size - 1
-    # Two together: a hand may make one that is like those before it.
+    # Two half swings together: a hand may cause a single one like those before.
     while last > 2 and not all(_alike(halves, tops, k, least) for k in (last, last - 1)):
         last -= 1
     if last < 2 or tops[last] < max(small, 3 * least):
         return time.size  # it decays to its rest
     tail = values[int(np.searchsorted(time, found.crossing[-1])) :]
-    usual = tops[last - 1] * LARGER + least
+    usual = tops[last - 1] * GROWTH + least
     longest = (1 + UNEVEN) * halves[last - 1]
     grown = np.max(np.abs(tail), initial=0.0) > usual
     if (
@@ -226,7 +192,7 @@ def _untouched(time: Floats, values: Floats, least: float, small: float, *, more
 
 
 def _alike(halves: Floats, tops: Floats, k: int, least: float) -> bool:
-    """Whether a half swing is what the one of the same side before it becomes by itself."""
+    """Return whether a half swing follows freely from the one of the same side before it."""
     even = abs(halves[k] / halves[k - 2] - 1) < UNEVEN
     slack = least if math.isfinite(least) else 0.0
-    return bool(even and SMALLER * tops[k - 2] - slack < tops[k] < LARGER * tops[k - 2] + slack)
+    return bool(even and DECAY * tops[k - 2] - slack < tops[k] < GROWTH * tops[k - 2] + slack)

@@ -1,4 +1,4 @@
-"""Text as loggers write it: encoding, separators, decimal commas, headers, broken lines."""
+"""Text files of loggers: encoding, separators, decimal commas, headers, broken lines."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import counted
 from pendmap.records.experiment import Finding
+from pendmap.records.units import CHANNELS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,31 +23,31 @@ if TYPE_CHECKING:
 
 
 MOST_COLUMNS: Final = 1000
-"""Columns that a table may have: a logger of a hundred channels with ten numbers each."""
+"""Columns of a table at most."""
 
 MOST_BYTES: Final = 2**30
-"""Largest file that is read, and bytes that its numbers may take: an hour at 10 kHz."""
+"""Largest file, and bytes of its numbers, at most."""
 
-LONGEST: Final = 40 * MOST_COLUMNS
-"""Characters of the longest line that may be a row of so many numbers."""
+LONGEST_LINE: Final = 40 * MOST_COLUMNS
+"""Characters of the longest line that may be a row."""
 
-LOOKED_AT: Final = 400
-"""Lines, from all over a file, that its separators are found from."""
+SAMPLE_LINES: Final = 400
+"""Lines, from all over a file, from which separators are found."""
 
-ENOUGH: Final = 0.5
-"""Share of the lines that must be rows of numbers; a log with more noise than that is none."""
+LEAST_ROWS: Final = 0.5
+"""Share of the lines that are rows of numbers at least."""
 
 MOST_CONTROLS: Final = 0.02
 """Share of control characters above which a file is no text."""
 
 MOST_NULS: Final = 0.2
-"""Share of NUL bytes above which a file is no text: a logger that loses power leaves some."""
+"""Share of NUL bytes above which a file is no text."""
 
-WAYS: Final = (
+SEPARATORS: Final = (
     *((";", ","), ("\t", ","), ("\t", "."), (";", "."), (",", ".")),
     *(("|", "."), (" ", "."), (" ", ","), (",", ",")),
 )
-"""Separators with decimal signs, in the order in which they are believed."""
+"""Separators with decimal signs, in the order of preference."""
 
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _NOTHING: Final = frozenset(
@@ -59,43 +60,25 @@ _LEVELS: Final = {
 """Words that loggers write for the levels of a trigger."""
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 
+_HEADS: Final = 30
+"""Lines above the numbers of a short file at most."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Table:
-    """Columns of numbers, and where they stand in the file.
+    """Columns of numbers, and their rows in the file."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        What heads each column; empty texts where there is no header.
-    values : ndarray, shape (rows, columns)
-        ``nan`` where there is no number.
-    rows : ndarray of int, shape (rows,)
-        Line of the file, from 1 (of a Parquet file: row of the table).
-    findings : tuple of Finding
-        What was odd about the text.
-    headed : bool
-        Whether there is a header.
-    order : ndarray of int, shape (rows,)
-        Lines that are not empty and no row leave a place out.
-    """
-
-    names: tuple[str, ...]
-    values: NDArray[np.float64]
-    rows: NDArray[np.intp]
+    names: tuple[str, ...]  # headings; empty texts without a header
+    values: NDArray[np.float64]  # shape (rows, columns); NaN where there is no number
+    rows: NDArray[np.intp]  # lines of the file, from 1 (of a Parquet file: rows of the table)
     findings: tuple[Finding, ...] = ()
     headed: bool = True
+    # Places among the lines that are not empty: unreadable lines leave a place out.
     order: NDArray[np.intp] = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
 
 def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
-    """Return a file's text; NUL bytes of an interrupted logger are left out, and said.
-
-    Raises
-    ------
-    InputError
-        If it is no text.
-    """
+    """Return the text of a file, without NUL bytes, and findings; raise InputError for no text."""
     findings: list[Finding] = []
     if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
@@ -120,13 +103,7 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
 
 
 def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:
-    """Refuse a table with too many columns, or that unpacks to too many bytes.
-
-    Raises
-    ------
-    InputError
-        If one is more than a record can have.
-    """
+    """Raise InputError for a table with too many columns or bytes."""
     if columns > MOST_COLUMNS:
         raise InputError(f"{where}: must have at most {MOST_COLUMNS} columns, got {columns}")
     if size > MOST_BYTES:
@@ -135,13 +112,7 @@ def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:
 
 
 def parsed(text: str, reader: Reader, where: str) -> Table:
-    """Return the table that a text holds.
-
-    Raises
-    ------
-    InputError
-        If there are no rows of numbers.
-    """
+    """Return the table of a text; raise InputError if there are no rows of numbers."""
     import pandas as pd
 
     whole = text.endswith(("\n", "\r"))
@@ -149,14 +120,16 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     lines = [(k, line) for k, line in lines if k > reader.skip_rows]
     if not lines:
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
-    long = sum(len(line) > LONGEST for _, line in lines)
-    if long > ENOUGH * len(lines):
+    long = sum(len(line) > LONGEST_LINE for _, line in lines)
+    if long > LEAST_ROWS * len(lines):
         raise InputError(
             f"{where}: must be a table of up to {MOST_COLUMNS} columns, got lines of more than "
-            f"{LONGEST} characters"
+            f"{LONGEST_LINE} characters"
         )
-    # A line without a number is left out with those that cannot be read.
-    lines = [(k, line if len(line) <= LONGEST else "?") for k, line in lines] if long else lines
+    # A line that is too long is left out as unreadable.
+    lines = (
+        [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines] if long else lines
+    )
     delimiter, decimal, width = _way(lines, reader, where)
     fits = [_fits(line, delimiter, decimal, width) for _, line in lines]
     first = fits.index(True)
@@ -196,6 +169,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
 
 
 def _numbers(column: object, decimal: str) -> NDArray[np.float64]:
+    """Return the numbers of a column; NaN for anything else."""
     import pandas as pd
 
     texts = pd.Series(column).astype(str).str.strip()
@@ -210,6 +184,7 @@ def _numbers(column: object, decimal: str) -> NDArray[np.float64]:
 
 
 def _split(line: str, delimiter: str) -> list[str]:
+    """Return the parts of a line."""
     if delimiter == " ":
         return line.split()
     if '"' in line:
@@ -221,7 +196,7 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 
 def _is_row(parts: list[str], decimal: str) -> int:
-    """Return how many numbers a line has; 0 if anything in it is neither number nor nothing."""
+    """Return the count of numbers of a line; 0 if anything in it is no number."""
     numbers = 0
     for part in parts if len(parts) <= MOST_COLUMNS else ():
         text = part if decimal == "." else part.replace(decimal, ".", 1) if "." not in part else "?"
@@ -233,9 +208,9 @@ def _is_row(parts: list[str], decimal: str) -> int:
 
 
 def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str, str, int]:
-    """Return delimiter, decimal sign and number of columns: whatever makes most lines rows."""
-    step = max(len(lines) // LOOKED_AT, 1)
-    # Uneven places: loggers of several sensors write rows of each kind by turns.
+    """Return delimiter, decimal sign and width that make most lines rows."""
+    step = max(len(lines) // SAMPLE_LINES, 1)
+    # Uneven places: loggers of several sensors alternate rows of each kind.
     places = [k * step + int(step * (0.618 * k % 1)) for k in range(len(lines) // step)]
     sample = [lines[k][1] for k in places]
     found = _common(sample, reader, 2) or _common(sample, reader, 1)
@@ -243,11 +218,11 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
         return ";", ",", 1
     if found is not None:
         fitting = sum(_fits(line, *found) for line in sample)
-        if fitting >= ENOUGH * len(sample) or fitting >= len(sample) - _HEADS:
+        if fitting >= LEAST_ROWS * len(sample) or fitting >= len(sample) - _HEADS:
             return found
     for decimal in (".", ","):
         alone = (reader.delimiter or (";" if decimal == "," else ","), decimal, 1)
-        if sum(_fits(line, *alone) for line in sample) > ENOUGH * len(sample):
+        if sum(_fits(line, *alone) for line in sample) > LEAST_ROWS * len(sample):
             return alone
     advice = "; what it is separated by may stand in [reader] of experiment.toml" if found else ""
     raise InputError(
@@ -256,17 +231,18 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
 
 
 def _fractions(sample: list[str]) -> bool:
-    """Whether what stands behind the commas are decimals: whole numbers have no 0 in front."""
+    """Return whether the digits behind the commas are decimals: some begin with 0."""
     parts = [line.split(",") for line in sample if _fits(line, ",", ".", 2)]
     digits = all(re.fullmatch(r"\s*[+-]?\d+", a) and re.fullmatch(r"\d+\s*", b) for a, b in parts)
     return digits and any(b.startswith("0") and len(b.strip()) > 1 for _, b in parts)
 
 
 def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, int] | None:
-    """Return delimiter, decimal sign and columns that most lines have ``least`` numbers by."""
+    """Return delimiter, decimal sign and width of most lines with ``least`` numbers."""
     best: tuple[int, tuple[str, str, int] | None] = (0, None)
     ways = [
-        (reader.delimiter or delimiter, reader.decimal or decimal) for delimiter, decimal in WAYS
+        (reader.delimiter or delimiter, reader.decimal or decimal)
+        for delimiter, decimal in SEPARATORS
     ]
     for delimiter, decimal in dict.fromkeys(ways):
         if delimiter == decimal and not any('"' in line for line in sample):
@@ -283,29 +259,26 @@ def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, in
     return best[1]
 
 
-_HEADS: Final = 30
-"""Lines that may stand above the numbers of a short file."""
-
-
 def _fits(line: str, delimiter: str, decimal: str, width: int) -> bool:
+    """Return whether a line is a row of this width."""
     parts = _split(line, delimiter)
     return len(parts) == width and _is_row(parts, decimal) > 0
 
 
 def _cut(lines: list[tuple[int, str]], fits: list[bool], delimiter: str) -> bool:
-    """Whether a last line without an end has fewer digits than all before it have."""
-    before = [line for (_, line), fit in zip(lines[-21:-1], fits[-21:-1], strict=True) if fit]
-    last = _split(lines[-1][1], delimiter)[-1]
-    digits = {_decimals(_split(line, delimiter)[-1]) for line in before}
-    return len(digits) == 1 and _decimals(last) < next(iter(digits))
+    """Return whether a last line without an end has fewer digits than all before it."""
 
+    def decimals(line: str) -> int:
+        parts = re.split(r"[.,]", _split(line, delimiter)[-1])
+        return len(parts[1]) if len(parts) > 1 else 0
 
-def _decimals(number: str) -> int:
-    return len(re.split(r"[.,]", number)[1]) if re.search(r"[.,]", number) else 0
+    before = zip(lines[-21:-1], fits[-21:-1], strict=True)
+    digits = {decimals(line) for (_, line), fit in before if fit}
+    return len(digits) == 1 and decimals(lines[-1][1]) < next(iter(digits))
 
 
 def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ...], bool]:
-    """Return the names above the numbers, a line of units under them included."""
+    """Return the names above the numbers, with a line of units below them."""
     heads = [_split(line.lstrip("#% "), delimiter) for line in lines[-3:]]
     heads = [[part.strip('"') for part in head] for head in heads if len(head) > 1 or width == 1]
     if heads and delimiter == "," and len(heads[-1]) != width and len(heads[-1]) * 2 == width:
@@ -317,15 +290,7 @@ def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ..
     if len(heads) > 1 and all(re.fullmatch(r"[\(\[]?[^\d\s]{0,6}\d?[\)\]]?", n) for n in names):
         units = [name.strip("()[] ") for name in names]
         above = heads[-2]
-        if any(_unit(unit) for unit in units) and any(len(name) > 0 for name in above):
+        known = any(unit and c.has(unit) for unit in units for c in CHANNELS.values())
+        if known and any(above):
             names = [f"{a} [{u}]" if u else a for a, u in zip(above, units, strict=True)]
     return tuple(names), True
-
-
-def _unit(text: str) -> bool:
-    from pendmap.records.units import CHANNELS
-
-    return len(text) > 0 and any(channel.has(text) for channel in CHANNELS.values())
-
-
-# A file, read: CSV and other text, Excel, or Parquet.

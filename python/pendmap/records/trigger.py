@@ -18,68 +18,45 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Places = tuple[int, int]
 
-BETWEEN: Final = 0.02
-"""Share of the samples that may lie between two levels: those of a slow edge."""
+BETWEEN_LEVELS: Final = 0.02
+"""Share of the samples between two levels at most."""
 
-DEAD: Final = 0.2
-"""Share of the way between the levels that is neither: noise there makes no edge."""
+DEAD_BAND: Final = 0.2
+"""Distance from the threshold over that of the levels within which noise is no edge."""
 
-APART: Final = 3.0
-"""Periods of small swings that releases are apart; what recurs faster is no release."""
+RELEASES_APART: Final = 3.0
+"""Periods of small swings between releases at least."""
 
 BOUNCE: Final = 0.3
-"""Share of a drive period within which a second edge is a bounce of the first."""
+"""Drive periods within which a second edge is a bounce."""
 
-FEWEST: Final = 4
-"""Edges from which a drive's frequency is taken."""
+FEWEST_EDGES: Final = 4
+"""Edges from which the frequency of a drive is taken."""
 
-EVEN: Final = 0.1
-"""Share of the period by which edges of a drive may miss its beat, rms, beyond the sampling."""
+UNEVEN_EDGES: Final = 0.1
+"""Periods by which edges of a drive miss its beat, rms, besides the sampling."""
 
-DIFFERS: Final = 3.0
-"""Standard errors from which a given frequency or phase is not that of the trigger."""
+DIFFERENT: Final = 3.0
+"""Standard errors from which a given frequency or phase is another."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Beat:
-    """A drive as its trigger shows it.
+    """Frequency and edges of a drive as its trigger shows them."""
 
-    Parameters
-    ----------
-    omega, stderr : float
-        rad/s.
-    time : ndarray, shape (M,)
-        Of the edges that count, s: the middle between the samples before and after.
-    error : float
-        Standard error of one of them, s.
-    left_out : int
-        Bounces.
-    """
-
-    omega: float
-    stderr: float
-    time: Floats
-    error: float
-    left_out: int
+    omega: float  # rad/s
+    stderr: float  # of omega, rad/s
+    time: Floats  # middles between the samples before and after each edge, s, shape (M,)
+    error: float  # standard error of one of them, s
+    left_out: int  # bounces
 
 
 def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp], str] | None:
     """Return the places of the first samples after each edge, and which edge it is.
 
-    The threshold lies between the means of the two levels, with a dead band about it. Where it is
-    not said which edge counts, the rising one does, or the falling one if there is no other.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        The channel; missing values keep the level before them.
-    edge : str, optional
-        ``"rising"`` or ``"falling"``.
-
-    Returns
-    -------
-    tuple or None
-        None where the channel has no two levels.
+    The threshold is between the means of the two levels; missing values keep the level. By default
+    the rising edge counts, or the falling one if there is no other. Returns None without two
+    levels.
     """
     seen = values[np.isfinite(values)]
     if seen.size == 0 or np.ptp(seen) == 0:
@@ -91,8 +68,8 @@ def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp],
         if not seen.min() < middle < seen.max() or middle == threshold:
             break
         threshold = middle
-    band = DEAD * (high - low)
-    if np.mean(np.abs(seen - threshold) < band) > BETWEEN:
+    band = DEAD_BAND * (high - low)
+    if np.mean(np.abs(seen - threshold) < band) > BETWEEN_LEVELS:
         return None
     state = np.where(values > threshold + band, 1, np.where(values < threshold - band, -1, 0))
     places = np.flatnonzero(state)
@@ -105,7 +82,7 @@ def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp],
 
 
 def _debounced(time: Floats, places: NDArray[np.intp], dead: float) -> list[int]:
-    """Return the edges that do not follow the one that counted before within ``dead``, s."""
+    """Return the edges that do not follow a counted one within ``dead``, s."""
     kept: list[int] = []
     for k in places.tolist():
         if not kept or time[k] - time[kept[-1]] > dead:
@@ -114,22 +91,7 @@ def _debounced(time: Floats, places: NDArray[np.intp], dead: float) -> list[int]
 
 
 def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
-    """Return the stretches of a free record that begin at the trigger's edges.
-
-    Parameters
-    ----------
-    work : Work
-        A free record.
-    parts : list of (int, int)
-        The stretches that nobody touches, as the angle shows them.
-    period : float
-        Of small swings, s.
-
-    Returns
-    -------
-    list of (int, int)
-        For each edge the motion that follows it; ``parts`` where the trigger tells nothing.
-    """
+    """Return the motion after each edge of the trigger; ``parts`` where it shows no release."""
     if "trigger" not in work.extra or not parts:
         return parts
     found = edges_of(work.extra["trigger"], work.edge)
@@ -138,7 +100,7 @@ def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
         return parts
     kept = _debounced(work.time, found[0], period)
     apart = np.diff(work.time[kept])
-    if apart.size and np.median(apart) < APART * period:
+    if apart.size and np.median(apart) < RELEASES_APART * period:
         text = (
             f"the trigger's {counted(len(kept), f'{found[1]} edge')} recur after"
             f" {np.median(apart):.3g} s, three swings and less: it marks no release"
@@ -152,7 +114,7 @@ def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
         if not after:
             continue
         a, b = max(after, key=lambda part: part[1] - part[0])
-        # What the angle shows is known to a fraction of a swing; the trigger knows better.
+        # The angle shows the release to a fraction of a swing, the trigger to a sample.
         motions.append((low if work.time[a] - work.time[low] < period else a, b))
     if not motions:
         work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
@@ -166,33 +128,25 @@ def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
 
 
 def _none(found: tuple[NDArray[np.intp], str] | None) -> str:
+    """Return why there is no edge."""
     return "has no two levels" if found is None else f"has no {found[1]} edge"
 
 
 def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) -> Beat | None:
     """Return the frequency with which edges recur; None where they do not.
 
-    Each edge lies between two samples: where periods exist that every edge allows, they bound
-    Omega, and its standard error is that of an even distribution between the bounds. The bounds are
-    ``(t_j - t_i +- (d_i + d_j) / 2) / (n_j - n_i)``, d the interval at an edge, n its number. Else
-    it is the least-squares line of the edges' times over their numbers, with its standard error.
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    places : ndarray of int, shape (M,)
-        Of the first sample after each edge.
-    omega : float, optional
-        About what is expected, rad/s, to tell bounces.
+    Each edge is between two samples, so that the edges bound the period by ``(t_j - t_i +- (d_i +
+    d_j) / 2) / (n_j - n_i)``, d the interval at an edge, n its number; the error is that of a
+    uniform distribution. Without such a period it is the least-squares line of t over n. ``omega``
+    is the expected frequency, rad/s, to recognise bounces.
     """
-    if places.size < FEWEST:
+    if places.size < FEWEST_EDGES:
         return None
     apart = np.diff(time[places])
-    # Without a frequency to go by: bounces are many and short, periods few and long.
+    # Without a known frequency: bounces are many and short, periods few and long.
     period = 2 * math.pi / omega if omega else float(np.quantile(apart, 0.9))
     kept = np.asarray(_debounced(time, places, BOUNCE * period), np.intp)
-    if kept.size < FEWEST:
+    if kept.size < FEWEST_EDGES:
         return None
     before, after = time[kept - 1], time[kept]
     middle = (before + after) / 2
@@ -204,7 +158,7 @@ def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) 
     rest = middle - start - period * number
     sampling = float(np.mean(after - before)) / math.sqrt(12)
     spread = float(np.sqrt(np.sum(rest**2) / (rest.size - 2)))
-    if period <= 0 or spread > EVEN * period + 2 * sampling:
+    if period <= 0 or spread > UNEVEN_EDGES * period + 2 * sampling:
         return None
     error = max(spread, sampling) * math.sqrt(float(covariance[0, 0]))
     low, high = _allowed(before, after, number)
@@ -215,7 +169,7 @@ def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) 
 
 
 def _allowed(before: Floats, after: Floats, number: Floats) -> tuple[float, float]:
-    """Return the least and the greatest period that all edges allow."""
+    """Return the least and the greatest period that all edges allow, s."""
     low, high = 0.0, math.inf
     for k in range(1, number.size):
         steps = number[k:] - number[:-k]
@@ -225,13 +179,13 @@ def _allowed(before: Floats, after: Floats, number: Floats) -> tuple[float, floa
 
 
 def check_drive(work: Work) -> None:
-    """Say what frequency the trigger of a forced run shows; take its phase where that is stated."""
+    """Report the frequency that the trigger of a forced run shows; take its phase if stated."""
     if work.plan.kind != "forced" or "trigger" not in work.extra:
         return
     drive = work.plan.drive
     given = drive["Omega"] if drive else None
     found = edges_of(work.extra["trigger"], work.edge)
-    if found is None or found[0].size < FEWEST:
+    if found is None or found[0].size < FEWEST_EDGES:
         why = (
             f"the trigger {_none(found)}"
             if found is None or not found[0].size
@@ -254,7 +208,7 @@ def check_drive(work: Work) -> None:
     if drive is None or given is None:
         work.say("trigger-drive", said)
         return
-    if abs(beat.omega - given) > DIFFERS * beat.stderr:
+    if abs(beat.omega - given) > DIFFERENT * beat.stderr:
         work.say("trigger-differs", f"{said}: the drive is given with {given:.7g}")
         return
     work.say("trigger-drive", said)
@@ -263,17 +217,17 @@ def check_drive(work: Work) -> None:
 
 
 def _phase(work: Work, beat: Beat, omega: float, phase: float) -> None:
-    """Take the drive's phase from the edges, ``phi = phase - Omega t``, where it is not given."""
+    """Take the drive's phase from the edges, ``phi = phase - Omega t``, if it is not given."""
     drive = work.plan.drive or {}
     mean = np.mean(np.exp(1j * (phase - omega * beat.time)))
     phi = float(np.angle(mean))
-    # An edge is somewhere between two samples, each time at the same place if they are in step.
+    # Edges in step with the sampling have one common error, which no mean reduces.
     error = omega * beat.error
     told = drive["phi"]
     if told is None:
         work.plan = dataclasses.replace(work.plan, drive={**drive, "phi": phi})
         text = f"phi = {phi:.4g} +- {error:.1g} rad by the trigger, phase {phase:g} at its edges"
         work.say("trigger-phase", text)
-    elif abs(math.remainder(told - phi, 2 * math.pi)) > DIFFERS * error:
+    elif abs(math.remainder(told - phi, 2 * math.pi)) > DIFFERENT * error:
         text = f"by the trigger phi = {phi:.4g} +- {error:.1g} rad: it is given as {told:.4g}"
         work.say("trigger-differs", text)

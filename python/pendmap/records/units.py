@@ -1,4 +1,4 @@
-"""The channels of a record, the units they come in, and the names that tools give them."""
+"""Channels of a record, their units, and the names that tools give them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PIVOT_UNITS: Final = {
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
 }
-"""Units of a recorded pivot: what they are in SI, and how much of it."""
+"""Units of a recorded pivot: the SI unit and the factor to it."""
 
 _TURN: Final = 2 * math.pi
 _DEGREE: Final = math.pi / 180
@@ -28,33 +28,15 @@ _DEGREE: Final = math.pi / 180
 
 @dataclasses.dataclass(frozen=True)
 class Channel:
-    """What a column may hold.
+    """Quantity of a column, with its units and names."""
 
-    Parameters
-    ----------
-    unit : str
-        In SI.
-    units : mapping of str to float
-        How much of SI each unit is, by its plain spelling.
-    default : str
-        The column's name where nothing is said.
-    names : tuple of str
-        Patterns of other names, plain (lower case, without unit).
-    """
-
-    unit: str
-    units: Mapping[str, float]
-    default: str
-    names: tuple[str, ...]
+    unit: str  # in SI
+    units: Mapping[str, float]  # factor to SI by plain spelling
+    default: str  # usual heading
+    names: str  # pattern of other names, plain (lower case, without unit)
 
     def factor(self, unit: str, where: str) -> float:
-        """Return how much of SI a unit is.
-
-        Raises
-        ------
-        InputError
-            If it is not one of this channel's.
-        """
+        """Return the factor from a unit to SI; raise InputError for other units."""
         spelled = spelling(unit)
         if spelled in self.units:
             return self.units[spelled]
@@ -69,7 +51,7 @@ class Channel:
         )
 
     def has(self, unit: str) -> bool:
-        """Whether a text is one of the channel's units, raw ones included."""
+        """Return whether a text is one of the channel's units, raw ones included."""
         return spelling(unit) in self.units or spelling(unit) in _RAW
 
 
@@ -118,71 +100,33 @@ CHANNELS: Final = {
         "s",
         _TIMES,
         "t_s",
-        (
-            "t",
-            "time",
-            "zeit",
-            "temps",
-            "tiempo",
-            "tempo",
-            "time ?stamp",
-            "elapsed( time)?",
-            "clock",
-            "seconds_elapsed",
-        ),
+        "t|time|zeit|temps|tiempo|tempo|time ?stamp|elapsed( time)?|clock|seconds_elapsed",
     ),
     "angle": Channel(
         "rad",
         _ANGLES,
         "theta_rad",
-        (
-            "theta",
-            "θ",
-            "th",
-            "angle",
-            "winkel",
-            "alpha",
-            "phi",
-            "φ",
-            "encoder",
-            "ang(le)? ?pos(ition)?",
-            "angular position",
-            "volts?",
-            "voltage",
-            "counts?",
-            "adc",
-        ),
+        "theta|θ|th|angle|winkel|alpha|phi|φ|encoder|ang(le)? ?pos(ition)?|angular position"
+        "|volts?|voltage|counts?|adc",
     ),
     "velocity": Channel(
         "rad/s",
         _SPEEDS,
         "velocity_rad_s",
-        (
-            "omega",
-            "ω",
-            "(angular )?velocity",
-            "theta ?dot",
-            "dtheta",
-            "gyro(scope)?( ?[xyz])?",
-            "rot(ation)? ?rate( ?[xyz])?",
-            "w[xyz]?",
-            "omega filtered",
-        ),
+        "omega|ω|(angular )?velocity|theta ?dot|dtheta|gyro(scope)?( ?[xyz])?"
+        "|rot(ation)? ?rate( ?[xyz])?|w[xyz]?|omega filtered",
     ),
     "acceleration": Channel(
         "m/s2",
         _ACCELERATIONS,
         "acceleration_m_s2",
-        ("((linear|angular) )?acc(el|eleration|elerometer)?( ?[xyz])?", "a[xyz]?", "theta ?ddot"),
+        "((linear|angular) )?acc(el|eleration|elerometer)?( ?[xyz])?|a[xyz]?|theta ?ddot",
     ),
-    "pixel_x": Channel("px", _LENGTHS, "pixel_x", ("x", "pixel ?x", "x ?pixel", "px x", "pos ?x")),
-    "pixel_y": Channel("px", _LENGTHS, "pixel_y", ("y", "pixel ?y", "y ?pixel", "px y", "pos ?y")),
-    "peaks": Channel("rad", _ANGLES, "peak_rad", ("peaks?", "amplitudes?", "turning points?")),
+    "pixel_x": Channel("px", _LENGTHS, "pixel_x", "x|pixel ?x|x ?pixel|px x|pos ?x"),
+    "pixel_y": Channel("px", _LENGTHS, "pixel_y", "y|pixel ?y|y ?pixel|px y|pos ?y"),
+    "peaks": Channel("rad", _ANGLES, "peak_rad", "peaks?|amplitudes?|turning points?"),
     "trigger": Channel(
-        "1",
-        {"1": 1.0, "v": 1.0, "mv": 1e-3, "ttl": 1.0},
-        "trigger",
-        ("trigger", "trig", "sync", "ttl"),
+        "1", {"1": 1.0, "v": 1.0, "mv": 1e-3, "ttl": 1.0}, "trigger", "trigger|trig|sync|ttl"
     ),
 }
 """By name, in the order in which columns are tried."""
@@ -193,7 +137,7 @@ _BEHIND: Final = re.compile(r"^(?P<name>.+?)[_ ](?P<unit>[a-zµ°]+(?:_s2?)?)$",
 
 
 def spelling(unit: str) -> str:
-    """Return a unit as the tables above spell it."""
+    """Return a unit as the tables spell it."""
     text = unit.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
     text = text.replace("µ", "u").replace("μ", "u").replace("·", "").replace(" ", "")
     text = text.replace("º", "°").replace("s⁻¹", "/s").replace("s-1", "/s")
@@ -206,7 +150,7 @@ def plain(name: str) -> str:
 
 
 def name_and_unit(header: str) -> tuple[str, str | None]:
-    """Split what heads a column into name and unit.
+    """Split a heading into name and unit.
 
     >>> name_and_unit("Time (s)"), name_and_unit("t/ms"), name_and_unit("theta_rad")
     (('Time', 's'), ('t', 'ms'), ('theta', 'rad'))

@@ -1,4 +1,4 @@
-"""A record on its way from the table to a run: what each check sees and may change."""
+"""A record between table and run: each check reads and may change it."""
 
 from __future__ import annotations
 
@@ -17,93 +17,52 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.records.channels import Channels
     from pendmap.records.description import RunPlan
     from pendmap.records.rod_sensors import Accelerometer
-    from pendmap.records.text import Table
 
     Floats = NDArray[np.float64]
 
-FEWEST = 5
-"""Samples that a record must have; fewer show no swing."""
+FEWEST_SAMPLES = 5
+"""Samples that a record must have."""
 
 _FEWEST_PEAKS = 3
+"""Turning points that a record of turning points must have."""
 
 
 @dataclasses.dataclass
 class Work:
-    """One record while it is read; all arrays have one length.
-
-    ``count`` is the step of the readings as it is known, ``seen`` as they show it, 0 for none.
-    ``extra`` holds further channels by name, those of the pivot as ``pivot:vertical`` and
-    ``pivot:horizontal``. ``accelerometer`` says where an acceleration was measured, or
-    ``place_missing`` which keys would; ``integrated`` whether the angle was made of the velocity.
-    ``releases`` are the stretches for fitting of a free record, first place and the one after the
-    last; ``edge`` and ``phase`` what [columns] says of the trigger;
-    ``edges`` whether each reading is an edge of an encoder; ``pivot_unit`` what
-    the pivot's channels are.
-    """
+    """One record while it is read, in SI; all arrays have shape (N,)."""
 
     where: str
     plan: RunPlan
-    known: Mapping[str, Any]
-    declared: frozenset[str]
+    known: Mapping[str, Any]  # [rig]
+    declared: frozenset[str]  # channels with a unit or scale in [columns]
     time: Floats
     theta: Floats
-    rows: NDArray[np.intp]
-    extra: dict[str, Floats]
+    rows: NDArray[np.intp]  # lines of the file
+    extra: dict[str, Floats]  # further channels; the pivot's as pivot:vertical, pivot:horizontal
     trusted: NDArray[np.bool_]
     findings: list[Finding]
+    columns: Mapping[str, str]  # the heading of each channel
+    unused: tuple[str, ...]  # headings of the columns that no channel is read from
     segments: list[Segment] = dataclasses.field(default_factory=list)
-    count: float = 0.0
-    seen: float = 0.0
+    count: float = 0.0  # step of the readings as known, rad; 0 for none
+    seen: float = 0.0  # step that the readings show, rad; 0 for none
     peaks_only: bool = False
     accelerometer: Accelerometer | None = None
-    integrated: bool = False
-    place_missing: str = ""
+    integrated: bool = False  # the angle is the integral of the velocity
+    place_missing: str = ""  # keys of [columns] that would place the accelerometer
     releases: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    edge: str | None = None
-    phase: float | None = None
-    edges: bool = False
+    edge: str | None = None  # edge of the trigger that counts
+    phase: float | None = None  # phase of the drive at that edge, rad
+    edges: bool = False  # each reading is an edge of an encoder
     pivot_unit: str | None = None
 
     @property
     def made_of(self) -> Accelerometer | None:
-        """The accelerometer that the angle was made of; none where the angle was measured."""
+        """The accelerometer that the angle was made of; None where the angle was measured."""
         made = self.accelerometer is not None and math.isfinite(self.accelerometer.w0)
         return self.accelerometer if made else None
-
-    @classmethod
-    def begin(
-        cls,
-        where: str,
-        plan: RunPlan,
-        known: Mapping[str, Any],
-        channels: Channels,
-        table: Table,
-    ) -> Work:
-        """Take the channels of a table; nothing is an angle yet unless a channel is one."""
-        extra = {name: values.copy() for name, values in channels.values.items() if name != "time"}
-        for way, values in (channels.pivot or {}).items():
-            extra[f"pivot:{way}"] = values.copy()
-        time = channels.values["time"].copy()
-        return cls(
-            where=where,
-            plan=plan,
-            known=known,
-            declared=channels.declared,
-            time=time,
-            theta=extra.pop("angle", np.zeros(time.size)),
-            rows=table.rows.copy(),
-            extra=extra | ({} if "angle" in channels.values else {"no angle": np.zeros(time.size)}),
-            trusted=np.ones(time.size, bool),
-            findings=[*table.findings, *channels.findings],
-            accelerometer=channels.accelerometer,
-            place_missing=channels.place_missing,
-            edge=channels.edge,
-            phase=channels.phase,
-            pivot_unit=channels.pivot_unit,
-        )
 
     def say(
         self,
@@ -114,7 +73,7 @@ class Work:
         at: NDArray[np.intp] | None = None,
         span: tuple[float, float] | None = None,
     ) -> None:
-        """Note a finding, at samples or over a span of time."""
+        """Add a finding, at samples or over a span of time in s."""
         where = ""
         if at is not None and at.size:
             shown = ", ".join(str(int(self.rows[k])) for k in at[:3])
@@ -132,10 +91,9 @@ class Work:
         self.extra = {name: values[which] for name, values in self.extra.items()}
 
     def apart(self) -> tuple[list[Work], list[Finding]]:
-        """Return a work for each release, and what was found in the file and in none of them alone.
+        """Return a work for each release, and the findings that belong to none of them.
 
-        The first keeps what is before it, the last what is after it; what is between two releases
-        is in neither.
+        The first keeps what is before it, the last what is after it.
         """
         if len(self.releases) < 2:
             return [self], []
@@ -157,27 +115,21 @@ class Work:
         return parts, shared
 
     def cut(self, low: float | None, high: float | None) -> None:
-        """Keep the part of the file that the run is said to be."""
+        """Keep the samples from ``low`` to ``high``, s."""
         if low is None and high is None:
             return
         first, last = float(self.time[0]), float(self.time[-1])
         low, high = -math.inf if low is None else low, math.inf if high is None else high
         self.keep((self.time >= low) & (self.time <= high))
-        if self.time.size < FEWEST:
+        if self.time.size < FEWEST_SAMPLES:
             raise InputError(
                 f"{self.where}: from_s and to_s must be times within {first:g} to {last:g} s, they"
                 f" leave {counted(self.time.size, 'sample')}"
             )
 
     def refuse_short(self) -> None:
-        """Refuse what is too short for a record.
-
-        Raises
-        ------
-        InputError
-            If there are fewer samples than show a swing.
-        """
-        least = _FEWEST_PEAKS if self.peaks_only else FEWEST
+        """Raise InputError if there are too few samples for a record."""
+        least = _FEWEST_PEAKS if self.peaks_only else FEWEST_SAMPLES
         if self.time.size < least:
             raise InputError(
                 f"{self.where}: must have {least} samples or more with time and angle, got"
@@ -185,7 +137,7 @@ class Work:
             )
 
     def pivot(self) -> dict[str, Floats] | None:
-        """The pivot's recorded motion, if there is any."""
+        """Return the pivot's recorded motion by direction, or None."""
         found = {
             name.removeprefix("pivot:"): values
             for name, values in self.extra.items()

@@ -1,7 +1,6 @@
-"""Half cycles, roughly: where a record passes its middle and how far it goes between.
+"""Half cycles of a record, without errors, for checks.
 
-This serves the checks of a record. The methods of identification have peaks and crossings of their
-own, with standard errors.
+The methods of identification have peaks and crossings of their own, with standard errors.
 """
 
 from __future__ import annotations
@@ -18,25 +17,17 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-DEAD: Final = 0.05
-"""Share of the amplitude nearby within which noise may cross the middle without being counted."""
+DEAD_BAND: Final = 0.05
+"""Median size within which a crossing of the middle is noise."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Swings:
-    """Half cycles of a record.
+    """Half cycles of a record about 0."""
 
-    Parameters
-    ----------
-    crossing : ndarray, shape (M + 1,)
-        Times at which the record passes its middle, s, by straight lines between samples.
-    peak_time, peak : ndarray, shape (M,)
-        The farthest sample between two of them, s and rad from the middle.
-    """
-
-    crossing: Floats
-    peak_time: Floats
-    peak: Floats
+    crossing: Floats  # s, linear between samples, shape (M + 1,)
+    peak_time: Floats  # s, of the farthest sample between two crossings, shape (M,)
+    peak: Floats  # rad from the middle, shape (M,)
 
     @property
     def period(self) -> Floats:
@@ -46,7 +37,7 @@ class Swings:
 
 
 def after_turns(theta: Floats) -> int:
-    """Return where a record about 0 begins to swing: it may go over the top before."""
+    """Return where a record about 0 begins to swing, after turns over the top."""
     if not theta.size or abs(float(theta[0])) <= math.pi:
         return 0
     passed = np.flatnonzero(theta * theta[0] <= 0)
@@ -54,10 +45,10 @@ def after_turns(theta: Floats) -> int:
 
 
 def swings(time: Floats, theta: Floats, *, least: float = 0.0) -> Swings:
-    """Return the half cycles of a record about 0 that go farther than ``least``."""
+    """Return the half cycles of a record about 0 that exceed ``least``."""
     none = np.empty(0)
-    # The sign last seen outside a dead band; the band is narrow where the swing is.
-    band = max(least, DEAD * float(np.quantile(np.abs(theta), 0.5)) if theta.size else 0.0)
+    # The sign last seen outside a dead band.
+    band = max(least, DEAD_BAND * float(np.quantile(np.abs(theta), 0.5)) if theta.size else 0.0)
     state = np.where(theta > band, 1, np.where(theta < -band, -1, 0))
     seen = np.flatnonzero(state)
     if seen.size == 0:
@@ -65,7 +56,10 @@ def swings(time: Floats, theta: Floats, *, least: float = 0.0) -> Swings:
     signs = state[seen]
     turns = np.flatnonzero(signs[1:] != signs[:-1])
     before, after = seen[turns], seen[turns + 1]
-    crossing = _crossings(time, theta, before, after)
+    # Straight lines through the samples around the band.
+    rise = theta[after] - theta[before]
+    share = -theta[before] / np.where(rise == 0, 1.0, rise)
+    crossing = time[before] + share * (time[after] - time[before])
     count = max(crossing.size - 1, 0)
     peak_time, peak = np.empty(count), np.empty(count)
     for k in range(count):
@@ -73,12 +67,3 @@ def swings(time: Floats, theta: Floats, *, least: float = 0.0) -> Swings:
         at = low + int(np.argmax(np.abs(theta[low : high + 1])))
         peak_time[k], peak[k] = time[at], theta[at]
     return Swings(crossing, peak_time, peak)
-
-
-def _crossings(
-    time: Floats, theta: Floats, before: NDArray[np.intp], after: NDArray[np.intp]
-) -> Floats:
-    """Where straight lines through the samples around the band pass 0."""
-    rise = theta[after] - theta[before]
-    share = -theta[before] / np.where(rise == 0, 1.0, rise)
-    return np.asarray(time[before] + share * (time[after] - time[before]))

@@ -1,14 +1,14 @@
-"""What a sample is away from a polynomial through its neighbours.
+"""Polynomials through neighbouring samples of any smooth motion.
 
-Nothing is assumed about the pendulum: a quartic through nine samples follows any motion that is
-sampled well, and what remains in the middle is noise (diagnosing outliers, missed counts and the
-noise floor all start here).
+A quartic through nine well-sampled readings follows any motion: its residual in the middle is
+noise, from which outliers, missed counts and the noise of a record are found.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -20,67 +20,56 @@ if TYPE_CHECKING:
 
 
 POINTS: Final = 9
-"""Samples a polynomial goes through."""
+"""Samples of a window."""
 
 _EVEN: Final = 1e-3
-"""Share of an interval by which samples may miss equal spacing and still count as even."""
+"""Relative error of an even interval."""
 
 _BLOCK: Final = 20_000
-"""Windows of uneven samples that are solved at a time: a few megabytes."""
+"""Uneven windows that are solved at a time."""
+
+_NORMAL_MAD: Final = 0.674489750196
+"""Median of the absolute value of a standard normal variable."""
+
+_OUTLIER: Final = 4.5
+"""Standard deviations from which a residual is left out."""
+
+_ROUNDS: Final = 4
+"""Repetitions of a fit without outliers at most."""
+
+_EVEN_WINDOW: Final = 1e-3
+
+_WINDOW_BLOCK: Final = 4096
+"""Windows of uneven samples that are solved at a time."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LocalFit:
-    """Residuals and slopes of polynomials through neighbouring samples.
+    """Residuals and slopes of polynomials through neighbouring samples."""
 
-    Parameters
-    ----------
-    middle : ndarray of int, shape (M,)
-        Which samples the residuals belong to.
-    residual : ndarray, shape (M,)
-        Reading less polynomial, divided by the noise gain: white noise of standard deviation
-        sigma gives residuals of standard deviation sigma.
-    slope : ndarray, shape (M,)
-        Derivative of the polynomial in the middle.
-    neighbours : int
-        How far to each side a window reaches, in samples.
-    sum_of_squares : float
-        Sum of the squared autocorrelations of the residuals of white noise: M residuals are worth
-        M over this many independent ones.
-    shares : ndarray, shape (points,)
-        Parts that the samples of a window have in the variance of a residual; they add up to 1.
-    """
-
-    middle: NDArray[np.intp]
-    residual: Floats
-    slope: Floats
-    neighbours: int
-    sum_of_squares: float
-    shares: Floats
+    middle: NDArray[np.intp]  # samples of the residuals, shape (M,)
+    residual: Floats  # reading less polynomial over the noise gain, shape (M,)
+    slope: Floats  # in the middle, shape (M,)
+    neighbours: int  # samples to each side of a window
+    sum_of_squares: float  # M residuals are worth M over this many independent ones
+    shares: Floats  # of the samples in the variance of a residual, shape (points,); sum 1
 
 
 def local_fit(
     time: Floats, theta: Floats, *, degree: int = 4, points: int = POINTS, stride: int = 1
 ) -> LocalFit:
-    """Fit a polynomial around every sample and say what remains of it.
+    """Fit a polynomial around every sample; return residuals and slopes in the middle.
 
-    Parameters
-    ----------
-    time, theta : ndarray, shape (N,)
-        s, increasing; rad.
-    degree : int
-        Of the polynomials.
-    points : int
-        Samples of a window, odd and more than ``degree + 1``.
-    stride : int
-        Every how manieth sample a window takes.
+    ``points`` is odd and more than ``degree + 1``; a window takes every ``stride``-th sample.
     """
     half = points // 2
     reach = half * stride
     count = time.size - 2 * reach
     weights, slopes = even_weights(degree, points)
     gain = np.sqrt(weights[half])
-    spread, shares = _spread(weights / gain), (weights / gain) ** 2
+    shares = (weights / gain) ** 2
+    autocorrelation = np.correlate(weights / gain, weights / gain, "full")
+    spread = float(np.sum(autocorrelation**2) / np.sum(shares) ** 2)
     if count <= 0:
         none = np.empty(0)
         return LocalFit(np.empty(0, np.intp), none, none, reach, spread, shares)
@@ -99,7 +88,7 @@ def local_fit(
     residual /= gain
     slope /= interval
     uneven = np.flatnonzero(worst > _EVEN)
-    # A gap of many intervals is no window: a polynomial across it says nothing about noise.
+    # A polynomial across a gap of many intervals shows no noise.
     across = worst > half
     for start in range(0, uneven.size, _BLOCK):
         block = uneven[start : start + _BLOCK]
@@ -122,13 +111,8 @@ def even_weights(degree: int, points: int) -> tuple[Floats, Floats]:
     return weights, inverse[1] / half
 
 
-def _spread(weights: Floats) -> float:
-    autocorrelation = np.correlate(weights, weights, "full")
-    return float(np.sum(autocorrelation**2) / np.sum(weights**2) ** 2)
-
-
 def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Residual over its gain, and slope, of windows (M, points) of their own spacing."""
+    """Return residual over its gain, and slope, of windows (M, points) of their own spacing."""
     half = theta.shape[1] // 2
     width = np.maximum(np.max(np.abs(lag), axis=1), 1e-12)
     x = lag / width[:, None]
@@ -144,3 +128,174 @@ def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats]:
     slope[sound] = np.linalg.solve(r[sound], right[:, :, None])[:, 1, 0] / width[sound]
     residual = np.where(sound, (theta[:, half] - fitted) / gain, np.nan)
     return residual, slope
+
+
+@dataclasses.dataclass(frozen=True)
+class WindowFit:
+    """A polynomial ``sum_j c_j ((t - centre) / half)**j`` fitted to samples of unit weight."""
+
+    centre: float  # of the window, s
+    half: float  # width of the window, s
+    coefficients: Floats  # rad, shape (degree + 1,)
+    covariance: Floats  # of the coefficients for noise of unit variance
+    points: int  # samples used
+    residual: float  # root of the squared residuals over the degrees of freedom, rad
+
+    def at(self, time: float, derivative: int = 0) -> tuple[float, float]:
+        """Return a derivative and its standard error for unit noise, in rad/s^derivative."""
+        size = self.coefficients.size
+        row = np.zeros(size)
+        s = (time - self.centre) / self.half
+        for j in range(derivative, size):
+            row[j] = math.perm(j, derivative) * s ** (j - derivative) / self.half**derivative
+        return float(row @ self.coefficients), math.sqrt(
+            max(float(row @ self.covariance @ row), 0.0)
+        )
+
+    def turn(self) -> float | None:
+        """Return the instant nearest to the centre at which the velocity is zero, s."""
+        slopes = self.coefficients[1:] * np.arange(1, self.coefficients.size)
+        return self._nearest_root(slopes)
+
+    def zero(self) -> float | None:
+        """Return the instant nearest to the centre at which the angle is zero, s."""
+        return self._nearest_root(self.coefficients)
+
+    def _nearest_root(self, ascending: Floats) -> float | None:
+        # Newton's method from the middle nearly always converges and is faster than all roots.
+        found = _newton(ascending.tolist())
+        if found is None:
+            roots = np.roots(ascending[::-1])
+            real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
+            real = real[np.abs(real) < 1]
+            if real.size == 0:
+                return None
+            found = float(real[np.argmin(np.abs(real))])
+        return self.centre + self.half * found
+
+
+def _newton(ascending: list[float]) -> float | None:
+    """Return a root within half a unit of 0 by Newton's method, or None."""
+    s = 0.0
+    for _ in range(20):
+        value = slope = 0.0
+        for c in reversed(ascending):
+            slope = slope * s + value
+            value = value * s + c
+        if slope == 0:
+            return None
+        step = value / slope
+        s -= step
+        if abs(s) > 0.5:  # noqa: PLR2004
+            return None
+        if abs(step) < 1e-13:  # noqa: PLR2004
+            return s
+    return None
+
+
+def fit_around(  # noqa: PLR0913 (samples, window, form)
+    time: Floats,
+    theta: Floats,
+    centre: float,
+    half: float,
+    powers: tuple[int, ...],
+    *,
+    sigma: float = 0.0,
+    begin: float = -math.inf,
+) -> WindowFit | None:
+    """Fit a polynomial of these powers to the samples within ``half`` of ``centre``, s.
+
+    Samples 4.5 times ``sigma`` off are left out and the fit is repeated; 0 keeps all. Samples
+    before ``begin`` are not used. Returns None where there are no more samples than powers.
+    """
+    first, last = np.searchsorted(time, (max(centre - half, begin), centre + half * (1 + 1e-9)))
+    s, x = (time[first:last] - centre) / half, theta[first:last]
+    if x.size <= len(powers):
+        return None
+    rows = s[:, None] ** np.array(powers)
+    inverse, coefficients, residual = _solve(rows, x)
+    for _ in range(_ROUNDS if sigma > 0 else 0):
+        if float(np.abs(residual).max()) <= _OUTLIER * sigma:
+            break
+        scale = max(sigma, float(np.median(np.abs(residual))) / _NORMAL_MAD)
+        good = np.abs(residual) < _OUTLIER * scale
+        if good.all() or good.sum() <= len(powers) + 1:
+            break
+        rows, x = rows[good], x[good]
+        inverse, coefficients, residual = _solve(rows, x)
+    every, square = np.zeros(max(powers) + 1), np.zeros((max(powers) + 1,) * 2)
+    every[list(powers)] = coefficients
+    square[np.ix_(powers, powers)] = inverse
+    freedom = x.size - len(powers)
+    return WindowFit(
+        centre, half, every, square, x.size, math.sqrt(float(residual @ residual) / freedom)
+    )
+
+
+def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the inverse normal matrix, the solution and the residual."""
+    # Different times, scaled to the window, make the matrix far from singular.
+    inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
+    coefficients = inverse @ (rows.T @ x)
+    return inverse, coefficients, x - rows @ coefficients
+
+
+def smoothed_velocity(
+    time: Floats, theta: Floats, half: float, degree: int = 4
+) -> tuple[Floats, Floats]:
+    """Return the velocity by local polynomials, rad/s, and its error for unit noise, 1/s.
+
+    Windows reach ``half`` (s) to both sides, and more where they have too few samples.
+    """
+    step = float(np.median(np.diff(time)))
+    reach = max(round(half / step), degree // 2 + 2)
+    width = 2 * reach + 1
+    if time.size < width:
+        raise ValueError(f"{time.size} samples are fewer than a window of {width}")
+    scale = half if half > 0 else 1.0
+    slope, stderr = np.empty(time.size), np.empty(time.size)
+    # One set of weights serves all windows of evenly spaced samples.
+    lags = np.arange(-reach, reach + 1) * (step / scale)
+    rows = lags[:, None] ** np.arange(degree + 1)
+    normal = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
+    inside = slice(reach, time.size - reach)
+    slope[inside] = np.correlate(theta, rows @ normal[1], "valid") / scale
+    stderr[inside] = math.sqrt(normal[1, 1]) / scale
+    odd = np.flatnonzero(~_evenly(time, step, reach))
+    for begin in range(0, odd.size, _WINDOW_BLOCK):
+        some = odd[begin : begin + _WINDOW_BLOCK]
+        slope[some], stderr[some] = _slopes(time, theta, some, width, scale, degree)
+    return slope, stderr
+
+
+def _evenly(time: Floats, step: float, reach: int) -> NDArray[np.bool_]:
+    """Return around which samples a window of ``reach`` to each side is evenly spaced."""
+    even = np.zeros(time.size, bool)
+    # All intervals of a window together may be off by as much as one.
+    off = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(time) / step - 1.0) > _EVEN_WINDOW)))
+    drift = np.abs(time[2 * reach :] - time[: time.size - 2 * reach] - 2 * reach * step)
+    even[reach : time.size - reach] = (off[2 * reach :] == off[: time.size - 2 * reach]) & (
+        drift < _EVEN_WINDOW * step * math.sqrt(2 * reach)
+    )
+    return even
+
+
+def _slopes(  # noqa: PLR0913, PLR0917 (samples, window, form)
+    time: Floats, theta: Floats, at: NDArray[np.intp], width: int, scale: float, degree: int
+) -> tuple[Floats, Floats]:
+    """Return slopes and their errors at some samples, each from a window of its own spacing."""
+    # The first and the last whole window serve the ends.
+    first = np.clip(at - width // 2, 0, time.size - width)
+    within = first[:, None] + np.arange(width)
+    s, x = (time[within] - time[at, None]) / scale, theta[within]
+    sums, moments = np.empty((at.size, 2 * degree + 1)), np.empty((at.size, degree + 1))
+    power = np.ones_like(s)
+    for k in range(2 * degree + 1):
+        sums[:, k] = power.sum(axis=1)
+        if k <= degree:
+            moments[:, k] = np.einsum("ij,ij->i", power, x)
+        power *= s
+    order = np.arange(degree + 1)
+    normal = np.linalg.inv(sums[:, order[:, None] + order])
+    slope = np.sum(normal[:, 1, :] * moments, axis=1) / scale
+    return slope, np.sqrt(np.maximum(normal[:, 1, 1], 0.0)) / scale

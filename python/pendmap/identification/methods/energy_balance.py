@@ -12,7 +12,7 @@ from pendmap.identification.methods.combined import unphysical
 from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.period import frequency, viscous_work
 from pendmap.identification.uncertainty import chain_covariance, chain_least_squares, estimates
-from pendmap.signal.window_polynomial import smoothed_velocity
+from pendmap.signal.local_polynomial import smoothed_velocity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -1,0 +1,407 @@
+"""Checks of channels against each other: velocity, acceleration and pivot against the angle.
+
+A swing alone does not tell the distance of a tangential sensor from the sense of its axis: it reads
+``(g - r w0**2) sin(th)``. A step ``s`` of a pivot's places read every ``h`` seconds is one of
+``s / h^2`` in its acceleration (1000 m/s^2 for 1 mm at 1 kHz): there cubics are fitted.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.formatting import counted
+from pendmap.model.quantities import GRAVITY
+from pendmap.records.resolution import step_of
+from pendmap.records.rod_sensors import Accelerometer
+from pendmap.records.units import PIVOT_UNITS
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import even_times
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from pendmap.records.work import Work
+
+    Floats = NDArray[np.float64]
+
+
+SAME_MOTION: Final = 0.8
+"""Correlation from which two channels show the same motion."""
+
+GAIN_OFF: Final = 0.1
+"""Relative error that a gain of 1 may have: filtered channels miss a few per cent."""
+
+CERTAIN_SIGN: Final = 8.0
+"""Standard errors from which a coefficient has the wrong sign."""
+
+FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}
+"""Largest span of a pivot in a laboratory, by unit."""
+
+DERIVATIVE_SPAN: Final = 0.12
+"""Periods over which derivatives are taken."""
+
+CHECK_ONLY: Final = "a check, not fitted: the angle is"
+"""Why an acceleration beside an angle is not used."""
+
+PIVOT_ORDER: Final = {"m": 2, "m/s": 1}
+"""Derivatives from a unit of the pivot to an acceleration."""
+
+NOISE_SHARE: Final = 0.05
+"""Noise of the pivot's acceleration over its largest value, at most."""
+
+STEPS_PASSED: Final = 4.0
+"""Steps that a moving pivot passes within a window at least."""
+
+LONGEST_WINDOW: Final = 0.2
+"""Seconds that a window spans at most, unless it then holds only five readings."""
+
+MOVING_SHARE: Final = 0.2
+"""Speed over the largest from which the pivot moves."""
+
+
+def check(work: Work) -> None:
+    """Turn channels that run against the angle; report those that do not follow it."""
+    if "velocity" in work.extra:
+        _velocity(work)
+    if "acceleration" in work.extra:
+        _acceleration(work)
+    if work.plan.kind == "forced":
+        _far(work)
+        _drive_sign(work)
+
+
+def _far(work: Work) -> None:
+    """Report a pivot whose span shows another unit."""
+    unit, _ = PIVOT_UNITS[(work.plan.pivot or {}).get("unit", "m/s2")]
+    for way, values in (work.pivot() or {}).items():
+        good = values[np.isfinite(values)]
+        span = float(np.ptp(good)) if good.size else 0.0
+        if span > FARTHEST_PIVOT[unit]:
+            text = f"the pivot's {way} motion spans {span:.4g} {unit}: its unit is another"
+            work.say("pivot-unit", text)
+
+
+def _velocity(work: Work) -> None:
+    """Compare a velocity with the slope of the angle: turn it, rescale it or leave it out."""
+    velocity = work.extra["velocity"]
+    missing = ~np.isfinite(velocity)
+    if missing.any():
+        text = f"{counted(int(missing.sum()), 'sample')} without velocity: the channel is left out"
+        work.say("velocity-missing", text)
+        del work.extra["velocity"]
+        return
+    if work.integrated:
+        return  # nothing to compare it with
+    fit = local_fit(work.time, work.theta)
+    which = work.trusted[fit.middle]
+    slope, seen = fit.slope[which], velocity[fit.middle][which]
+    scale = float(np.max(np.abs(seen), initial=0.0))
+    if slope.size < 10 or scale == 0 or float(np.std(slope)) == 0 or float(np.std(seen)) == 0:
+        return
+    seen = seen / scale  # squares of huge numbers overflow
+    alike = float(np.corrcoef(slope, seen)[0, 1])
+    if abs(alike) < SAME_MOTION:
+        text = f"the velocity does not follow the angle (correlation {alike:.2f}): it is left out"
+        work.say("velocity-unlike", text)
+        del work.extra["velocity"]
+        return
+    gain = float(np.dot(slope, seen) / np.dot(slope, slope)) * scale
+    if alike < 0:
+        work.extra["velocity"] = -velocity
+        text = "the velocity has the other sign than the angle: turned round, the angle counts"
+        work.say("sign-turned", text, mended=True)
+    gain = abs(gain)
+    if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
+        work.extra["velocity"] = work.extra["velocity"] * math.pi / 180
+        text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
+        work.say("velocity-unit", text, mended=True)
+    elif abs(gain - 1) > GAIN_OFF:
+        work.say("velocity-scale", f"the velocity is {gain:.3g} times the angle's derivative")
+
+
+def _drive_sign(work: Work) -> None:
+    """Regress the second derivative of the angle on gravity and on the pivot's acceleration.
+
+    th'' = -w0^2 sin th - (a_vertical / l) sin th + (-a_lateral / l) cos th: both coefficients are
+    negative where upward and toward positive theta are positive.
+    """
+    from scipy.signal import savgol_filter
+
+    interval, even = even_times(work.time)
+    count, good = even.size, work.trusted
+    if count < 100 or not good.any():
+        return
+    theta = np.interp(even, work.time[good], work.theta[good])
+    w0 = work.known.get("w0") or 6.0
+    window = max(round(DERIVATIVE_SPAN * 2 * math.pi / w0 / interval), 5) | 1
+    if window > count // 4:
+        return
+
+    def smooth(values: Floats, derivative: int = 0) -> Floats:
+        smoothed: Floats = savgol_filter(values, window, 3, deriv=derivative, delta=interval)
+        return smoothed
+
+    sine, cosine = np.sin(theta), np.cos(theta)
+    columns, names = [smooth(sine)], [""]
+    for name, accelerating in _pushes(work, even, smooth).items():
+        columns.append(smooth(accelerating * (cosine if name == "horizontal" else sine)))
+        names.append(name)
+    table = np.column_stack(columns)
+    if len(names) == 1 or np.linalg.matrix_rank(table) < len(names):
+        return
+    target = smooth(theta, 2)
+    answer = np.linalg.lstsq(table, target, rcond=None)[0]
+    rest = target - table @ answer
+    worth = max(count / window, len(names) + 1.0)
+    variance = float(np.sum(rest**2)) / count * (count / worth)
+    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 1e-300))
+    if answer[0] > 0:
+        return  # no pendulum about 0: nothing to tell a sign by
+    for name, value, error in zip(names[1:], answer[1:], errors[1:], strict=True):
+        if value > CERTAIN_SIGN * error:
+            said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
+            text = f"{said} acts with the other sign than the angle shows: turned by 180 degrees?"
+            text += "" if name == "drive" else " sign = -1 in pivot turns it"
+            work.say("sign-turned", text)
+
+
+def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
+    """Return the accelerations of the pivot, or a(t) of the drive, at even times."""
+    found: dict[str, Floats] = {}
+    plan = work.plan
+    if plan.drive is not None and plan.drive["phi"] is not None:
+        p, omega = plan.drive["p"] or 0.0, plan.drive["Omega"] or 0.0
+        if p:
+            found["drive"] = p * np.cos(omega * even + plan.drive["phi"])
+    unit, _ = PIVOT_UNITS[(plan.pivot or {}).get("unit", "m/s2")]
+    order = {"m/s": 1, "m": 2}.get(unit, 0)
+    for way, values in (work.pivot() or {}).items():
+        good = np.isfinite(values)
+        if np.count_nonzero(good) < even.size // 2 or np.std(values[good]) == 0:
+            continue
+        if np.max(np.abs(values[good])) < 1e6:
+            motion = np.interp(even, work.time[good], values[good])
+            found[way] = smooth(motion, order) if order else motion
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class _Motion:
+    """Smoothed angle and derivatives where they are known, and the measured acceleration."""
+
+    theta: Floats
+    velocity: Floats
+    acceleration: Floats
+    measured: Floats
+    w0: float
+
+    def expected(self, sensor: Accelerometer) -> Floats:
+        """Return the readings that the motion of the angle would cause."""
+        r, g = sensor.distance_m, sensor.gravity
+        if sensor.direction == "radial":
+            return np.asarray(r * self.velocity**2 + g * np.cos(self.theta))
+        return np.asarray(r * self.acceleration + g * np.sin(self.theta))
+
+
+def _acceleration(work: Work) -> None:
+    """Compare an acceleration with the angle beside it; turn it if its sign is the other."""
+    if work.made_of is not None:
+        return
+    if work.plan.kind == "forced":
+        text = "the acceleration is not used: on a forced run it holds the pivot's own"
+        work.say("acceleration-unused", text)
+        return
+    motion = _motion(work)
+    if motion is None:
+        text = "the acceleration is not used: too few samples beside the angle to compare it"
+        work.say("acceleration-unused", text)
+    elif work.accelerometer is None:
+        _unplaced(work, motion)
+    else:
+        _compared(work, motion, work.accelerometer)
+
+
+def _motion(work: Work) -> _Motion | None:
+    """Return the derivatives of the angle by polynomials through a part of a period."""
+    from scipy.signal import savgol_filter
+
+    measured = work.extra["acceleration"]
+    good = work.trusted & np.isfinite(measured)
+    interval, even = even_times(work.time)
+    count = even.size
+    if np.count_nonzero(good) < 100 or not count:
+        return None
+    theta = np.interp(even, work.time[good], work.theta[good])
+    seen = np.interp(even, work.time[good], measured[good])
+    inside = np.interp(even, work.time, good.astype(float)) > 0.99
+    crossings = np.count_nonzero(np.diff(np.sign(theta[inside] - np.median(theta[inside]))))
+    if crossings < 4:
+        return None
+    # Noise crosses the middle, too: this is a lower bound of the period.
+    period = 2 * float(np.count_nonzero(inside)) * interval / crossings
+    window = max(round(DERIVATIVE_SPAN * period / interval), 5) | 1
+    if window > count // 4:
+        return None
+    zeroth, first, second = (
+        np.asarray(savgol_filter(theta, window, 4, deriv=k, delta=interval)) for k in range(3)
+    )
+    smoothed = np.asarray(savgol_filter(seen, window, 4))
+    inside[: window // 2] = inside[count - window // 2 :] = False
+    sine = np.sin(zeroth[inside])
+    slope = _slope(sine, second[inside])
+    if slope >= 0:
+        return None
+    w0 = math.sqrt(-slope)
+    return _Motion(zeroth[inside], first[inside], second[inside], smoothed[inside], w0)
+
+
+def _slope(x: Floats, y: Floats) -> float:
+    """Return the slope of the least-squares line through points."""
+    x = x - np.mean(x)
+    power = float(np.dot(x, x))
+    return float(np.dot(x, y - np.mean(y))) / power if power else 0.0
+
+
+def _alike(one: Floats, other: Floats) -> float:
+    """Return the correlation of two channels; 0 where one is constant."""
+    if float(np.std(one)) == 0 or float(np.std(other)) == 0:
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])
+
+
+def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
+    """Report how an acceleration compares with the readings expected at its place."""
+    expected = motion.expected(sensor)
+    alike, gain = _alike(expected, motion.measured), _slope(expected, motion.measured)
+    where = (
+        "" if sensor.direction == "angular" else f", {sensor.direction} at {sensor.distance_m:g} m"
+    )
+    if abs(alike) < SAME_MOTION:
+        text = (
+            f"the acceleration is not used: it does not follow the angle (correlation {alike:.2f}"
+            f"{where}): direction or column is another, or its noise hides the swing"
+        )
+        work.say("acceleration-unlike", text)
+        return
+    if gain < 0:
+        work.extra["acceleration"] = -work.extra["acceleration"]
+        text = "the acceleration has the other sign than the angle: turned round, the angle counts"
+        work.say("sign-turned", text, mended=True)
+    gain = abs(gain)
+    if abs(gain - 1) > GAIN_OFF:
+        text = (
+            f"the acceleration is {gain:.3g} times what the angle says{where}:"
+            f" {_other(motion, sensor)}; not used"
+        )
+        work.say("acceleration-scale", text)
+        return
+    text = f"the acceleration is {gain:.3g} times what the angle says{where}: {CHECK_ONLY}"
+    work.say("acceleration-agrees", text)
+
+
+def _other(motion: _Motion, sensor: Accelerometer) -> str:
+    """Return other places or units that would explain the readings."""
+    if sensor.direction == "angular":
+        return "its unit, or a distance"
+    measured = motion.measured * math.copysign(
+        1.0, _alike(motion.expected(sensor), motion.measured)
+    )
+    distance = _distance(dataclasses.replace(motion, measured=measured), sensor)
+    found = f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
+    return f"{found} or gravity_removed is wrong"
+
+
+def _distance(motion: _Motion, sensor: Accelerometer) -> float:
+    """Return the distance that the readings show, m, for the given gravity and direction."""
+    if sensor.direction == "radial":
+        rest = motion.measured - sensor.gravity * np.cos(motion.theta)
+        return _slope(motion.velocity**2, rest)
+    gain = _slope(np.sin(motion.theta), motion.measured)
+    return (sensor.gravity - gain) / motion.w0**2
+
+
+def _unplaced(work: Work, motion: _Motion) -> None:
+    """Report where an accelerometer of unknown place seems to be."""
+    gravity = float(work.known.get("gravity", GRAVITY))
+    sine = _alike(np.sin(motion.theta), motion.measured)
+    radial = _alike(motion.velocity**2, motion.measured)
+    if max(abs(sine), abs(radial)) < SAME_MOTION:
+        text = "the acceleration is not used: it follows neither the angle nor the velocity squared"
+        work.say("acceleration-unlike", text)
+        return
+    if abs(radial) > abs(sine):
+        turned = dataclasses.replace(motion, measured=math.copysign(1.0, radial) * motion.measured)
+        distance = _distance(turned, Accelerometer("radial", 1.0, gravity))
+        without = _distance(turned, Accelerometer("radial", 1.0, 0.0))
+        said = f'"radial", with distance_m {distance:.3g}, or {without:.3g} if gravity is removed'
+    else:
+        gain = abs(_slope(np.sin(motion.theta), motion.measured))
+        near, far = (abs(gravity - s * gain) / motion.w0**2 for s in (1, -1))
+        without = gain / motion.w0**2
+        near_too = f"{near:.3g} or " if gain < gravity else ""
+        said = (
+            f'"tangential", with distance_m {near_too}{far:.3g} by the sense of its axis, or'
+            f" {without:.3g} if gravity is removed"
+        )
+    text = (
+        f"the acceleration looks {said}; {work.place_missing} in [columns] would make it"
+        f" {CHECK_ONLY}"
+    )
+    work.say("acceleration-unused", text)
+
+
+def smooth_pivot(work: Work) -> None:
+    """Replace places or speeds of the pivot that come in steps by smooth accelerations."""
+    order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
+    motion = work.pivot() or {}
+    if not order or work.time.size < 20 or not all(np.isfinite(v).all() for v in motion.values()):
+        return
+    interval, even = even_times(work.time)
+    if not even.size:
+        return
+    places = {way: np.interp(even, work.time, values) for way, values in motion.items()}
+    windows = [
+        _cubic_window(places[way], step_of(values), order, interval)
+        for way, values in motion.items()
+        if np.ptp(values) > 0
+    ]
+    if not windows or max(windows) < 7:
+        return
+    from scipy.signal import savgol_filter
+
+    for way, values in places.items():
+        pushed = savgol_filter(values, max(windows), 3, deriv=order, delta=interval)
+        work.extra[f"pivot:{way}"] = np.interp(work.time, even, pushed)
+    what = "places" if order == 2 else "speeds"
+    text = (
+        f"the pivot's {what} come in steps: its acceleration is that of cubics through"
+        f" {max(windows)} readings, {max(windows) * interval:.3g} s"
+    )
+    work.say("pivot-smoothed", text, mended=True)
+    work.pivot_unit = "m/s2"
+
+
+def _cubic_window(values: Floats, step: float, order: int, interval: float) -> int:
+    """Return the number of readings that a cubic is fitted to: 5 where none is needed."""
+    from scipy.signal import savgol_coeffs, savgol_filter
+
+    time = interval * np.arange(values.size, dtype=np.float64)
+    rest = np.abs(local_fit(time, values).residual)
+    felt = rest[rest > 1e-9 * np.ptp(values)]
+    noise = max(step / math.sqrt(12), float(np.median(felt)) if felt.size else 0.0)
+    most = max(min(int(LONGEST_WINDOW / interval), values.size // 4), 5)
+    for window in range(5, most + 1, 2):
+        gain = float(np.linalg.norm(savgol_coeffs(window, 3, deriv=order, delta=interval)))
+        pushed = savgol_filter(values, window, 3, deriv=order, delta=interval)
+        change = np.abs(savgol_filter(values, window, 3, deriv=1, delta=interval))
+        speed = float(np.median(change[change >= MOVING_SHARE * change.max()]))
+        passed = speed * window * interval >= STEPS_PASSED * step
+        if passed and gain * noise <= NOISE_SHARE * float(np.max(np.abs(pushed))):
+            return window
+    return most - (most + 1) % 2
