@@ -23,7 +23,7 @@ import numpy as np
 
 from peers.report import machine, note, say, table
 from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, identify
-from pendmap.identification.methods.registry import combined, de_paula, decrement, log_decrement
+from pendmap.identification.methods import combined, de_paula, decrement, log_decrement
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive

@@ -76,7 +76,7 @@ class Peaks:
         stderr_time: float = 0.0,
         stderr_amplitude: float = 0.0,
     ) -> Peaks:
-        """Return peaks that somebody else has measured; absolute values get alternating signs."""
+        """Return peaks that were measured elsewhere; absolute values get alternating signs."""
         t, a = np.asarray(time, float), np.asarray(amplitude, float)
         if t.ndim != 1 or t.shape != a.shape:
             raise InputError(
@@ -93,21 +93,21 @@ class Peaks:
 
     @property
     def known(self) -> bool:
-        """Whether their standard errors are known."""
+        """Whether the standard errors are known."""
         return bool(np.any(self.stderr_time > 0) or np.any(self.stderr_amplitude > 0))
 
     @property
     def odd(self) -> NDArray[np.bool_]:
-        """Which peaks begin an odd half cycle, shape (P,)."""
+        """Peaks that begin an odd half cycle, as a mask, shape (P,)."""
         return np.asarray(self.index % 2 == 1)
 
     @property
     def turned(self) -> Peaks:
-        """Only those at which the pendulum turned and was seen: no stop, nothing clipped."""
+        """Peaks at which the pendulum turned and was seen: no stop, nothing clipped."""
         return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
 
     def later(self, seconds: float) -> Peaks:
-        """Return the same on a clock that shows so much more."""
+        """Return the peaks on a clock that is ahead by some seconds."""
         return dataclasses.replace(
             self, time=self.time + seconds, crossing_time=self.crossing_time + seconds
         )
@@ -123,13 +123,7 @@ class Peaks:
 def samples(
     time: ArrayLike, theta: ArrayLike, trusted: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
-    """Return the samples that may be used, as arrays.
-
-    Raises
-    ------
-    InputError
-        If the lengths differ, a sample that is trusted is not finite, or time does not increase.
-    """
+    """Return the trusted samples as arrays; refuse what is not finite or does not increase."""
     t, x = np.asarray(time, float), np.asarray(theta, float)
     good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
@@ -226,7 +220,7 @@ def find_peaks(
 def _finder(
     time: Floats, theta: Floats, sigma: float | None
 ) -> tuple[Finder | CoarseFinder | None, float]:
-    """What suits the samples, or nothing where the record does not swing; and the noise."""
+    """Return a finder that suits the sampling, None without swings; and the noise."""
     if is_coarse(time, theta):
         coarse = coarse_finder(time, theta, sigma)
         return (coarse if coarse.swings else None), coarse.sigma
@@ -236,7 +230,7 @@ def _finder(
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
-    """Numbers of the peaks: signs alternate, and a gap in the record hides an even number."""
+    """Return numbers of the peaks: signs alternate, and a gap hides an even number."""
     result = [0] if ends else []
     for before, after in itertools.pairwise(ends):
         mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)
