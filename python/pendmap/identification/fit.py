@@ -39,11 +39,11 @@ class TrajectoryFit:
     """A pendulum fitted to records, in SI."""
 
     estimates: Mapping[str, Estimate]  # profile intervals; name[k] belongs to run k
-    ends: Mapping[str, tuple[float, float]]  # of the intervals; NaN where not found
+    ends: Mapping[str, tuple[float, float]]  # ends of the intervals; NaN where not found
     names: tuple[str, ...]  # free parameters, in the order of the covariance
     covariance: NDArray[np.float64]  # shape (k, k)
-    chi2: float  # of intervals: -2 log P, shifted to 1 a reading
-    samples: int  # that count
+    chi2: float  # sum of squares; of interval readings -2 log P
+    samples: int  # samples that count
     degrees: int  # samples less adapted numbers
     rms: float  # of the residuals that count, rad
     model: Rig  # as found; negative damping is set to 0
@@ -51,7 +51,7 @@ class TrajectoryFit:
     residuals: tuple[NDArray[np.float64], ...]  # reading less model, rad; 0: does not count
     white: tuple[NDArray[np.float64], ...]  # residuals of unit variance
     windows: tuple[tuple[int, int, int, float, float], ...]  # run, first, last + 1, state
-    steps: int  # of the search
+    steps: int  # steps of the search
     converged: bool  # whether the search ended
     given_up: bool  # whether the target was out of reach
     widening: float  # of the intervals, squared: above 1 where the model does not fit

@@ -152,16 +152,14 @@ def find_peaks(
     at a peak ``A``; it shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half width
     ``h``. The window is as wide as lets this be a quarter of the standard error, and 1.3 rad of
     phase at most. Coulomb friction bends the two sides of a peak differently, which makes its time
-    late by ``5/32 h theta_r / sin A``: this is taken off, with ``theta_r`` from the sizes of the
-    peaks, and a fifth of it counts as error.
-    Amplitudes are freed of the excess ``stderr(v)^2 / (2 abs(theta''))`` that the highest point of
-    a noisy curve has on average.
+    late by ``5/32 h theta_r / sin A``: this is subtracted, with ``theta_r`` from the sizes of the
+    peaks, and a fifth of it counts as error. From amplitudes the mean excess of the highest point
+    of a noisy curve is subtracted, ``stderr(v)^2 / (2 abs(theta''))``.
 
-    With fewer than 20 samples a period (of small swings) no quartic has samples enough. Peaks and
-    crossings are then those of a pendulum's swings,
-    ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0``, fitted to the samples within
-    half a swing, with parameters that 12 turns in a row share, and found again for the next 12.
-    Errors hold the noise, that of these parameters, and what the form misses.
+    With fewer than 20 samples a period (of small swings) peaks and crossings are those of a
+    pendulum's swings, ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0``, fitted to
+    the samples within half a swing, with parameters that each 12 turns in a row share. Errors
+    include the noise, the errors of these parameters, and the misfit of the form.
 
     Parameters
     ----------
