@@ -11,22 +11,15 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-MOST = 500
+MOST: Final = 500
 """Characters of a message."""
 
 
 def one_line(text: str) -> str:
-    """Return a text on one line as a terminal may show it: no control characters, 500 at most.
+    """Return a text on one line of 500 characters at most, control characters as escapes.
 
-    Parameters
-    ----------
-    text : str
-        A message; file names, values and what libraries say may stand in it.
-
-    Returns
-    -------
-    str
-        Control characters and marks of direction as escapes; the middle left out where it is long.
+    File names, values and messages of libraries may stand in it; its middle is left out if it is
+    long.
     """
     line = " ".join(text[: 100 * MOST].split())
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
@@ -68,8 +61,10 @@ MOST_PERIODS: Final = 2**31 - 1
 MOST_SAMPLES: Final = 10_000
 MOST_SEED: Final = 2**63 - 1
 MOST_THREADS: Final = 256
+"""Greatest values of arguments."""
 
-_LONGEST = 60
+_LONGEST: Final = 60
+"""Characters of a value in a message."""
 
 
 def short_repr(value: object) -> str:
@@ -87,13 +82,7 @@ def _bare(value: Any) -> Any:  # noqa: ANN401 (whatever was given)
 
 
 def instruction_set() -> str:
-    """Return the instruction set that is computed with.
-
-    Raises
-    ------
-    InputError
-        If ``PENDMAP_SIMD`` names none that this processor has.
-    """
+    """Return the instruction set in use; refuse a ``PENDMAP_SIMD`` that is not available."""
     from pendmap import _core  # noqa: PLC0415 (heavy; the command line reads only the bounds)
 
     with core_errors():
@@ -101,13 +90,7 @@ def instruction_set() -> str:
 
 
 def check_number(name: str, value: object) -> float:
-    """Return any finite real number as a float.
-
-    Raises
-    ------
-    InputError
-        For anything else, a ``bool`` included.
-    """
+    """Return any finite real number as a float; refuse anything else, ``bool`` included."""
     value = _bare(value)
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise InputError(f"{name} must be a number, got {short_repr(value)}")
@@ -121,13 +104,7 @@ def check_number(name: str, value: object) -> float:
 
 
 def check_whole(name: str, value: object, least: int, most: int) -> int:
-    """Return a whole number between two bounds, both included, as an int.
-
-    Raises
-    ------
-    InputError
-        For anything else, ``2.0`` and a ``bool`` included.
-    """
+    """Return a whole number from ``least`` to ``most`` as an int; refuse 2.0 and ``bool``."""
     value = _bare(value)
     wanted = f"{name} must be a whole number from {least} to {most}"
     if isinstance(value, bool):
@@ -142,13 +119,7 @@ def check_whole(name: str, value: object, least: int, most: int) -> int:
 
 
 def check_flag(name: str, value: object) -> bool:
-    """Return a switch.
-
-    Raises
-    ------
-    InputError
-        If it is neither ``True`` nor ``False``.
-    """
+    """Return True or False; refuse anything else."""
     value = _bare(value)
     if not isinstance(value, bool):
         raise InputError(f"{name} must be True or False, got {short_repr(value)}")
@@ -156,25 +127,13 @@ def check_flag(name: str, value: object) -> bool:
 
 
 def check_callable(name: str, value: object, of: str = "two numbers, done and in all") -> None:
-    """Refuse what is neither ``None`` nor can be called, as a function ``of`` something.
-
-    Raises
-    ------
-    InputError
-        If it is something else.
-    """
+    """Refuse anything that is neither ``None`` nor a function ``of`` something."""
     if value is not None and not callable(value):
         raise InputError(f"{name} must be a function of {of}, got {short_repr(value)}")
 
 
 def check_type(name: str, value: object, kind: type, example: str) -> None:
-    """Refuse what is not of a type of pendmap's; ``example`` says how one is made.
-
-    Raises
-    ------
-    InputError
-        If it is of another type.
-    """
+    """Refuse anything not of a type; ``example`` shows how one is made."""
     if not isinstance(value, kind):
         article = ("an " if kind.__name__[0] in "AEIOU" else "a ") + kind.__name__
         raise InputError(f"{name} must be {article}, like {example}, got {short_repr(value)}")

@@ -1,4 +1,4 @@
-"""Words and digits that depend on numbers."""
+"""Numbers, counts and tables as text: the only place where numbers with errors become words."""
 
 from __future__ import annotations
 
@@ -12,36 +12,46 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     Table = tuple[Sequence[str], Sequence[Sequence[str]]]
-    from collections.abc import Sequence
 
 
 DIGITS: Final = 5
 """Digits of a number whose uncertainty is not known."""
 
 PLACES: Final = 10
-"""Places after the point up to which a number is written out."""
+"""Most decimal places of a number."""
+
+ERROR_DIGITS: Final = 2
+"""Digits of a standard error."""
+
+MOST_PLACES: Final = 15
+"""Most decimal places of an estimate."""
 
 LONG_AGO: Final = 1e3
-"""Seconds from which six digits are no longer milliseconds."""
+"""Time from which six digits are coarser than milliseconds, s."""
 
 
 def counted(count: int, noun: str, several: str = "") -> str:
-    """Return ``1 period``, ``2 periods``; ``several`` is the plural where that takes no s."""
+    """Return ``1 period``, ``2 periods``; ``several`` is an irregular plural."""
     return f"{count} {noun}" if count == 1 else f"{count} {several or noun + 's'}"
 
 
+def percent(value: float) -> str:
+    """Return ``0.123 %``; empty where a value is not finite."""
+    return f"{value:.3g} %" if math.isfinite(value) else ""
+
+
 def moment(time: float) -> str:
-    """Return a time in s to six digits, of a clock that counts from long ago to milliseconds."""
+    """Return a time in s to six digits, and to a millisecond where that takes more."""
     return f"{time:.6g}" if abs(time) < LONG_AGO else f"{round(time, 3):.15g}"
 
 
 def written(value: float, width: float) -> str:
-    """Return a number with two digits of its uncertainty, five where that is unknown: 0."""
+    """Return a number with two digits of its uncertainty; five where that is 0, unknown."""
     if not (math.isfinite(value) and math.isfinite(width)):
         return f"{value:g}"
     if not width:
         return f"{value:.{DIGITS}g}"
-    places = max(1 - math.floor(math.log10(width)), 0)
+    places = max(_places(width), 0)
     if places > PLACES:
         return f"{value:.3g}"
     text = f"{value:.{places}f}"
@@ -49,23 +59,16 @@ def written(value: float, width: float) -> str:
 
 
 def with_error(value: float, error: float, sign: str = "+-") -> str:
-    """Return ``0.2736 +- 0.0013``; the number alone where its error is 0, or not known.
-
-    A number without an error has five digits, however small it is.
-    """
+    """Return ``0.2736 +- 0.0013``; the number with five digits where its error is 0 or unknown."""
     if not (math.isfinite(error) and error > 0):
         return written(value, 0.0)
     return f"{written(value, error)} {sign} {written(error, error)}"
 
 
-# Results that say themselves: tables and lines, as text and in a notebook.
-
-
 class Readable(abc.ABC):
     """A result with ``print(result)`` and a notebook's cell as its command prints it.
 
-    Its arrays stay behind its attributes: a dataclass that is one has ``repr=False`` and a
-    ``__repr__`` of one line.
+    A dataclass that is one has ``repr=False`` and a ``__repr__`` of one line, without its arrays.
     """
 
     @abc.abstractmethod
@@ -98,46 +101,39 @@ def _html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return f"<table><thead>{line(head, 'th')}</thead><tbody>{body}</tbody></table>"
 
 
-# Numbers with their errors, and with as many digits as these leave them.
-
-
-ERROR_DIGITS: Final = 2
-"""Digits of a standard error."""
-
-
 def interval(estimate: Estimate) -> str:
-    """Return the 95 % interval with the digits that the standard error has: ``[6.2022, 6.2071]``.
-
-    Empty where there is none.
-    """
+    """Return the 95 % interval to the digits of the error: ``[6.2022, 6.2071]``; empty without."""
     if estimate.ci95 is None:
         return ""
     low, high = estimate.ci95
     error = estimate.stderr
     if error is None or not math.isfinite(error) or error <= 0:
         error = (high - low) / 4
-    places = ERROR_DIGITS - 1 - math.floor(math.log10(error)) if 0 < error < math.inf else 0
-    if places <= 0 or places > 15:  # noqa: PLR2004 (no digits left, or none needed)
+    places = _places(error) if 0 < error < math.inf else 0
+    if not 0 < places <= MOST_PLACES:
         return f"[{low:.6g}, {high:.6g}]"
     return f"[{low:.{places}f}, {high:.{places}f}]"
 
 
 def estimate_text(estimate: Estimate, *, minus: str = "-") -> str:
-    """Return a number with its standard error in the last digits: ``6.2047(12)``, +- 0.0012.
+    """Return a number with its error in the last digits, ``6.2047(12)`` for +- 0.0012.
 
-    Pictures write another ``minus``.
+    Pictures use another ``minus``.
     """
-    return _estimate_text(estimate).replace("-", minus)
-
-
-def _estimate_text(estimate: Estimate) -> str:
     value, error = estimate.value, estimate.stderr
-    if error is None or not math.isfinite(error) or error <= 0:
-        return f"{value:.5g}"
-    places = ERROR_DIGITS - 1 - math.floor(math.log10(error))
-    if places <= 0 or places > 15:  # noqa: PLR2004 (no digits left, or none needed)
-        return f"{value:.5g} +- {error:.2g}"
-    return f"{value:.{places}f}({round(error * 10**places)})"
+    text = f"{value:.{DIGITS}g}"
+    if error is not None and math.isfinite(error) and error > 0:
+        places = _places(error)
+        if 0 < places <= MOST_PLACES:
+            text = f"{value:.{places}f}({round(error * 10**places)})"
+        else:
+            text += f" +- {error:.{ERROR_DIGITS}g}"
+    return text.replace("-", minus)
+
+
+def _places(error: float) -> int:
+    """Return the decimal places of a number with this error."""
+    return ERROR_DIGITS - 1 - math.floor(math.log10(error))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Units: the one formula by which SI and numbers without dimensions become each other."""
+"""Units: conversion between SI and nondimensional numbers, and the names of both."""
 
 from __future__ import annotations
 
@@ -15,28 +15,21 @@ TIME, VELOCITY, RATE = -1, 1, 1
 
 @dataclasses.dataclass(frozen=True)
 class Units:
-    """What a result's numbers are counted in.
+    """Units of a result's numbers.
 
-    A number in SI is the one without dimensions times a power of ``w0``: times have the power -1
-    (``tau = w0 t``), velocities and exponents 1, accelerations 2. Angles are in rad either way.
-
-    Parameters
-    ----------
-    w0 : float
-        Natural frequency ``sqrt(g / l)`` in rad/s; 1 without dimensions.
-    si : bool
-        Whether results are in SI.
+    A number in SI is the nondimensional one times a power of ``w0``: times have the power -1 (``tau
+    = w0 t``), velocities and exponents 1, accelerations 2. Angles are in rad either way.
     """
 
-    w0: float = 1.0
-    si: bool = False
+    w0: float = 1.0  # sqrt(g / l), rad/s; 1 if nondimensional
+    si: bool = False  # whether results are in SI
 
     def given(self, value: Any, power: float) -> Any:  # noqa: ANN401 (a number, or an array)
-        """Return a number without dimensions, or an array of them, in these units."""
+        """Return a nondimensional number or array in these units."""
         return value * self.w0**power
 
     def bare(self, value: Any, power: float) -> Any:  # noqa: ANN401 (likewise)
-        """Return a number in these units without dimensions."""
+        """Return a number or array in these units as nondimensional."""
         return value / self.w0**power
 
     @property
@@ -46,17 +39,17 @@ class Units:
 
     @property
     def of_time(self) -> str:
-        """The unit of time."""
+        """Unit of time."""
         return "s" if self.si else "1 / w0"
 
     @property
     def of_velocity(self) -> str:
-        """The unit of velocity."""
+        """Unit of velocity."""
         return "rad/s" if self.si else "1"
 
     @property
     def of_rate(self) -> str:
-        """The unit of exponents."""
+        """Unit of exponents."""
         return "1/s" if self.si else "1 per tau"
 
     @property
@@ -66,7 +59,7 @@ class Units:
 
     @property
     def clock(self) -> str:
-        """The symbol of time."""
+        """Symbol of time."""
         return "t" if self.si else "tau"
 
     def spoken(self, velocity: str) -> str:
@@ -83,17 +76,17 @@ class Units:
 
     @property
     def per_time(self) -> str:
-        """What an exponent counts, in words."""
+        """Unit of an exponent, in words."""
         return "per second" if self.si else "per unit of tau"
 
     @property
     def own_period(self) -> str:
-        """What a period is where there is no drive: that of small swings."""
+        """Period without a drive: that of small swings."""
         return "2 pi / w0" if self.si else "2 pi"
 
     @property
     def section(self) -> str:
-        """Where the stroboscopic section lies."""
+        """Definition of the stroboscopic section."""
         period = f"2 pi / {'Omega' if self.si else 'omega'} ({self.own_period} without drive)"
         return f"{self.clock} = 0 mod T, T = {period}, at the drive's phase"
 
@@ -107,4 +100,4 @@ class Units:
 
 SI: Final = Units(si=True).name
 NONDIMENSIONAL: Final = Units()
-"""Those of :class:`pendmap.Pendulum`."""
+"""Units of :class:`pendmap.Pendulum`."""

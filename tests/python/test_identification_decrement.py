@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -12,15 +13,8 @@ from hypothesis import strategies as st
 
 from decays import decay, record
 from pendmap.identification import Peaks
-from pendmap.identification.methods.registry import (
-    combined,
-    de_paula,
-    decrement,
-    identify_peaks,
-    log_decrement,
-    repaired,
-    scatter,
-)
+from pendmap.identification.methods import combined, de_paula, decrement, log_decrement, repaired
+from pendmap.identification.methods.registry import identify_peaks, scatter
 from pendmap.identification.period import frequency, mean_period
 
 WIDE = decay()
@@ -167,7 +161,8 @@ def test_an_offset_makes_triplets_alternate_and_readings_differ() -> None:
 
 def test_a_record_that_ends_above_12_degrees_is_not_for_the_printed_method() -> None:
     time, angle = record(WIDE, seconds=30)
-    for method in (combined.identify, combined.identify_odd_ends, repaired.identify):
+    odd_ends = functools.partial(combined.identify, reading="odd_ends")
+    for method in (combined.identify, odd_ends, repaired.identify):
         found = method(time, angle)
         assert not found.applicable
         assert not found.estimates
@@ -178,7 +173,7 @@ def test_a_record_that_ends_above_12_degrees_is_not_for_the_printed_method() -> 
 
 def test_what_is_negative_is_said_and_kept() -> None:
     time, angle = record(WIDE, offset=math.radians(0.05), counts=4096)
-    found = combined.identify_odd_triplets(time, angle)
+    found = combined.identify(time, angle, reading="odd_triplets")
     assert found["c_over_m"] < 0
     assert any(text.startswith("unphysical: c_over_m") for text in found.warnings)
     assert found.rig.c_over_m == 0

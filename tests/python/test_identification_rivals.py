@@ -21,7 +21,7 @@ from pendmap.identification import (
     starting_values,
     table1,
 )
-from pendmap.identification.methods.registry import de_paula, energy_balance, log_decrement
+from pendmap.identification.methods import de_paula, energy_balance, log_decrement
 from pendmap.identification.period import envelope, viscous_work
 
 WIDE = decay()

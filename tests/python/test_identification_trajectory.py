@@ -12,9 +12,10 @@ import pytest
 
 from driven_decays import motion
 from pendmap.errors import InputError
-from pendmap.identification.fit import FitRun, Pivot, fit_runs, score
+from pendmap.identification.fit import fit_runs, score
 from pendmap.identification.methods.trajectory import fit_decay, identify
 from pendmap.identification.readings import reading_of
+from pendmap.identification.runs import FitRun, Pivot
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect

@@ -1,4 +1,4 @@
-"""What a model does from a neighbourhood of a run's start: an ensemble of simulated records."""
+"""Simulated records of a model from a neighbourhood of a run's start."""
 
 from __future__ import annotations
 
@@ -22,27 +22,17 @@ if TYPE_CHECKING:
 
 
 _EXACTNESS: Final = 1e-9
-"""The integrator's error a step."""
+"""Integrator's error allowed a step."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Start:
-    """Where a run begins, as a model reads it from the first seconds.
+    """Initial state of a run, as a model estimates it from the first seconds."""
 
-    Attributes
-    ----------
-    time : float
-        s, on the run's clock.
-    theta, velocity : float
-        rad and rad/s.
-    covariance : ndarray, shape (2, 2)
-        Of both.
-    """
-
-    time: float
-    theta: float
-    velocity: float
-    covariance: Floats
+    time: float  # s, on the run's clock
+    theta: float  # rad
+    velocity: float  # rad/s
+    covariance: Floats  # shape (2, 2), of both
 
     @property
     def stderr(self) -> tuple[float, float]:
@@ -64,12 +54,7 @@ class Start:
 def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
     """Return the state at the beginning of a run's first window, with its covariance.
 
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        Of this run alone, with its windows' states adapted.
-    run : FitRun
-        The record.
+    ``fit`` is of this run alone, with its windows' states adapted.
     """
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
@@ -90,43 +75,17 @@ def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
 
 @dataclasses.dataclass(frozen=True)
 class Simulated:
-    """Records of a model, made where a run was.
-
-    Attributes
-    ----------
-    run : FitRun
-        Its drive or its pivot's motion, and its time in the laboratory.
-    model : Rig
-        The model.
-    threads : int or None
-        Number of threads; None: one a processor.
-    """
+    """Records of a model under the drive or pivot motion of a run."""
 
     run: FitRun
     model: Rig
-    threads: int | None = None
+    threads: int | None = None  # None: one a processor
 
     def readings(self, theta: Floats, velocity: Floats, times: Floats) -> Floats:
-        """Return what the sensor of the angle would have read, rad, shape (M, N).
+        """Return readings of the angle, rad, not wrapped, shape (M, N).
 
-        Parameters
-        ----------
-        theta, velocity : ndarray, shape (M,)
-            Starts at the first of the times, rad and rad/s.
-        times : ndarray, shape (N,)
-            s, on the run's clock, not falling.
-
-        Returns
-        -------
-        ndarray, shape (M, N)
-            Not wrapped; no numbers after a motion left their range.
-
-        Raises
-        ------
-        InputError
-            If a number is outside its range.
-        KeyboardInterrupt
-            After Ctrl-C, within a fraction of a second.
+        M starts (rad, rad/s) at the first of N times (s, on the run's clock). Readings are NaN
+        after a motion left the range of numbers.
         """
         from pendmap import _core  # noqa: PLC0415 (likewise)
 

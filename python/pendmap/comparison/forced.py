@@ -1,4 +1,4 @@
-"""A model beside a forced run: what its wandering is like, and the steady state it reaches."""
+"""A model beside a forced run: statistics of an ensemble, and the steady state it reaches."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from pendmap.comparison import steady
 from pendmap.comparison.ensemble import Simulated, Start, start_of
 from pendmap.comparison.itinerary import Itineraries, Ruler
 from pendmap.errors import MOST_SEED, InputError, check_number, check_whole
-from pendmap.formatting import counted
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.joint import as_angles, as_fit_run, reading_of_run
 from pendmap.signal.robust import intervals_of
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.formatting import Estimate
-    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
@@ -33,21 +31,28 @@ if TYPE_CHECKING:
 
 
 _AT_ONCE: Final = 4_000_000
-"""Samples that are held at once."""
+"""Samples held in memory at once."""
 _FOLLOWED: Final = 100
-"""Members that are followed on to where they settle."""
-_FEWEST: Final = 32
+"""Members that are followed until they settle."""
+FEWEST: Final = 32
 """Samples without which neither the noise nor a start is known."""
 _UNLIKELY: Final = 0.01
-"""Chance below which a statistic is said to be unlike the model: of the five of a run that a true
-model gives, one is in at most one run of twenty."""
+"""Chance below which a statistic is reported: of a true model, one of five in 5 % of runs."""
+_STATISTICS: Final = (
+    ("wells visited", "", "wells"),
+    ("escapes from a well", "", "escapes"),
+    ("angle covered", "rad", "covered"),
+    ("time to settle", "s", "settled"),
+    ("greatest velocity", "rad/s", "fastest"),
+)
+"""Name, unit and field of :class:`Itineraries` of each statistic."""
 _EVEN: Final = (2.5, 97.5)
-"""Percent: the ends of the middle 95 %."""
+"""Ends of the middle 95 %, percent."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Ensemble:
-    """How the starts of a model are chosen.
+    """Choice of the starts of a model.
 
     Parameters
     ----------
@@ -78,31 +83,21 @@ class Ensemble:
 
 @dataclasses.dataclass(frozen=True)
 class Statistic:
-    """A number of the record beside those of the ensemble.
-
-    Attributes
-    ----------
-    name, unit : str
-        What it is.
-    measured : float
-        Of the record; infinite for a time that has not come when it ends.
-    ensemble : ndarray, shape (M,)
-        Of each member.
-    """
+    """A number of the record beside those of the ensemble."""
 
     name: str
     unit: str
-    measured: float
-    ensemble: Floats
+    measured: float  # of the record; infinite for a time beyond its end
+    ensemble: Floats  # of each member, shape (M,)
 
     @property
     def median(self) -> float:
-        """Of the ensemble."""
+        """Median of the ensemble."""
         return float(np.quantile(self.ensemble, 0.5, method="inverted_cdf"))
 
     @property
     def ci95(self) -> tuple[float, float]:
-        """The middle 95 % of the ensemble."""
+        """Middle 95 % of the ensemble."""
         low, high = np.percentile(self.ensemble, _EVEN, method="inverted_cdf")
         return float(low), float(high)
 
@@ -174,7 +169,7 @@ class ForcedComparison:
 
     @property
     def unlike(self) -> tuple[Statistic, ...]:
-        """The statistics that the model gives with a chance of less than 1 %."""
+        """Statistics that the model gives with a chance of less than 1 %."""
         return tuple(one for one in self.statistics if one.chance < _UNLIKELY)
 
 
@@ -188,32 +183,14 @@ def compare_forced(
 ) -> ForcedComparison:
     """Compare a model with a forced run; only an unknown phase of the drive is adapted.
 
-    Where the motion is chaotic, two paths part however good the model is: what is compared is what
-    they do, over a neighbourhood of the measured start. Members are read with the noise of the
-    record and measured like it. Where the record ends on a steady state, so do they, and the two
-    cycles are compared at the same phase of the drive.
-
-    Parameters
-    ----------
-    model : Rig
-        In SI.
-    run : Run
-        Under a drive, or with its pivot's motion recorded.
-    ensemble : Ensemble
-        How many members, and how far apart.
-    threads : int, optional
-        Number of threads; by default one a processor.
-    progress : callable, optional
-        Called now and then with the members done and in all.
-
-    Raises
-    ------
-    InputError
-        If the record cannot be followed.
+    Where the motion is chaotic, two paths diverge however good the model is: statistics are
+    compared, over a neighbourhood of the measured start. Members are read with the noise of the
+    record and measured like it. Where the record ends on a steady state, members are followed to
+    theirs, and the two cycles are compared at the same phase of the drive.
     """
     worth = reading_of_run(run)
-    fit: TrajectoryFit = fit_runs([as_fit_run(run, worth)], model, free=(), profiled=())
     given = as_fit_run(run, worth)
+    fit = fit_runs([given], model, free=(), profiled=())
     found_phase = [each for name, each in fit.estimates.items() if name.startswith("phi")]
     if given.drive is not None and found_phase:
         given = dataclasses.replace(given, drive={**given.drive, "phi": found_phase[0].value})
@@ -226,15 +203,20 @@ def compare_forced(
     simulated = Simulated(given, model, threads)
     made, kept = _members(simulated, (theta, velocity), time, ruler, progress)
     theta, velocity = theta[kept], velocity[kept]
-    example = _example(made)
-    reading = simulated.readings(theta[example], velocity[example], time)[0]
+    statistics = tuple(
+        Statistic(name, unit, float(getattr(own, key)[0]), getattr(made, key).astype(float))
+        for name, unit, key in _STATISTICS
+    )
+    place = _example(statistics)
+    reading = simulated.readings(theta[place, None], velocity[place, None], time)[0]
     found = None
     if period is not None and own.n[0]:
         closes, since = (int(own.n[0]), int(own.w[0])), time[0] + float(own.settled[0])
-        cycle = steady.folded(time, measured, period, closes, since)
         starts = start.time, theta[:_FOLLOWED], velocity[:_FOLLOWED]
-        ends = steady.reached(simulated, starts, period)
-        found = steady.compared(cycle, ends)
+        found = steady.compared(
+            steady.folded(time, measured, period, closes, since),
+            steady.reached(simulated, starts, period),
+        )
     return ForcedComparison(
         run=run,
         sigma=worth.sigma,
@@ -247,22 +229,9 @@ def compare_forced(
         velocity=ruler.velocity(measured),
         example=(reading, ruler.velocity(reading)),
         lost=ensemble.members - theta.size,
-        statistics=_statistics(own, made),
+        statistics=statistics,
         steady=found,
         ensemble=ensemble,
-    )
-
-
-def too_short(model: Rig, run: Run) -> str:
-    """Return how a record is too short to be compared; empty where it is not."""
-    samples = int(run.trusted.sum())
-    seconds = float(np.ptp(run.time[run.trusted]))
-    swing = math.tau / model.w0
-    if samples >= _FEWEST and seconds >= swing:
-        return ""
-    return (
-        f"it is too short: {counted(samples, 'sample')} over {seconds:.3g} s; {_FEWEST} over "
-        f"{swing:.3g} s, one swing, are needed"
     )
 
 
@@ -285,7 +254,7 @@ def _members(
     ruler: Ruler,
     progress: Callable[[int, int], object] | None,
 ) -> tuple[Itineraries, NDArray[np.bool_]]:
-    """Return what the members do, and which have stayed in the range of numbers."""
+    """Return the itineraries of the members, and which stayed in the range of numbers."""
     draw = np.random.default_rng(0)  # of noise, in which nothing is sensitive
     count, many = starts[0].size, max(1, _AT_ONCE // time.size)
     parts, kept = [], np.zeros(count, dtype=bool)
@@ -304,25 +273,10 @@ def _members(
     return Itineraries.joined(parts), kept
 
 
-def _statistics(own: Itineraries, made: Itineraries) -> tuple[Statistic, ...]:
-    rows = (
-        ("wells visited", "", "wells"),
-        ("escapes from a well", "", "escapes"),
-        ("angle covered", "rad", "covered"),
-        ("time to settle", "s", "settled"),
-        ("greatest velocity", "rad/s", "fastest"),
-    )
-    return tuple(
-        Statistic(name, unit, float(getattr(own, key)[0]), getattr(made, key).astype(float))
-        for name, unit, key in rows
-    )
-
-
-def _example(made: Itineraries) -> slice:
+def _example(statistics: tuple[Statistic, ...]) -> int:
     """Return the place of the member whose ranks are nearest to the middle of all statistics."""
     ranks = []
-    for one in (made.wells, made.escapes, made.covered, made.settled, made.fastest):
-        order = np.argsort(np.argsort(one, kind="stable"), kind="stable")
+    for one in statistics:
+        order = np.argsort(np.argsort(one.ensemble, kind="stable"), kind="stable")
         ranks.append(order / max(order.size - 1, 1) - 0.5)
-    place = int(np.argmin(np.abs(ranks).max(axis=0)))
-    return slice(place, place + 1)
+    return int(np.argmin(np.abs(ranks).max(axis=0)))

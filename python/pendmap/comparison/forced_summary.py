@@ -1,11 +1,11 @@
-"""What a comparison of a model with a forced run shows, as JSON and as text."""
+"""A comparison of a model with a forced run, as JSON and as text."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
 
-from pendmap.formatting import counted
+from pendmap.formatting import counted, percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def as_json(one: ForcedComparison) -> dict[str, Any]:
-    """Return the JSON object of one run; null where a time has not come by the record's end."""
+    """Return the JSON object of one run, with infinity for a time beyond the record's end."""
     run, start = one.run, one.start
     return {
         "name": run.name,
@@ -38,9 +38,9 @@ def as_json(one: ForcedComparison) -> dict[str, Any]:
             {
                 "what": each.name,
                 "unit": each.unit or "1",
-                "measured": _finite(each.measured),
-                "median": _finite(each.median),
-                "ci95": [_finite(end) for end in each.ci95],
+                "measured": each.measured,
+                "median": each.median,
+                "ci95": each.ci95,
                 "chance": each.chance,
             }
             for each in one.statistics
@@ -61,14 +61,10 @@ def _steady(found: Steady) -> dict[str, Any]:
             {"kind": one.cycle.kind, "n": one.cycle.n, "w": one.cycle.w, "share": one.share}
             for one in found.reached
         ],
-        "rms_theta": _finite(found.rms),
-        "rms_velocity": _finite(found.rms_velocity),
-        "amplitude_error_percent": _finite(100 * found.overestimate),
+        "rms_theta": found.rms,
+        "rms_velocity": found.rms_velocity,
+        "amplitude_error_percent": 100 * found.overestimate,
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def table(runs: Sequence[ForcedComparison]) -> tuple[list[str], list[list[str]]]:
@@ -93,14 +89,14 @@ def table(runs: Sequence[ForcedComparison]) -> tuple[list[str], list[list[str]]]
 
 
 def written(of: Statistic, value: float, digits: int = 4) -> str:
-    """Return a value of a statistic as it is read."""
+    """Return a value of a statistic as text."""
     if not math.isfinite(value):
         return "not yet"
     return f"{value:.0f}" if not of.unit or abs(value) >= 10**digits else f"{value:.{digits}g}"
 
 
 def lines(one: ForcedComparison, fits: float) -> Iterator[str]:
-    """Yield the residual of one run, its steady state, and what the model does not give."""
+    """Yield the residual of one run, its steady state, and statistics unlike the model's."""
     name = one.run.name
     ratio = one.rms / one.sigma if one.sigma else math.inf
     missing = ": something is missing in the model" if ratio > fits else ""
@@ -124,10 +120,12 @@ def lines(one: ForcedComparison, fits: float) -> Iterator[str]:
 
 
 def _of_steady(name: str, found: Steady) -> Iterator[str]:
-    ends = [f"{one.cycle.kind} from {100 * one.share:.3g} % of the starts" for one in found.reached]
+    ends = [
+        f"{one.cycle.kind} from {percent(100 * one.share)} of the starts" for one in found.reached
+    ]
     share = sum(one.share for one in found.reached)
     if share < 1 - 1e-9:
-        ends.append(f"no cycle from {100 * (1 - share):.3g} %")
+        ends.append(f"no cycle from {percent(100 * (1 - share))}")
     head = f"{name}: settles on {found.measured.kind}; the model on {', '.join(ends)}"
     if found.model is None:
         yield f"{head}: not on the measured one"

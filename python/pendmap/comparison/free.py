@@ -1,4 +1,4 @@
-"""A model against records that it was not fitted to."""
+"""A model against records that it was not fitted to: comparison, JSON and text."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from pendmap.comparison import forced_summary
-from pendmap.comparison.forced import Ensemble, ForcedComparison, compare_forced, too_short
+from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
 from pendmap.errors import (
     MOST_THREADS,
     FitDiverged,
@@ -16,32 +18,32 @@ from pendmap.errors import (
     check_type,
     check_whole,
 )
-from pendmap.formatting import Estimate, Readable, counted
-from pendmap.identification.fit import TrajectoryFit, fit_runs
+from pendmap.formatting import Estimate, Readable, counted, percent
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.joint import as_fit_run, reading_of_run
 from pendmap.identification.methods.trajectory import OFFSET
-from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import rig_of
-from pendmap.identification.table1 import PeakErrors, Table1, table_of_run
+from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig
 from pendmap.records.experiment import Experiment
 from pendmap.records.summary import doubts, doubts_said, findings_said
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
-    import numpy as np
     from numpy.typing import NDArray
 
+    from pendmap.identification.peaks import Peaks
+    from pendmap.identification.table1 import PeakErrors, Table1
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
-    from collections.abc import Iterator
 
 
 MODEL = "model"
-"""What the model is called in table 1."""
+"""Name of the model in table 1."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -87,7 +89,7 @@ class RunComparison:
 
     @property
     def errors(self) -> PeakErrors | None:
-        """Errors of periods and peaks; none where there are too few, or none was measured."""
+        """Errors of periods and peaks; none where there are too few."""
         return self.table.errors.get(MODEL)
 
 
@@ -142,16 +144,15 @@ def compare(
 ) -> Comparison:
     """Compare a model with every run of an experiment.
 
-    Nothing of the model is adapted. Where a free decay begins is not known better than its noise,
-    so that angle and velocity of the first free sample are adapted for the residual; periods and
-    peaks are those of a motion from the first peak as it was measured.
+    No parameter of the model is adapted. The residual of a free decay is least over the angle and
+    velocity of its first free sample, known only to the noise; periods and peaks are those of a
+    motion from the first peak as it was measured.
 
-    A forced run may be chaotic, and two chaotic paths part however good the model is. It is
+    A forced run may be chaotic, and two chaotic paths diverge however good the model is. It is
     compared with an ensemble of simulated records over a neighbourhood of its start, by the wells
     visited, escapes between them, the angle covered, the time to settle and the greatest velocity;
     where it ends on a steady state also with the cycle that the model ends on, at the same phase of
-    the drive. Its residual is taken in windows of up to three swings, each from the state that
-    brings the model nearest.
+    the drive. Its residual is taken in windows of up to three swings with a state each.
 
     Parameters
     ----------
@@ -190,7 +191,7 @@ def compare(
     forced: list[ForcedComparison] = []
     out: list[tuple[str, str]] = []
     for run in experiment.runs:
-        why = why_not(model, run)
+        why = _why_not(model, run)
         if not why:
             try:
                 if run.kind == "free":
@@ -204,59 +205,56 @@ def compare(
         if why:
             out.append((run.name, why))
     if not free and not forced:
-        said = "; ".join(f"{name}: {why}" for name, why in out)
+        said = "; ".join(": ".join(each) for each in out)
         raise InputError(f"{experiment.path}: no run can be compared: {said}")
     return Comparison(model, experiment, tuple(free), tuple(forced), tuple(out))
 
 
-def why_not(model: Rig, run: Run) -> str:
+def _why_not(model: Rig, run: Run) -> str:
     """Return why a run cannot be compared with a model; empty where it can."""
+    time, swing = run.time[run.trusted], math.tau / model.w0
+    seconds = float(np.ptp(time)) if time.size else 0.0
+    why = ""
     if run.peaks_only:
-        return "it holds peaks alone"
-    if run.copied:
-        return "it is a copy of another run"
-    if not run.moves:
-        return "nothing moves in it"
-    if run.kind != "forced":
-        return ""
-    if run.drive is None and run.pivot is None:
-        return "what drives it is not known"
-    return too_short(model, run)
+        why = "it holds peaks alone"
+    elif run.copied:
+        why = "it is a copy of another run"
+    elif not run.moves:
+        why = "nothing moves in it"
+    elif run.kind == "forced" and run.drive is None and run.pivot is None:
+        why = "what drives it is not known"
+    elif run.kind == "forced" and (time.size < FEWEST or seconds < swing):
+        why = (
+            f"it is too short: {counted(time.size, 'sample')} over {seconds:.3g} s; {FEWEST} over "
+            f"{swing:.3g} s, one swing, are needed"
+        )
+    return why
 
 
 def _compared(model: Rig, run: Run) -> RunComparison:
     reading = reading_of_run(run)
     given = as_fit_run(run, reading)
     model = rig_of(given, model)  # whatever drives it elsewhere
-    fit: TrajectoryFit = fit_runs([given], model, free=())
-    first = fit.windows[0]
+    fit = fit_runs([given], model, free=())
     peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
-    return RunComparison(
-        run,
-        reading.sigma,
-        (first[3], first[4]),
-        fit.curves[0],
-        fit.residuals[0],
-        fit.rms,
-        peaks,
-        table_of_run(run, peaks, {MODEL: _as_identification(model)}),
-    )
-
-
-def _as_identification(model: Rig) -> Identification:
     estimates = {name: Estimate(getattr(model, name)) for name in ("w0", "c_over_m", "Tr")}
     for effect in model.effects:
         if effect.name == OFFSET:
             estimates["offset"] = Estimate(effect.parameters["d"])
-    return Identification(MODEL, estimates, model=model)
-
-
-# What a comparison of a model with records shows, as JSON and as text.
+    return RunComparison(
+        run=run,
+        sigma=reading.sigma,
+        start=fit.windows[0][3:],
+        curve=fit.curves[0],
+        residual=fit.residuals[0],
+        rms=fit.rms,
+        peaks=peaks,
+        table=table_of_run(run, peaks, {MODEL: Identification(MODEL, estimates, model=model)}),
+    )
 
 
 FITS: Final = 1.1
-"""Rms over noise up to which a model is said to describe a record: the noise is known to a few
-percent."""
+"""Rms over noise up to which a model describes a record: the noise is known to a few percent."""
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
@@ -295,28 +293,19 @@ def _run(one: RunComparison) -> dict[str, Any]:
             for row in one.table.rows
         ],
         "table1_left_out": one.table.left_out or next(iter(one.table.lost.values()), None),
-        "periods": _pairs(errors and errors.period_time, errors and errors.period_error),
-        "peaks": _pairs(errors and errors.peak, errors and errors.peak_error),
+        "periods": [] if errors is None else _pairs(errors.period_time, errors.period_error),
+        "peaks": [] if errors is None else _pairs(errors.peak, errors.peak_error),
         "findings": [found.text for found in one.run.findings],
     }
 
 
-def _pairs(places: Any, errors: Any) -> list[dict[str, float | None]]:  # noqa: ANN401 (arrays or none)
-    if places is None:
-        return []
-    return [
-        {"at": float(at), "error_percent": float(error) if math.isfinite(error) else None}
-        for at, error in zip(places, errors, strict=True)
-    ]
+def _pairs(places: Floats, errors: Floats) -> list[dict[str, float]]:
+    pairs = zip(places.tolist(), errors.tolist(), strict=True)
+    return [{"at": at, "error_percent": error} for at, error in pairs]
 
 
 def tables(comparison: Comparison) -> list[tuple[list[str], list[list[str]]]]:
     """Return heads and rows of the tables of free decays and of forced runs."""
-    both = [_decays(comparison), forced_summary.table(comparison.forced)]
-    return [table for table in both if table[1]]
-
-
-def _decays(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     rows = []
     for one in comparison.runs:
         errors = one.errors
@@ -326,30 +315,24 @@ def _decays(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
                 f"{one.rms:.4g}",
                 f"{one.sigma:.3g}",
                 f"{one.rms / one.sigma:.3g}",
-                "" if errors is None else _percent(errors.period_rms),
-                "" if errors is None else _percent(errors.peak_rms),
+                "" if errors is None else percent(errors.period_rms),
+                "" if errors is None else percent(errors.peak_rms),
             ]
         )
     head = ["run", "rms (rad)", "noise (rad)", "rms / noise", "periods, rms", "peaks, rms"]
-    return head, rows
-
-
-def _percent(value: float) -> str:
-    return f"{value:.3g} %" if math.isfinite(value) else ""
+    both = [(head, rows), forced_summary.table(comparison.forced)]
+    return [table for table in both if table[1]]
 
 
 def as_text(comparison: Comparison) -> Iterator[str]:
-    """Yield the lines beside the table: table 1, whether the model fits, what was found.
-
-    Doubts about a unit come first.
-    """
+    """Yield the lines beside the tables: doubts first, then table 1, the fit, findings."""
     runs = [one.run for one in comparison.every]
     yield from doubts_said(comparison.experiment, *runs)
     for one in comparison.runs:
         for row in one.table.rows:
             unit = "s" if row.what == "period" else "rad"
             error = next(iter(row.errors.values()), math.nan)
-            said = "the model rests by then" if math.isnan(error) else f"error {error:.3g} %"
+            said = "the model rests by then" if math.isnan(error) else f"error {percent(error)}"
             yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {said}"
         if one.table.left_out:
             yield f"{one.run.name}: {one.table.left_out}"

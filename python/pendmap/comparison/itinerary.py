@@ -1,8 +1,8 @@
-"""What a pendulum does among its wells: one ruler for a measured path and for simulated ones.
+"""Statistics of a pendulum's path among its wells, measured and simulated paths alike.
 
-A well is the range of angles around one hanging position, from one top to the next. Paths of chaos
-are not laid over one another: what is compared is how many wells they visit, how often they escape
-from one to another, how far they go, how fast, and when they settle.
+A well is the range of angles around one hanging position, from one top to the next. Chaotic paths
+are not comparable point by point; compared are the number of wells, escapes between them, the range
+of the angle, the greatest speed, and the time to settle.
 """
 
 from __future__ import annotations
@@ -21,50 +21,38 @@ if TYPE_CHECKING:
 
 
 LONGEST: Final = 8
-"""The longest cycle that is looked for, in forcing periods."""
+"""Longest cycle that is looked for, forcing periods."""
 
 _MARGIN: Final = 0.1
-"""A path is in a well once it is this far below the tops beside it, rad: noise at the top is no
-escape."""
+"""Angle below both tops from which a path is in a well, rad: noise at the top is no escape."""
 _REPEATED: Final = 0.05
-"""Readings that come back this near, rad, repeat themselves; with six times the noise if that is
-more."""
+"""Distance within which readings repeat themselves, rad, if six times the noise is less."""
 _NOISES: Final = 6.0
+"""Distance within which readings repeat themselves, in noises."""
 _HELD: Final = 5
 """Periods for which a motion must repeat itself to have settled."""
 _SWING: Final = 0.06
-"""Half a window of the local polynomials that give velocities, over a small swing."""
+"""Half window of the local polynomials that give velocities, over a small swing."""
 _DEGREE: Final = 3
+"""Degree of these polynomials."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Ruler:
-    """How paths are measured.
+    """Units of length and time by which paths are measured."""
 
-    Parameters
-    ----------
-    tick : float
-        Between two samples, s.
-    swing : float
-        Period of small swings, s.
-    period : float or None
-        Of the drive, s; None where nothing drives periodically, and only rest is settled.
-    sigma : float
-        Noise of the readings, rad.
-    """
-
-    tick: float
-    swing: float
-    period: float | None
-    sigma: float
+    tick: float  # between two samples, s
+    swing: float  # period of small swings, s
+    period: float | None  # of the drive, s; None: only rest counts as settled
+    sigma: float  # noise of the readings, rad
 
     @property
     def near(self) -> float:
-        """How near a reading comes back that repeats itself, rad."""
+        """Distance within which a reading repeats itself, rad."""
         return max(_REPEATED, _NOISES * math.sqrt(2) * self.sigma)
 
     def velocity(self, reading: Floats) -> Floats:
-        """Slopes of local cubics, rad/s, shape (..., N) as the readings."""
+        """Return slopes of local cubics, rad/s, shape (..., N) as the readings."""
         from scipy.signal import savgol_filter  # noqa: PLC0415 (scipy takes a while)
 
         half = max(round(_SWING * self.swing / self.tick), 2)
@@ -76,29 +64,15 @@ class Ruler:
 
 @dataclasses.dataclass(frozen=True)
 class Itineraries:
-    """What each of M paths does.
+    """Statistics of M paths; arrays have the shape (M,)."""
 
-    Attributes
-    ----------
-    wells, escapes : ndarray of int, shape (M,)
-        How many different wells it visits, and how often it passes into another.
-    covered : ndarray, shape (M,)
-        Greatest less least angle, rad.
-    fastest : ndarray, shape (M,)
-        Greatest speed, rad/s.
-    settled : ndarray, shape (M,)
-        Seconds after which it repeats itself until its end; infinite where it does not.
-    n, w : ndarray of int, shape (M,)
-        Forcing periods after which it does so then, and net turns over them; 0 where it does not.
-    """
-
-    wells: Whole
-    escapes: Whole
-    covered: Floats
-    fastest: Floats
-    settled: Floats
-    n: Whole
-    w: Whole
+    wells: Whole  # different wells visited
+    escapes: Whole  # passages into another well
+    covered: Floats  # greatest less least angle, rad
+    fastest: Floats  # greatest speed, rad/s
+    settled: Floats  # s, after which it repeats itself; infinite: never
+    n: Whole  # forcing periods of the cycle; 0 where not settled
+    w: Whole  # net turns over the cycle
 
     @classmethod
     def of(cls, reading: Floats, ruler: Ruler) -> Itineraries:
@@ -126,7 +100,7 @@ class Itineraries:
 def wells(reading: Floats) -> Whole:
     """Return the number of the well at each sample, 0 that of ``theta = 0``, shape (M, N).
 
-    Within 0.1 rad of a top, or beyond, it is still the one before.
+    Within 0.1 rad of a top, or beyond, it is still the previous one.
     """
     nearest = np.round(reading / math.tau).astype(np.int64)
     inside = np.abs(reading - math.tau * nearest) < math.pi - _MARGIN

@@ -20,48 +20,38 @@ if TYPE_CHECKING:
 
 
 SAMPLES: Final = 64
-"""Samples of a cycle a forcing period."""
+"""Samples of a cycle in a forcing period."""
 _HARMONICS: Final = 12
-"""Harmonics of the drive that a cycle has: beyond there is noise."""
+"""Harmonics of the drive that a cycle has: higher ones are noise."""
 _CYCLES: Final = 50
 """Cycles at the end of a record that are averaged, at most."""
 _STEADY: Final = 0.01
-"""Cycles are averaged from where their later half differs from the earlier one by less, rad rms."""
+"""Cycles are averaged from where their halves differ by less, rad rms."""
 _AT_REST: Final = 0.05
-"""A cycle of a lesser amplitude, rad, is rest."""
+"""Amplitude below which a cycle is rest, rad."""
 _DECAY: Final = 10.0
-"""A model is followed on until viscous damping alone has shrunk what is left by this power of e, in
-periods between ..."""
+"""Power of e by which viscous damping shrinks a transient before cycles are looked for."""
 _FOLLOWED: Final = (100, 2000)
+"""Least and greatest number of periods of that."""
 _CLOSED: Final = 1e-3
-"""Then it is on a cycle if it comes back this near, rad."""
+"""Distance within which a motion must close to be on a cycle, rad."""
 _ONE: Final = 0.02
-"""Cycles nearer than this, rad, are one."""
+"""Distance below which two cycles are one, rad."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Cycle:
-    """A closed motion.
+    """A closed motion of S samples."""
 
-    Attributes
-    ----------
-    n, w : int
-        Forcing periods, and net turns over them.
-    time : ndarray, shape (S,)
-        From where the drive's time is a whole number of periods, s.
-    theta, velocity : ndarray, shape (S,)
-        Reading of the angle, rad, not wrapped, and its derivative, rad/s.
-    """
-
-    n: int
-    w: int
-    time: Floats
-    theta: Floats
-    velocity: Floats
+    n: int  # forcing periods
+    w: int  # net turns over them
+    time: Floats  # s, from a whole number of periods of the drive
+    theta: Floats  # rad, not wrapped
+    velocity: Floats  # rad/s
 
     @classmethod
     def of(cls, n: int, w: int, period: float, theta: Floats) -> Cycle:
-        """Return the cycle through readings at equal times, by Fourier's series."""
+        """Return the cycle through readings at equal times, by Fourier series."""
         time = np.arange(theta.size) * n * period / theta.size
         turning = math.tau * w / (n * period)
         waves = np.fft.rfft(theta - turning * time)
@@ -73,7 +63,7 @@ class Cycle:
 
     @property
     def swing(self) -> Floats:
-        """The angle less its steady turning, rad."""
+        """Angle less its steady turning, rad."""
         return np.asarray(
             self.theta - math.tau * self.w * np.arange(self.theta.size) / self.theta.size
         )
@@ -99,7 +89,7 @@ class Cycle:
         return kind_of("oscillation", self.n, 0)
 
     def moved(self, periods: int) -> Cycle:
-        """Return the same motion from some whole periods later on."""
+        """Return the motion from some whole periods later on."""
         at = periods * SAMPLES
         turned = math.tau * self.w
         theta = np.concatenate([self.theta[at:], self.theta[:at] + turned])
@@ -108,9 +98,9 @@ class Cycle:
         )
 
     def nearest(self, other: Cycle) -> tuple[float, Cycle]:
-        """Return the rms angle between both, rad, and this one so moved that it is least.
+        """Return the least rms angle between both, rad, and this one shifted to reach it.
 
-        By whole periods of the drive and whole turns; infinite where ``n`` or ``w`` differ.
+        Shifts are whole periods of the drive and whole turns; infinite where ``n`` or ``w`` differ.
         """
         if (self.n, self.w) != (other.n, other.w):
             return math.inf, self
@@ -127,15 +117,7 @@ class Cycle:
 
 @dataclasses.dataclass(frozen=True)
 class Reached:
-    """A cycle that a model ends on.
-
-    Attributes
-    ----------
-    cycle : Cycle
-        The motion.
-    share : float
-        Of the starts that end there.
-    """
+    """A cycle that a model ends on, and the share of starts that do."""
 
     cycle: Cycle
     share: float
@@ -143,33 +125,18 @@ class Reached:
 
 @dataclasses.dataclass(frozen=True)
 class Steady:
-    """A record's steady state beside a model's.
+    """A record's steady state beside a model's."""
 
-    Attributes
-    ----------
-    measured : Cycle
-        The mean of the record's last cycles.
-    cycles : int
-        How many these are.
-    reached : tuple of Reached
-        What the model ends on from the neighbourhood of the start, the most frequent first.
-    model : Cycle or None
-        The one of these that is nearest to the record's, moved onto it; none of the same ``n`` and
-        ``w`` where it ends elsewhere.
-    rms, rms_velocity : float
-        Of the difference, rad and rad/s; no numbers without a ``model``.
-    """
-
-    measured: Cycle
-    cycles: int
-    reached: tuple[Reached, ...]
-    model: Cycle | None
-    rms: float
-    rms_velocity: float
+    measured: Cycle  # mean of the record's last cycles
+    cycles: int  # how many these are
+    reached: tuple[Reached, ...]  # by the model, the most frequent first
+    model: Cycle | None  # the nearest of these, shifted; None without equal n, w
+    rms: float  # of the difference, rad
+    rms_velocity: float  # likewise, rad/s
 
     @property
     def overestimate(self) -> float:
-        """Amplitude of the model over the measured one, less 1; no number at rest."""
+        """Amplitude of the model over the measured one, less 1; NaN at rest."""
         if self.model is None or self.measured.at_rest:
             return math.nan
         return self.model.amplitude / self.measured.amplitude - 1
@@ -178,18 +145,10 @@ class Steady:
 def folded(
     time: Floats, reading: Floats, period: float, closes: tuple[int, int], since: float
 ) -> tuple[Cycle, int]:
-    """Return the mean of a record's last cycles, and how many these are.
+    """Return the mean of a record's last cycles, and their number.
 
-    Parameters
-    ----------
-    time, reading : ndarray, shape (N,)
-        s on the drive's clock, and rad.
-    period : float
-        Of the drive, s.
-    closes : (int, int)
-        ``n`` and ``w`` of the cycle.
-    since : float
-        Time from which it repeats itself, s.
+    ``time`` is on the drive's clock; ``closes`` are ``n`` and ``w`` of the cycle, ``since`` (s) is
+    when it begins to repeat itself.
     """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 (scipy takes a while)
 
@@ -203,7 +162,7 @@ def folded(
     turns = math.tau * w * np.arange(count)
     begins = (first + n * np.arange(count)) * period
     rows = CubicSpline(time, reading)(begins[:, None] + at) - turns[:, None]
-    while count > 1:  # the last ones where what is left of the way there still shrinks
+    while count > 1:  # the last ones, where the transient still decays
         early, late = rows[: count // 2].mean(axis=0), rows[count // 2 :].mean(axis=0)
         if math.sqrt(float(np.mean((late - early) ** 2))) < _STEADY:
             break
@@ -217,14 +176,7 @@ def reached(
 ) -> tuple[Reached, ...]:
     """Return the cycles that a model ends on, the most frequent first.
 
-    Parameters
-    ----------
-    model : Simulated
-        The model under the run's drive.
-    starts : (float, ndarray, ndarray)
-        Time on the run's clock, s, and angles and velocities then, rad and rad/s, shapes (M,).
-    period : float
-        Of the drive, s.
+    ``starts`` are a time on the run's clock (s), and angles and velocities then (rad, rad/s).
     """
     begin, theta, velocity = starts
     rate = 0.5 * model.model.c_over_m * period
@@ -248,7 +200,7 @@ def reached(
 
 
 def _closed(row: Floats, period: float) -> Cycle | None:
-    """Return the shortest cycle on which readings close; None where they do on none."""
+    """Return the shortest cycle on which readings close; None without."""
     for n in range(1, LONGEST + 1):
         size = n * SAMPLES
         apart = row[size:] - row[:-size]

@@ -15,7 +15,7 @@ from pendmap.charts import names
 from pendmap.charts.methods import MEASURED, drawn, look
 from pendmap.figures import blocks, sides, style
 from pendmap.figures.half_cycles import course_of, first_and_last
-from pendmap.identification.methods.trajectory import METHOD as BEST
+from pendmap.identification.methods.registry import BEST
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.units import Units
 

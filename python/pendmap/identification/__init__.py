@@ -1,4 +1,4 @@
-"""Damping from the record of a free decay: the paper's method, its repair and its rivals."""
+"""Damping from records of free decays: the trajectory method, the paper's, and others."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Peaks and crossings of a record with few samples a period, by a pendulum's own swings.
 
-A quartic through a peak needs more samples than such a record has within a quarter swing. What
-joins them here is the equation of motion, with parameters that are found again every few swings.
+A quartic through a peak needs more samples than such a record has within a quarter swing. Instead
+samples are joined by the equation of motion, with parameters fitted again every few swings.
 """
 
 from __future__ import annotations
@@ -30,45 +30,43 @@ if TYPE_CHECKING:
 
 
 COARSE: Final = 20.0
-"""Samples a period of small swings below which nine of them, which a quartic needs for errors that
-can be believed, reach farther than a quartic follows a peak."""
+"""Samples a period of small swings below which nine of them, which a quartic needs, reach too
+far."""
 _FINE: Final = 32
 """Points a period of the curve through the samples in which turns are looked for."""
 _GAP: Final = 2.5
-"""A pause of this many samples is a gap."""
+"""Pause in samples that is a gap."""
 _CLEAR: Final = 0.02
-"""Noise over the whole way that is assumed where it is not known yet: only large swings count."""
+"""Noise over the range of the angle, assumed until it is known: only large swings count."""
 _LONGEST: Final = 0.8
-"""Half width of a turn's window at most, in half swings: friction changes its sign at the next."""
+"""Greatest half width of a turn's window, half swings: friction changes its sign at the next."""
 _LEAST: Final = 3.2
-"""Half width of a turn's window, in samples, where that is more than a quarter swing."""
+"""Half width of a turn's window, samples, where that is more than a quarter swing."""
 _BESIDE: Final = 0.95
-"""Half width of a crossing's window in quarter swings."""
-_RESOLVED: Final = 8.0
-"""A peak counts if it stands this many of its standard errors away from the one before."""
+"""Half width of a crossing's window, quarter swings."""
 
 
 def is_coarse(time: Floats, theta: Floats) -> bool:
-    """Whether a record swings with fewer than 20 samples a period, that of small swings."""
+    """Return whether a record has fewer than 20 samples a period of small swings."""
     _, swing = _swinging(theta)
     time, theta = time[swing:], theta[swing:]
     raw = _natural(time, theta)
     if raw is None or 2 * math.pi / raw >= COARSE * float(np.median(np.diff(time))):
         return False
-    # Spikes of single samples are gone from the median; quick swings are gone as well, or slower.
+    # The median removes single spikes; it also removes quick swings, or makes them slower.
     calm = _natural(time, median_of_five(theta))
     return calm is None or calm > 0.6 * raw
 
 
 def _swinging(theta: Floats) -> tuple[float, int]:
-    """Where a record rests, in whole turns, rad, and from which sample it swings about that."""
+    """Return where a record rests, in whole turns (rad), and its first sample that swings."""
     tail = theta[-max(theta.size // 4, 1) :]
     rest = math.tau * round(float(np.median(tail)) / math.tau) if theta.size else 0.0
     return rest, after_turns(theta - rest)
 
 
 def _natural(time: Floats, theta: Floats) -> float | None:
-    """The natural frequency by the times of the turns of large swings, rad/s."""
+    """Return the natural frequency by the times of the turns of large swings, rad/s."""
     if time.size < 8:  # noqa: PLR2004 (two half swings, roughly)
         return None
     turns = zigzags(theta, 0.1 * float(np.ptp(theta)) + 1e-12, np.empty(0, np.intp))
@@ -79,7 +77,7 @@ def _natural(time: Floats, theta: Floats) -> float | None:
 
 
 def coarse_finder(time: Floats, theta: Floats, sigma: float | None) -> CoarseFinder:
-    """Return the finder of a record; every method asks for that of the same one."""
+    """Return the finder of a record, shared by all methods."""
     return _finder(time.tobytes(), theta.tobytes(), sigma)
 
 
@@ -91,16 +89,11 @@ def _finder(time: bytes, theta: bytes, sigma: float | None) -> CoarseFinder:
 class CoarseFinder:
     """One record, a curve through its samples, and swings fitted to it.
 
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s, increasing, and rad from the downward rest.
-    sigma : float, optional
-        Noise of a sample, rad; by default what the fits leave of swings that are clear.
+    Without ``sigma`` (rad) the noise is the residual of fits to clear swings.
     """
 
     def __init__(self, time: Floats, theta: Floats, sigma: float | None) -> None:
-        # What goes over the top before has no turns, and no part in how far swings go.
+        # Rotations before the swings have no turns and are left out.
         rest, swing = _swinging(theta)
         self.rotated = swing > 0
         time, theta = time[swing:], theta[swing:] - rest
@@ -131,7 +124,7 @@ class CoarseFinder:
         self.course = outline(t, x, sigma * math.sqrt(points))
 
     def _turns(self, sigma: float | None) -> tuple[SwingFit, bool, bool]:
-        """Fit all turns; whether the first is where the record begins, and whether it was held."""
+        """Fit all turns; whether the first is the record's begin, and whether held."""
         course = self.course
         assert course is not None  # noqa: S101 (callers have asked)
         t, x = self.fine
@@ -145,11 +138,10 @@ class CoarseFinder:
         elif leaves - t[0] > 3 * self.step:
             held = True
             instants, states = [leaves, *instants], [float(np.median(x[: course.left])), *states]
-        elif t[extreme] - t[0] > 0.75 * self.step:
-            begins = False
-            instants, states = [float(t[extreme]), *instants], [float(x[extreme]), *states]
         else:
-            instants, states = [float(t[0]), *instants], [float(x[0]), *states]
+            begins = bool(t[extreme] - t[0] <= 0.75 * self.step)
+            first = 0 if begins else extreme
+            instants, states = [float(t[first]), *instants], [float(x[first]), *states]
         at, size = np.array(instants), np.clip(np.array(states), -3.1, 3.1)
         zero = float(np.median(x[course.turns][-3:-1] + x[course.turns][-2:])) / 2
         zero = zero if abs(zero) < 0.5 * float(np.abs(size).max()) else 0.0
@@ -169,7 +161,7 @@ class CoarseFinder:
         return fit_swings(windows, (at, size, form), sigma=sigma), begins, held
 
     def found(self) -> list[End]:
-        """All peaks, in order of time."""
+        """Return all peaks, in order of time."""
         return list(self._found)
 
     @functools.cached_property
@@ -180,11 +172,9 @@ class CoarseFinder:
         result: list[End] = []
         self.fit, rows = fit, []
         for k, (instant, angle) in enumerate(zip(fit.instant, fit.state, strict=True)):
-            stderr_time, stderr_angle = (
-                float(part[k]) * self._shared(instant) for part in (
-                    fit.stderr_instant, fit.stderr_state,
-                )
-            )  # fmt: skip
+            shared = self._shared(instant)
+            stderr_time = float(fit.stderr_instant[k]) * shared
+            stderr_angle = float(fit.stderr_state[k]) * shared
             kind = "turn"
             if k == 0 and begins:
                 # A first peak that lies before the record was not seen.
@@ -194,7 +184,7 @@ class CoarseFinder:
             end = End(float(instant), float(angle), stderr_time, stderr_angle, kind)
             if stderr_time * self.w0 > 1 or not math.isfinite(stderr_angle):
                 continue
-            if result and not _resolved(result[-1], end):
+            if result and not end.resolved_from(result[-1]):
                 continue
             result.append(end)
             rows.append(k)
@@ -209,7 +199,7 @@ class CoarseFinder:
         return result
 
     def _shared(self, instant: float) -> float:
-        """Errors that samples near a turn share where the count is coarser than the noise."""
+        """Return the factor on errors that samples share near a turn by the count."""
         if self.count <= 2 * self.sigma:
             return 1.0
         near = np.abs(self.time - instant) <= max(math.pi / 2 / self.w0, 2 * self.step)
@@ -218,7 +208,7 @@ class CoarseFinder:
     def crossings(
         self, ends: list[End], index: NDArray[np.int64]
     ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-        """Instants at which the angle is zero between two peaks, their errors and half cycles."""
+        """Return instants of zero angle between peaks, errors and half cycles."""
         spans, at, speed, half, rows = [], [], [], [], []
         pairs = zip(itertools.pairwise(ends), index[:-1], self.rows, strict=False)
         for (before, after), k, row in pairs:
@@ -251,14 +241,8 @@ class CoarseFinder:
         return fit.instant[good], fit.stderr_instant[good], np.array(half, np.int64)[good]
 
 
-def _resolved(before: End, after: End) -> bool:
-    return abs(after.angle - before.angle) > _RESOLVED * math.hypot(
-        before.stderr_angle, after.stderr_angle
-    )
-
-
 def _through(time: Floats, theta: Floats, factor: int) -> tuple[Floats, Floats]:
-    """A curve through the samples, ``factor`` points for each; none across a gap."""
+    """Return a curve through the samples, ``factor`` points for each; none across a gap."""
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
     parts = []

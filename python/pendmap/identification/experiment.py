@@ -1,4 +1,4 @@
-"""Damping from an experiment by every method, with all that tables and figures of it need."""
+"""Identification from an experiment by every method, and the model file of its result."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from pendmap.formatting import counted
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.joint import JointFit, as_fit_run, fit_together
-from pendmap.identification.methods.registry import check_names, identify, identify_peaks
-from pendmap.identification.methods.trajectory import METHOD as BEST
+from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
 from pendmap.identification.methods.trajectory import OFFSET, TooShortError, identification_of
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.peaks import Peaks, find_peaks
@@ -34,28 +33,19 @@ if TYPE_CHECKING:
 
 
 MISSES: Final = 1.2
-"""Residual over noise above which the drag is tried."""
+"""Residual over noise above which quadratic drag is tried."""
 
 
 def decay_of(experiment: Experiment) -> Run:
-    """Return the free run of an experiment that swings longest and is not held out.
-
-    Raises
-    ------
-    InputError
-        If there is none, or nothing moves.
-    """
+    """Return the free run that swings longest and is not held out; refuse an experiment without."""
     free = [run for run in experiment.runs if run.kind == "free" and not run.hold_out]
     if not free:
         raise InputError(
             f"{experiment.path}: must have a free decay, no run is free and not held out"
         )
     experiment.refuse_still(free)
-    return max((run for run in free if run.moves), key=_length)
-
-
-def _length(run: Run) -> float:
-    return float(np.ptp(run.time[run.trusted]))
+    lengths = {k: float(np.ptp(r.time[r.trusted])) for k, r in enumerate(free) if r.moves}
+    return free[max(lengths, key=lengths.__getitem__)]
 
 
 def identify_experiment(
@@ -134,7 +124,7 @@ def identify_experiment(
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
-    """Return a fit with drag, positive, where the one without leaves more than the noise."""
+    """Return a fit with drag, positive, where the one without does not reach the noise."""
     noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
     if joint.fit.rms < MISSES * noise:
         return None
@@ -162,7 +152,7 @@ def _best(
     except FitDiverged as error:
         if start is not None or effects:
             raise
-        # No other method can stand in for what was asked for by name; without that they can.
+        # Other methods can replace this one, but not an effect or a start that was asked for.
         return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
     certain = joint.fit.converged or len(runs) > 1
     if certain and not unit_wrong(experiment, *runs):
@@ -172,13 +162,8 @@ def _best(
             joint.fit,
         )
     part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
-    return joint, identification_of(joint.fit, joint.readings, part)
-
-
-# Which runs of an experiment were read, and which were left out and why.
-
-
-# The model that was identified, as a model file: with its covariance and where it comes from.
+    found = identification_of(joint.fit, joint.readings, part)
+    return joint, dataclasses.replace(found, method=BEST)
 
 
 def identified_model(report: IdentificationReport, command: str = "") -> Rig:
@@ -205,7 +190,7 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     notes: dict[str, Any] = {}
     if best.covariance is not None:
         names, matrix = best.covariance
-        # A sensor's bias and tilt are no part of the pendulum.
+        # Bias and tilt of a sensor do not belong to the pendulum.
         kept = [k for k, name in enumerate(names) if name.partition("[")[0] not in SENSOR]
         names = tuple(names[k] for k in kept)
         matrix = np.asarray(matrix)[np.ix_(kept, kept)]
@@ -240,17 +225,10 @@ def provenance(
     rms: float | None = None,
     noise: float | None = None,
 ) -> dict[str, Any]:
-    """Return the table ``[provenance]`` of a model file.
+    """Return the table ``[provenance]`` of a model file from records and their SHA-256.
 
-    Parameters
-    ----------
-    files : mapping of str to str
-        Records and their SHA-256.
-    command : str
-        How it was made; left out if empty.
-    rms, noise : float, optional
-        Root mean square of what the model leaves of the records, and the noise of a reading, rad:
-        where the one is above 1.5 times the other every map of the model says so.
+    ``command`` is left out if empty. ``rms`` is the residual, ``noise`` that of a reading, both
+    rad: where rms is above 1.5 times the noise every map of the model has a warning.
     """
     table: dict[str, Any] = {"version": version("pendmap"), "simd": instruction_set()}
     if command:

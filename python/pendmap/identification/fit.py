@@ -31,79 +31,31 @@ if TYPE_CHECKING:
 
 
 LEVEL: Final = 3.841458820694124
-"""The 95 % point of chi-squared with one degree of freedom."""
+"""95 % point of chi-squared with one degree of freedom."""
 
 
 @dataclasses.dataclass(frozen=True)
 class TrajectoryFit:
-    """A pendulum fitted to records.
+    """A pendulum fitted to records, in SI."""
 
-    Parameters
-    ----------
-    estimates : mapping of str to Estimate
-        Of the free parameters, in SI; standard errors from the covariance, intervals from the
-        profile of the likelihood, but for those that are ``mixed``. A name with ``[k]`` belongs to
-        run ``k`` alone.
-    ends : mapping of str to (float, float)
-        The ends of their intervals, one of which may not have been found: no number.
-    names : tuple of str
-        The free parameters, in the order of the covariance.
-    covariance : ndarray of float, shape (k, k)
-        In SI.
-    chi2 : float
-        The sum of the squared residuals over the standard errors; of readings that are intervals
-        twice minus the logarithm of the likelihood, less what makes it one for each reading.
-    samples, degrees : int
-        How many samples count; the same less what was adapted to them.
-    rms : float
-        Of the residuals, rad, over the samples that count.
-    model : Rig
-        The model that was given, with the values found; a negative damping is set to 0, which no
-        pendulum has: ``estimates`` have it.
-    curves : tuple of ndarray of float, shape (2, n)
-        For each run angle and velocity (rad, rad/s) of the model at each sample; no numbers where
-        there was no window.
-    residuals : tuple of ndarray of float, shape (n,)
-        For each run what the sensor read less the model's reading, rad; 0 where a sample does not
-        count.
-    white : tuple of ndarray of float, shape (n,)
-        The same over the standard errors, so that noise has unit variance; of readings that are
-        intervals the slope of the likelihood over its root mean square.
-    windows : tuple of (int, int, int, float, float)
-        Run, first sample, one after the last, angle (rad) and velocity (rad/s) at its first sample.
-    steps : int
-        Steps of the search.
-    converged : bool
-        Whether it ended.
-    given_up : bool
-        Whether it was given up, since it led nowhere near the target.
-    widening : float
-        Above 1 where the sum of squares is greater than chance allows, as it is where the model
-        lacks something: the intervals are wider by its root, covariance and standard errors are
-        not.
-    mixed : tuple of str
-        The parameters whose unit depends on an exponent that is free too: their intervals are in
-        equal ratios, by the covariance.
-    """
-
-    estimates: Mapping[str, Estimate]
-    ends: Mapping[str, tuple[float, float]]
-    names: tuple[str, ...]
-    covariance: NDArray[np.float64]
-    chi2: float
-    samples: int
-    degrees: int
-    rms: float
-    model: Rig
-    curves: tuple[NDArray[np.float64], ...]
-    residuals: tuple[NDArray[np.float64], ...]
-    white: tuple[NDArray[np.float64], ...]
-    windows: tuple[tuple[int, int, int, float, float], ...]
-    steps: int
-    converged: bool
-    given_up: bool
-    widening: float
-    mixed: tuple[str, ...]
+    estimates: Mapping[str, Estimate]  # profile intervals; name[k] belongs to run k
+    ends: Mapping[str, tuple[float, float]]  # ends of the intervals; NaN where not found
+    names: tuple[str, ...]  # free parameters, in the order of the covariance
+    covariance: NDArray[np.float64]  # shape (k, k)
+    chi2: float  # sum of squares; of interval readings -2 log P
+    samples: int  # samples that count
+    degrees: int  # samples less adapted numbers
+    rms: float  # of the residuals that count, rad
+    model: Rig  # as found; negative damping is set to 0
+    curves: tuple[NDArray[np.float64], ...]  # theta, velocity by run, (2, n); NaN outside windows
+    residuals: tuple[NDArray[np.float64], ...]  # reading less model, rad; 0: does not count
+    white: tuple[NDArray[np.float64], ...]  # residuals of unit variance
+    windows: tuple[tuple[int, int, int, float, float], ...]  # run, first, last + 1, state
+    steps: int  # steps of the search
+    converged: bool  # whether the search ended
+    given_up: bool  # whether the target was out of reach
+    widening: float  # of the intervals, squared: above 1 where the model does not fit
+    mixed: tuple[str, ...]  # sizes with a free exponent: intervals in equal ratios
 
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""
@@ -128,57 +80,20 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
 
-    The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free
-    parameters and over an initial state for each window; where readings are intervals, by counts
-    coarser than the noise, ``-2 log P`` of them stands for the square. Windows begin with about one
-    swing and grow from stage to stage, to the whole record of a free decay.
+    The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free parameters
+    and an initial state for each window (Bock 1983, Progress in Scientific Computing 2, 95); where
+    readings are intervals, ``-2 log P`` of them stands for the square. Windows begin with about one
+    swing (``shortest_s``) and grow by ``growth`` from stage to stage, to the whole record of a free
+    decay; ``windows`` of a former fit make one stage. Intervals are those of Venzon & Moolgavkar
+    (1988), Applied Statistics 37, 87, for the names in ``profiled``, by default all.
 
-    Parameters
-    ----------
-    runs : sequence of FitRun
-        The records.
-    model : Rig
-        What is known, and where the search starts; its ``w0`` may be off by some percent. Effects
-        of the drive are left out of runs without one.
-    free : sequence of str
-        What is fitted: names of :class:`pendmap.Rig`, and ``effect.parameter`` of effects of the
-        model. ``p``, ``Omega`` and ``phi`` are those of each run with a drive; a ``phi`` that a run
-        does not know is fitted anyhow.
-    start : mapping of str to float, optional
-        Other starts for some; here damping may be negative.
-    profiled : sequence of str, optional
-        For which an interval is computed from the profile; all if none are given.
-    shortest_s : float, optional
-        Length of the first windows, s; one swing if none is given.
-    windows : sequence, optional
-        Those of a former fit: the search begins with them, without stages.
-    sigma_doubt : float
-        Relative standard error of ``sigma``.
-    hold : bool
-        Whether the parameters stay at their starts, so that initial states and phases that no run
-        knows are adapted alone: a model is tried on records that it was not fitted to.
-    steps : int
-        The most steps of a stage.
-    least_gain : float
-        A step that promises less of the sum of squares than this is the last one.
-    growth : float
-        By how much windows grow from stage to stage: with less a motion near the top, where small
-        errors of its state soon are large, is lost less often.
-    target : float
-        The sum of squares that is to be reached: with ``windows``, a search that after some steps
-        promises far less is given up.
-
-    Raises
-    ------
-    InputError
-        If a name is not known, or a record is too short or not finite.
-    FitDiverged
-        If the start leads out of the range of numbers, or the fit to values that no model may have.
-
-    References
-    ----------
-    Bock (1983), Progress in Scientific Computing 2, 95; Venzon & Moolgavkar (1988), Applied
-    Statistics 37, 87.
+    ``model`` is known and is the start, but for other values in ``start``, where damping may be
+    negative. ``free`` has names of :class:`pendmap.Rig` and ``effect.parameter``; those of the
+    drive are fitted run by run, as is any phase that a run does not know. ``hold`` keeps the
+    parameters at their starts: only initial states and unknown phases are adapted. ``sigma_doubt``
+    is the relative standard error of ``sigma``, ``steps`` the most in a stage; the search ends
+    where a step promises less than ``least_gain``, or, with ``windows``, where the sum ``target``
+    is out of reach.
     """
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
@@ -211,28 +126,11 @@ def score(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return what candidate parameters would gain, without fitting them (the score test).
 
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        The fit without them.
-    runs : sequence of FitRun
-        Its records.
-    candidates : sequence of str
-        Names of further parameters, as in ``free`` of :func:`fit_runs`.
-    model : Rig
-        The model of the fit with the candidates' effects in it, at the values where they are
-        scored: 0 for their size. With effects of the drive it needs an ``Omega``, for which that of
-        each run stands.
-
-    Returns
-    -------
-    pull : ndarray of float, shape (k,)
-        Half of the slope of the sum of squares by each candidate, the fitted parameters and states
-        following.
-    information : ndarray of float, shape (k, k)
-        Half of its curvature. ``pull[i]**2 / information[i, i]`` is the gain in the sum of squares
-        that candidate ``i`` alone is expected to bring, ``pull[i] / information[i, i]`` its size in
-        SI; sets of candidates likewise, by the parts of both.
+    ``model`` is that of the fit with the candidates' effects, at the values where they are scored:
+    0 for a size. Returned are ``pull``, shape (k,), half of the slope of the sum of squares by each
+    candidate, fitted parameters and states following, and ``information``, shape (k, k), half of
+    its curvature: candidate ``i`` alone gains ``pull[i]**2 / information[i, i]``, with the size
+    ``pull[i] / information[i, i]`` in SI; sets of candidates likewise.
     """
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
@@ -278,7 +176,7 @@ def _result(
     values = unknown.given(bare)
     covariance = unknown.covariance(found["covariance"], bare)
     errors = [math.sqrt(variance) for variance in np.diag(covariance)]
-    # Of sizes that are no number of the core's there is no profile: the covariance stands for it.
+    # Sizes with a free exponent have no profile: their intervals follow from the covariance.
     wide = math.sqrt(LEVEL * found["widening"])
     intervals = {
         k: interval(float(values[k]), wide * errors[k], mixed=True)
@@ -288,7 +186,7 @@ def _result(
     profiled = [k for k in chosen if k not in unknown.mixed]
     for k, ends in zip(profiled, found["intervals"], strict=True):
         both = [float(unknown.given([*bare[:k], end, *bare[k + 1 :]])[k]) for end in ends]
-        # The unit of a bias may be negative; an end that was not found is no number.
+        # The unit of a bias may be negative; an end that was not found is NaN.
         low = next((end for end in both if end < values[k]), math.nan)
         high = next((end for end in both if end > values[k]), math.nan)
         intervals[k] = low, high
@@ -347,33 +245,15 @@ def _found_model(model: Rig, estimates: Mapping[str, Estimate]) -> Rig:
     return dataclasses.replace(model, **own, effects=tuple(effects), notes={})
 
 
-# Whether a fit follows the records that it was made from.
-
-
 MISSED: Final = 0.5
-"""Part of the readings' own standard deviation from which a residual is no smaller than motion."""
+"""Residual over the readings' standard deviation from which a fit does not follow its record."""
 
 FAR: Final = 1.0
-"""The same in rad: a pendulum that is off by this is elsewhere, also one that turns."""
+"""Residual, rad, from which a fit does not follow its record, also of a pendulum that turns."""
 
 
 def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> None:
-    """Refuse a fit that plainly is not one of its records.
-
-    Parameters
-    ----------
-    path : Path
-        The experiment.
-    runs : sequence of FitRun
-        What was fitted.
-    fit : TrajectoryFit
-        The fit.
-
-    Raises
-    ------
-    InputError
-        If the residual of a run is as large as its motion.
-    """
+    """Refuse a fit in which the residual of a run is as large as its motion."""
     for run, residual in zip(runs, fit.residuals, strict=True):
         counted = np.isfinite(residual)
         if run.trusted is not None:

@@ -1,4 +1,4 @@
-"""Free parameters: their names in SI, and where they stand in the core's list."""
+"""Free parameters: their names in SI, their places in the core's list, conversion between both."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.identification.runs import FitRun, RodSensor
+    from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.model.effects import Effect
     from pendmap.units import Units
@@ -36,26 +36,22 @@ PLACES: Final[Mapping[str, int]] = {
 """Places in the core's list of parameters; those of effects follow. -1 is gravity."""
 
 SENSOR: Final[Mapping[str, int]] = {"bias": -2, "tilt": -3}
-"""The same of the own of a sensor on the rod, run by run: they are always fitted."""
+"""Places of a rod sensor's own parameters, run by run: they are always fitted."""
 
 PER_RUN: Final = ("p", "Omega", "phi")
-"""What belongs to the drive of one run."""
+"""Parameters of the drive of one run."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A free parameter: its name in SI, the power of ``w0`` that it has, where it stands.
+    """A free parameter."""
 
-    ``unit`` is what one of the core's is in SI besides; ``less`` is the free parameter whose value
-    is taken off the power.
-    """
-
-    name: str
-    power: float
-    places: list[tuple[int, int]]
+    name: str  # in SI
+    power: float  # of w0 in the SI value
+    places: list[tuple[int, int]]  # run and place
     start: float
-    unit: float = 1.0
-    less: str | None = None
+    unit: float = 1.0  # further factor of the SI value
+    less: str | None = None  # free parameter whose value is subtracted from the power
 
     @property
     def is_w0(self) -> bool:
@@ -69,31 +65,31 @@ def free_quantities(
     free: Sequence[str],
     start: Mapping[str, float],
 ) -> list[Quantity]:
-    """Return the free parameters of runs, whose rigs are given.
+    """Return the free parameters of runs whose rigs are given.
 
-    Parameters
-    ----------
-    runs, rigs : sequence
-        The records and the pendulum of each.
-    free : sequence of str
-        Names as in :func:`pendmap.identification.fit.fit_runs`; a phase that a run does not
-        know is added, and so are bias and tilt of a sensor on the rod.
-    start : mapping of str to float
-        Starts other than the rigs' values.
-
-    Raises
-    ------
-    InputError
-        If a name is not known.
+    ``free`` has names as of :func:`pendmap.identification.fit.fit_runs`; a phase that a run does
+    not know is added, and so are bias and tilt of a sensor on the rod. ``start`` has starting
+    values that replace the rigs'.
     """
     names = list(dict.fromkeys(free))
-    unknown_phase = [k for k, run in enumerate(runs) if run.drive and run.drive.get("phi") is None]
+    known = f"{', '.join(PLACES)} and effect.parameter of the model's effects"
     quantities = []
+
+    def add(
+        name: str,
+        places: list[tuple[int, int]],
+        power: float = 0,
+        unit: float = 1.0,
+        less: str | None = None,
+    ) -> None:
+        begin = start.get(name.partition("[")[0], _value_of(name, rigs[places[0][0]]))
+        quantities.append(Quantity(name, power, places, start.get(name, begin), unit, less))
+
+    of_run = [f"[{k}]" if len(runs) > 1 else "" for k in range(len(runs))]
     for name in names:
-        known = f"{', '.join(PLACES)} and effect.parameter of the model's effects"
         if name in PER_RUN:
             driven = [k for k, run in enumerate(runs) if run.drive is not None]
-            parts = [(f"{name}[{k}]" if len(runs) > 1 else name, [k]) for k in driven]
+            parts = [(name + of_run[k], [k]) for k in driven]
         else:
             parts = [(name, list(range(len(runs))))]
         for own, where in parts:
@@ -101,29 +97,16 @@ def free_quantities(
             if not places:
                 raise InputError(f"free must be among {known}, got {short_repr(name)}")
             power, less = _power_of(name, rigs[places[0][0]], names)
-            quantities.append(Quantity(own, power, places, math.nan, less=less))
-    if "phi" not in names:
-        quantities += [
-            Quantity(f"phi[{k}]" if len(runs) > 1 else "phi", 0, [(k, PLACES["phi"])], math.nan)
-            for k in unknown_phase
-        ]
-    for k, run in enumerate(runs):
-        if run.rod_sensor is not None:
-            quantities += _of_sensor(run.rod_sensor, k, f"[{k}]" if len(runs) > 1 else "")
-    return [
-        dataclasses.replace(
-            q, start=start.get(q.name, start.get(q.name.partition("[")[0], _value_of(q, rigs)))
-        )
-        for q in quantities
-    ]
-
-
-def _of_sensor(sensor: RodSensor, k: int, which: str) -> list[Quantity]:
-    """Return what is not known of a sensor on the rod: its reading of nothing, and how it leans."""
-    own = [Quantity(f"bias{which}", 0, [(k, SENSOR["bias"])], math.nan, sensor.unit)]
-    if sensor.leans:
-        own.append(Quantity(f"tilt{which}", 0, [(k, SENSOR["tilt"])], math.nan))
-    return own
+            add(own, places, power, less=less)
+    unknown = [k for k, run in enumerate(runs) if run.drive and run.drive.get("phi") is None]
+    for k in unknown if "phi" not in names else []:
+        add("phi" + of_run[k], [(k, PLACES["phi"])])
+    sensors = [(k, run.rod_sensor) for k, run in enumerate(runs) if run.rod_sensor is not None]
+    for k, sensor in sensors:
+        add("bias" + of_run[k], [(k, SENSOR["bias"])], unit=sensor.unit)
+        if sensor.leans:
+            add("tilt" + of_run[k], [(k, SENSOR["tilt"])])
+    return quantities
 
 
 def _effect(name: str, rig: Rig) -> tuple[int, Effect, str] | None:
@@ -145,7 +128,7 @@ def _place_of(name: str, rig: Rig) -> int | None:
 
 
 def _power_of(name: str, rig: Rig, free: Sequence[str]) -> tuple[float, str | None]:
-    """Return a parameter's power of ``w0``, and what is taken off it, if that is free too."""
+    """Return a parameter's power of ``w0``, and the free exponent subtracted from it, if any."""
     if name == "w0":
         return 1, None
     own = dict(COUNTERPARTS.values())
@@ -164,9 +147,8 @@ def _power_of(name: str, rig: Rig, free: Sequence[str]) -> tuple[float, str | No
     return float(entry["power_of_w0"] - effect.parameters[less]), None
 
 
-def _value_of(quantity: Quantity, rigs: Sequence[Rig]) -> float:
-    rig = rigs[quantity.places[0][0]]
-    name = quantity.name.partition("[")[0]
+def _value_of(name: str, rig: Rig) -> float:
+    name = name.partition("[")[0]
     if name in SENSOR:
         return 0.0
     if name in PLACES:
@@ -175,37 +157,22 @@ def _value_of(quantity: Quantity, rigs: Sequence[Rig]) -> float:
     return math.nan if found is None else found[1].parameters[found[2]]
 
 
-# Free parameters as the core counts them, and in SI.
-#
-# The core counts time in ``1 / w_ref`` of a fixed ``w_ref``, and ``w0`` is a factor ``xi`` on
-# gravity
-# there. In SI
-#
-# ``w0 = w_ref sqrt(xi)``, ``x = u w_ref^k xi`` of all others.
-#
-# The power ``k`` of a size whose unit depends on an exponent ``n`` is ``2 - n``. Where both are
-# free
-# the Jacobian ``dx / dxi`` has ``dq / dn = -ln(w_ref) q`` beside its diagonal.
-
-
 @dataclasses.dataclass(frozen=True)
 class Conversion:
-    """Conversion of the free parameters of a fit.
+    """Conversion of a fit's free parameters between SI and the core.
 
-    Parameters
-    ----------
-    quantities : sequence of Quantity
-        The parameters.
-    units : Units
-        SI, with ``w_ref`` for their ``w0``.
+    The core counts time in ``1 / w_ref`` of a fixed ``w_ref``, and ``w0`` is a factor ``xi`` on
+    gravity. In SI ``w0 = w_ref sqrt(xi)``, and ``x = u w_ref^k xi`` of all others. The power ``k``
+    of a size whose unit depends on an exponent ``n`` is ``2 - n``; where both are free the Jacobian
+    ``dx / dxi`` has ``dq / dn = -ln(w_ref) q`` beside its diagonal.
     """
 
     quantities: Sequence[Quantity]
-    units: Units
+    units: Units  # SI, with w_ref for their w0
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the parameters are called."""
+        """Names of the parameters."""
         return tuple(q.name for q in self.quantities)
 
     @property
@@ -219,7 +186,7 @@ class Conversion:
         ]
 
     def given(self, values: ArrayLike) -> Floats:
-        """Return in SI what the core calls ``values``, shape (k,)."""
+        """Return in SI the core's ``values``, shape (k,)."""
         bare = np.asarray(values, np.float64)
         roots = np.sqrt(np.where(bare > 0, bare, np.nan))
         first = np.array([q.is_w0 for q in self.quantities], bool)
@@ -244,7 +211,8 @@ class Conversion:
     def covariance(self, bare: Floats, values: ArrayLike) -> Floats:
         """Return the covariance in SI, shape (k, k), from the core's.
 
-        Variances are infinite of what the records do not show, and of what is computed from it.
+        Variances are infinite of parameters that the records do not determine, and of those that
+        follow.
         """
         slopes = self.jacobian(values)
         known = np.where(np.isfinite(bare), bare, 0.0)
@@ -256,17 +224,17 @@ class Conversion:
 
     @property
     def mixed(self) -> tuple[int, ...]:
-        """The places of sizes whose unit is free too: no number of the core's is such a size."""
+        """Places of sizes whose unit depends on a free exponent."""
         return tuple(self._exponents)
 
     @property
     def _exponents(self) -> dict[int, int]:
-        """The place of the exponent of each size whose unit depends on a free one."""
+        """Place of the exponent of each size whose unit depends on a free one."""
         places = {name: k for k, name in enumerate(self.names)}
         return {k: places[q.less] for k, q in enumerate(self.quantities) if q.less is not None}
 
     def _scales(self, values: ArrayLike) -> Floats:
-        """Return what one of the core's is in SI; an exponent is the same number in both."""
+        """Return the SI value of one unit of the core's; an exponent is the same in both."""
         powers = np.array([q.power for q in self.quantities], np.float64)
         for size, exponent in self._exponents.items():
             powers[size] -= np.asarray(values, np.float64)[exponent]
@@ -275,10 +243,10 @@ class Conversion:
 
 
 def interval(value: float, half: float, *, mixed: bool) -> tuple[float, float]:
-    """Return a value less and more ``half`` of its interval; no numbers where that is not finite.
+    """Return the ends of ``value +- half``; NaN where ``half`` is not finite.
 
-    Of a size whose unit is free too, in equal ratios: what records tell is ``q v^n`` at their
-    velocities ``v``, so that ``ln q`` and ``n`` vary together, and nearly normally.
+    ``mixed``, of a size whose unit is free too, in equal ratios: records determine ``q v^n`` at
+    their velocities ``v``, so that ``ln q`` and ``n`` vary together, nearly normally.
     """
     if not math.isfinite(half):
         return math.nan, math.nan

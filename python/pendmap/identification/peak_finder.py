@@ -26,20 +26,20 @@ if TYPE_CHECKING:
 _BIAS: Final = 0.25
 """Bias allowed in a peak's amplitude, in standard errors."""
 _WIDEST: Final = 1.3
-"""Half width of a peak's window at most, in radians of phase w0 t: a quarter swing is 1.57."""
+"""Greatest half width of a peak's window, radians of phase w0 t: a quarter swing is 1.57."""
 _SHOW: Final = 6
-"""Peaks from which friction is told."""
+"""Peaks from which friction is estimated."""
 _CROSSING: Final = 0.6
+"""Half width of a crossing's window, radians of phase w0 t."""
 _FEWEST: Final = 8
-_RESOLVED: Final = 8.0
-"""A peak counts if it stands this many of its standard errors away from the one before."""
+"""Samples of a peak's window."""
 
 
 class Finder:
-    """One record, its noise and its rough course."""
+    """Peaks and crossings of one record, its noise and its rough course."""
 
     def __init__(self, time: Floats, theta: Floats, reading: Reading, course: Outline) -> None:
-        # An unwrapped angle may rest some turns away from where it began.
+        # An unwrapped angle may come to rest some turns from its start.
         away = math.tau * round(float(np.mean(theta[course.turns[-2:]])) / math.tau)
         self.time, self.theta = time, theta - away
         self.course = dataclasses.replace(course, smooth=course.smooth - away)
@@ -50,7 +50,7 @@ class Finder:
         self.bottom, self.top = float(theta.min()), float(theta.max())
 
     def found(self) -> list[End]:
-        """All peaks, in order of time."""
+        """Return all peaks, in order of time."""
         turns = [int(k) for k in self.course.turns]
         scale = self.w0, self.window(float(self.theta[0]))
         begin = release(self.time, self.theta, self.sigma, scale, self.course)
@@ -62,7 +62,7 @@ class Finder:
                 turns = [inner, *turns]
         for k in turns:
             end = self._clipped(k) or self._turn(k)
-            if end is None or (result and not self._resolved(result[-1], end)):
+            if end is None or (result and not end.resolved_from(result[-1])):
                 continue
             result.append(end)
         end = stop(self.time, self.theta, self.sigma, self.course, result)
@@ -71,7 +71,7 @@ class Finder:
 
     @staticmethod
     def _in_time(ends: list[End]) -> list[End]:
-        """Take off what friction makes turns late, as far as their sizes show friction."""
+        """Subtract the lateness of turns by friction, as far as their sizes show friction."""
         sizes = np.array([e.angle for e in ends if math.isfinite(e.stderr_angle)])
         if sizes.size < _SHOW:
             return ends
@@ -81,7 +81,7 @@ class Finder:
         return [e.late(theta_r) for e in ends]
 
     def window(self, amplitude: float) -> float:
-        """Half width of the window of a peak, s."""
+        """Return the half width of the window of a peak, s."""
         a = min(abs(amplitude), math.pi - 0.05)
         sixth = max(abs(math.sin(a) * (3 * math.sin(a) ** 2 - math.cos(a) ** 2)), 1e-3 * a, 1e-6)
         bias = 5 / 231 * sixth / 720
@@ -107,7 +107,7 @@ class Finder:
         if fit is None:
             return None
         end = self._end(fit, time)
-        # An instant less certain than the window is wide: no bend is seen, and nothing turns there.
+        # An error of the instant above the width of the window: there is no turn.
         return end if end.stderr_time <= 2 * fit.half else None
 
     def _end(self, fit: WindowFit, time: float) -> End:
@@ -125,14 +125,14 @@ class Finder:
         )
 
     def _effective(self, fit: WindowFit) -> float:
-        """The noise of a sample, counted as often as samples are independent."""
+        """Return the noise of a sample, where samples share errors of the count."""
         if self.count <= 2 * self.sigma:
             return self.sigma
         inside = self._between(fit.centre - fit.half, fit.centre + fit.half)
         return self.sigma * levels_shared(self.theta[inside], self.count)
 
     def _clipped(self, k: int) -> End | None:
-        """A top that was cut off: the extreme of the record for longer than the swing stays."""
+        """Return a top that was cut off: the extreme for longer than the swing stays."""
         extreme = self.top if self.course.smooth[k] > 0 else self.bottom
         half = self.course.period / 2
         around = self._between(float(self.time[k]) - half, float(self.time[k]) + half)
@@ -147,22 +147,14 @@ class Finder:
         return End(middle, extreme, self.step, math.inf, "clipped")
 
     def _between(self, begin: float, end: float) -> slice:
-        """The samples from one instant to another."""
+        """Return the samples from one instant to another."""
         first, last = np.searchsorted(self.time, (begin, end))
         return slice(int(first), int(last))
-
-    @staticmethod
-    def _resolved(before: End, after: End) -> bool:
-        if not (math.isfinite(before.stderr_angle) and math.isfinite(after.stderr_angle)):
-            return True
-        return abs(after.angle - before.angle) > _RESOLVED * math.hypot(
-            before.stderr_angle, after.stderr_angle
-        )
 
     def crossings(
         self, ends: list[End], index: NDArray[np.int64]
     ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-        """Instants at which the angle is zero between two peaks, their errors and half cycles."""
+        """Return instants of zero angle between two peaks, their errors and half cycles."""
         found = []
         for before, after, k in zip(ends, ends[1:], index, strict=False):
             if after.kind == "stop" or before.angle * after.angle >= 0:

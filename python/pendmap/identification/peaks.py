@@ -76,7 +76,7 @@ class Peaks:
         stderr_time: float = 0.0,
         stderr_amplitude: float = 0.0,
     ) -> Peaks:
-        """Return peaks that somebody else has measured; absolute values get alternating signs."""
+        """Return peaks that were measured elsewhere; absolute values get alternating signs."""
         t, a = np.asarray(time, float), np.asarray(amplitude, float)
         if t.ndim != 1 or t.shape != a.shape:
             raise InputError(
@@ -93,21 +93,21 @@ class Peaks:
 
     @property
     def known(self) -> bool:
-        """Whether their standard errors are known."""
+        """Whether the standard errors are known."""
         return bool(np.any(self.stderr_time > 0) or np.any(self.stderr_amplitude > 0))
 
     @property
     def odd(self) -> NDArray[np.bool_]:
-        """Which peaks begin an odd half cycle, shape (P,)."""
+        """Peaks that begin an odd half cycle, as a mask, shape (P,)."""
         return np.asarray(self.index % 2 == 1)
 
     @property
     def turned(self) -> Peaks:
-        """Only those at which the pendulum turned and was seen: no stop, nothing clipped."""
+        """Peaks at which the pendulum turned and was seen: no stop, nothing clipped."""
         return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
 
     def later(self, seconds: float) -> Peaks:
-        """Return the same on a clock that shows so much more."""
+        """Return the peaks on a clock that is ahead by some seconds."""
         return dataclasses.replace(
             self, time=self.time + seconds, crossing_time=self.crossing_time + seconds
         )
@@ -123,13 +123,7 @@ class Peaks:
 def samples(
     time: ArrayLike, theta: ArrayLike, trusted: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
-    """Return the samples that may be used, as arrays.
-
-    Raises
-    ------
-    InputError
-        If the lengths differ, a sample that is trusted is not finite, or time does not increase.
-    """
+    """Return the trusted samples as arrays; refuse what is not finite or does not increase."""
     t, x = np.asarray(time, float), np.asarray(theta, float)
     good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
@@ -158,16 +152,14 @@ def find_peaks(
     at a peak ``A``; it shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half width
     ``h``. The window is as wide as lets this be a quarter of the standard error, and 1.3 rad of
     phase at most. Coulomb friction bends the two sides of a peak differently, which makes its time
-    late by ``5/32 h theta_r / sin A``: this is taken off, with ``theta_r`` from the sizes of the
-    peaks, and a fifth of it counts as error.
-    Amplitudes are freed of the excess ``stderr(v)^2 / (2 abs(theta''))`` that the highest point of
-    a noisy curve has on average.
+    late by ``5/32 h theta_r / sin A``: this is subtracted, with ``theta_r`` from the sizes of the
+    peaks, and a fifth of it counts as error. From amplitudes the mean excess of the highest point
+    of a noisy curve is subtracted, ``stderr(v)^2 / (2 abs(theta''))``.
 
-    With fewer than 20 samples a period (of small swings) no quartic has samples enough. Peaks and
-    crossings are then those of a pendulum's swings,
-    ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0``, fitted to the samples within
-    half a swing, with parameters that 12 turns in a row share, and found again for the next 12.
-    Errors hold the noise, that of these parameters, and what the form misses.
+    With fewer than 20 samples a period (of small swings) peaks and crossings are those of a
+    pendulum's swings, ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0``, fitted to
+    the samples within half a swing, with parameters that each 12 turns in a row share. Errors
+    include the noise, the errors of these parameters, and the misfit of the form.
 
     Parameters
     ----------
@@ -226,7 +218,7 @@ def find_peaks(
 def _finder(
     time: Floats, theta: Floats, sigma: float | None
 ) -> tuple[Finder | CoarseFinder | None, float]:
-    """What suits the samples, or nothing where the record does not swing; and the noise."""
+    """Return a finder that suits the sampling, None without swings; and the noise."""
     if is_coarse(time, theta):
         coarse = coarse_finder(time, theta, sigma)
         return (coarse if coarse.swings else None), coarse.sigma
@@ -236,7 +228,7 @@ def _finder(
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
-    """Numbers of the peaks: signs alternate, and a gap in the record hides an even number."""
+    """Return numbers of the peaks: signs alternate, and a gap hides an even number."""
     result = [0] if ends else []
     for before, after in itertools.pairwise(ends):
         mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)

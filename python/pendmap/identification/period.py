@@ -1,4 +1,4 @@
-"""The natural frequency from the times of peaks, amplitudes taken into account."""
+"""The natural frequency from the times of peaks with their amplitudes; peaks by energy."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Frequency:
-    """A natural frequency ``w0`` (rad/s), its standard error and what the line leaves.
+    """Natural frequency ``w0`` (rad/s), its error, chi^2 per degree of freedom.
 
-    ``misfit`` is chi^2 per degree of freedom; where it is above 1 the error is widened by it.
+    The error is widened by the misfit where that is above 1.
     """
 
     w0: float
@@ -47,25 +47,11 @@ def quarters(amplitude: Floats) -> tuple[Floats, Floats]:
 def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Frequency:
     """Fit the amplitude-corrected period ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, to all peaks.
 
-    A half cycle between the peaks ``A`` and ``B`` takes a quarter period of each,
-    ``w0 t = [K(sin^2(A/2)) + K(sin^2(B/2))] / sqrt(1 - zeta^2)``. For viscous damping and friction
-    this is right to first order; at ``zeta = 0.004`` it misses 3e-4 of the half cycle near 2.6 rad
-    and 5e-5 near 2 rad. Errors of times and amplitudes both count, and that neighbouring half
-    cycles share a peak. Half cycles beside a missing peak are left out.
-
-    Parameters
-    ----------
-    peaks : Peaks
-        Three or more.
-    zeta : float
-        Damping ratio, which makes small swings slower.
-    offset : float
-        Zero error of the angle, rad.
-
-    Raises
-    ------
-    ValueError
-        If no two peaks follow one another.
+    A half cycle between the peaks ``A`` and ``B`` takes a quarter period of each, ``w0 t =
+    [K(sin^2(A/2)) + K(sin^2(B/2))] / sqrt(1 - zeta^2)``. For viscous damping and friction this is
+    right to first order; at ``zeta = 0.004`` it misses 3e-4 of the half cycle near 2.6 rad and 5e-5
+    near 2 rad. Errors of times and amplitudes both count, and that neighbouring half cycles share a
+    peak. Half cycles beside a missing peak are left out. ``offset`` is the zero error, rad.
     """
     amplitude = peaks.amplitude - offset
     quarter, slope = quarters(amplitude)
@@ -76,8 +62,7 @@ def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Freque
     lasts, both = time[pairs + 1] - time[pairs], quarter[pairs + 1] + quarter[pairs]
     rough = float(np.median(lasts / both))
     one = np.ones(pairs.size)
-    # A time that is too late makes one half cycle longer and the next one shorter, an amplitude
-    # that is too large makes both longer.
+    # A late time makes one half cycle longer and the next shorter, a large amplitude both longer.
     late = chain_covariance(pairs, -one, one, np.maximum(peaks.stderr_time, 1e-12) ** 2)
     wide = chain_covariance(
         pairs, slope[pairs] * rough, slope[pairs + 1] * rough, peaks.stderr_amplitude**2
@@ -88,21 +73,14 @@ def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Freque
     return Frequency(w0, math.sqrt(float(covariance[0, 0])) * w0**2 * root, misfit)
 
 
-# The peaks of a damped pendulum by its energy, without integrating its motion.
-
-
 _ROUNDS = 4
+"""Iterations of each half cycle's energy balance."""
 
 
 def viscous_work(amplitude: Floats) -> Floats:
     """Return ``int th'^2 dt / w0`` over a half cycle of a pendulum of this amplitude, rad^2.
 
     ``8 (E(m) - (1 - m) K(m))``, ``m = sin^2(A/2)``; ``pi A^2 / 2`` for small swings.
-
-    Parameters
-    ----------
-    amplitude : array
-        Either sign, below pi, rad.
     """
     half = np.minimum(np.abs(amplitude), math.pi - 1e-9) / 2
     m, rest = np.sin(half) ** 2, np.cos(half) ** 2
@@ -113,15 +91,9 @@ def envelope(first: Floats, gamma: Floats, theta_r: Floats, count: int) -> Float
     """Return the absolute values of successive peaks, shape (count, ...).
 
     Each half cycle loses ``cos B - cos A = gamma W((A + B)/2) + theta_r (A + B)`` with the work
-    ``W`` of :func:`viscous_work`: first order in the damping, any amplitude. Where friction would
-    end a half cycle before zero, the peaks are 0 from there on.
-
-    Parameters
-    ----------
-    first, gamma, theta_r : array, shapes that broadcast
-        First peak (rad), ``c_over_m / w0`` and ``Tr / w0^2``.
-    count : int
-        How many peaks.
+    ``W`` of :func:`viscous_work`: first order in the damping, any amplitude, ``gamma = c_over_m /
+    w0``, ``theta_r = Tr / w0^2``. From where friction ends a half cycle before zero, the peaks are
+    0.
     """
     a, damping, friction = np.broadcast_arrays(
         np.abs(np.asarray(first, float)), np.asarray(gamma, float), np.asarray(theta_r, float)

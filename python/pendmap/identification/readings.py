@@ -1,4 +1,4 @@
-"""What a reading is worth: its noise as seen without a model, and the sensor's counts."""
+"""Standard errors of readings: the noise as estimated without a model, and the sensor's counts."""
 
 from __future__ import annotations
 
@@ -19,52 +19,28 @@ if TYPE_CHECKING:
 
 
 DITHERED: Final = 0.45
-"""Noise below this part of a count, the rounding included, no longer makes the errors of successive
-readings different: a fit takes them for intervals."""
+"""Noise (rounding included) over the count below which a fit takes readings for intervals. Below,
+the errors of successive readings are no longer independent."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Reading:
-    """Standard errors of readings.
+    """Standard errors of readings; arrays have the shape (n,)."""
 
-    Parameters
-    ----------
-    sigma : float
-        Of one reading, rad.
-    count : float
-        The step of the sensor, rad; 0 where none is seen.
-    each : ndarray of float, shape (n,)
-        For a fit, by the noise at their speed.
-    doubt : float
-        Relative standard error of ``sigma``.
-    coarse : bool
-        Whether the count is coarser than the noise.
-    law : SpeedLaw or None
-        How the noise grows with speed, where the record shows that it does; ``each`` follows it.
-    alike : ndarray of float, shape (n,)
-        ``each`` without the law: for a model that lacks more than the noise.
-    shift : float or ndarray of float, shape (n,)
-        By how much instants that miss their stamps move the readings on average, rad; a fit takes
-        it off.
-    gain, unit : float, str
-        What was read over the angle that it counts for, and the unit of what was read; 1 and rad of
-        an angle.
-    """
-
-    sigma: float
-    count: float
-    each: NDArray[np.float64]
-    doubt: float
-    coarse: bool
-    alike: NDArray[np.float64]
-    law: SpeedLaw | None = None
-    shift: NDArray[np.float64] | float = 0.0
-    gain: float = 1.0
-    unit: str = "rad"
+    sigma: float  # of one reading, rad
+    count: float  # step of the sensor, rad; 0 where none is seen
+    each: NDArray[np.float64]  # rad, for a fit: by the law where there is one
+    doubt: float  # relative standard error of sigma
+    coarse: bool  # whether the count is coarser than the noise
+    alike: NDArray[np.float64]  # each without the law: for a model that lacks an effect
+    law: SpeedLaw | None = None  # growth of the noise with speed, where it is seen
+    shift: NDArray[np.float64] | float = 0.0  # mean error of stamps off time, rad; subtracted
+    gain: float = 1.0  # reading over the angle that it counts for
+    unit: str = "rad"  # of what was read
 
     @property
     def interval(self) -> float | None:
-        """The count, rad, where a fit takes readings for intervals."""
+        """Count, rad, where a fit takes readings for intervals."""
         return self.count if self.coarse else None
 
 
@@ -76,22 +52,12 @@ def reading_of(
     trusted: NDArray[np.bool_] | None = None,
     count: float | None = None,
 ) -> Reading:
-    """Return the standard errors of readings.
+    """Return the standard errors of readings (rad, at times in s), from the trusted ones.
 
-    The noise is that of :func:`pendmap.noise_floor`, by its law where it grows with speed, with few
-    samples a period what the swings of a pendulum leave, if that is less; it is at least that of
-    the count, ``count / sqrt(12)``.
-
-    Parameters
-    ----------
-    time, theta : ndarray of float, shape (n,)
-        s, and the readings, rad.
-    sigma : float, optional
-        Their noise, where it is known, rad.
-    trusted : ndarray of bool, shape (n,), optional
-        Which of them count for the noise.
-    count : float, optional
-        The step of the sensor, rad, where it is known.
+    The noise is that of :func:`pendmap.noise_floor`, by its law where it grows with speed. With few
+    samples a period it is the residual of a pendulum's swings, if that is less. It is at least that
+    of the count, ``count / sqrt(12)``. ``sigma`` and ``count`` (rad) are estimated unless they are
+    given.
     """
     if count is None:
         count = step_of(theta)
@@ -104,7 +70,7 @@ def reading_of(
         doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
         use = np.ones(time.size, bool) if trusted is None else trusted
         if known and is_coarse(time[use], theta[use]):
-            # No polynomial follows so few samples a period: what it leaves is motion.
+            # A polynomial cannot follow a swing with few samples: its residual is motion.
             left = coarse_finder(time[use], theta[use], None).sigma
             if left < sigma:
                 sigma, law = left, None

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
-from pendmap.formatting import Readable, counted, estimate_text, interval
+from pendmap.formatting import Readable, counted, estimate_text, interval, percent
 from pendmap.identification.methods.base import Identification
 from pendmap.records.summary import doubts, findings_said
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 
 DRAG: Final = "quadratic_drag"
-"""The effect that is tried unasked where viscous damping and friction leave more than the noise."""
+"""Effect that is tried unasked where viscous damping and friction do not explain a record."""
 
 COLUMNS: Final = {
     "w0": "w0 (rad/s)",
@@ -33,18 +32,18 @@ COLUMNS: Final = {
     "theta_r": "theta_r (rad)",
     "offset": "offset (rad)",
 }
-"""What the table of methods shows, and how it is headed; effects' parameters follow."""
+"""Columns of the table of methods and their heads; effects' parameters follow."""
 
 STILL: Final = "in which nothing moves"
-"""What a run is that shows no motion."""
+"""Description of a run without motion."""
 
 COPY: Final = "that copies another"
-"""What a run is whose readings count in another one."""
+"""Description of a run whose readings count in another one."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class IdentificationReport(Readable):
-    """What every method says of an experiment.
+    """Results of every method on an experiment.
 
     Parameters
     ----------
@@ -57,12 +56,11 @@ class IdentificationReport(Readable):
     methods : mapping of str to Identification
         By method, the best one first.
     joint : JointFit or None
-        What stands behind the best one; none where it was not asked for or cannot be applied.
+        Fit by the trajectory method; none where it was not asked for or cannot be applied.
     table : Table1
         Table 1 and figure 7 of the decay.
     with_drag : JointFit or None
-        The same with quadratic drag, where the best one leaves more than the noise and no effect
-        was asked for.
+        Fit with quadratic drag, where ``joint`` does not reach the noise and no effect was asked.
     """
 
     experiment: Experiment
@@ -86,12 +84,9 @@ class IdentificationReport(Readable):
 
     @property
     def best(self) -> Identification:
-        """The first method that could be applied and whose search converged.
+        """First method that could be applied and whose search converged.
 
-        Raises
-        ------
-        InputError
-            If there is none.
+        InputError is raised if there is none.
         """
         for found in self.methods.values():
             if found.sound:
@@ -112,7 +107,7 @@ class IdentificationReport(Readable):
 
     @property
     def passed_over(self) -> str:
-        """Which better method the best one stands in for, and why, in words; empty if for none."""
+        """The better method that the best one replaces, and why; else empty."""
         first = next(iter(self.methods.values()))
         if first.sound or not any(found.sound for found in self.methods.values()):
             return ""
@@ -129,20 +124,12 @@ class IdentificationReport(Readable):
 
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
-    """Return how many runs were read and which were not, in words; empty if all were.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        All of its runs.
-    read : sequence of Run
-        Those of them that were read.
-    """
+    """Return how many runs of an experiment were read and which were not; empty if all were."""
     reasons: dict[str, int] = {}
     for run in experiment.runs:
         if any(run is each for each in read):
             continue
-        # Where runs held out are read all the same, that is no reason for a forced one.
+        # Where runs held out are read too, being held out is no reason for a forced run.
         held = run.hold_out and (run.kind == "free" or not any(each.hold_out for each in read))
         why = "held out" if held else "forced"
         if run.kind == "free" and not run.hold_out:
@@ -242,7 +229,7 @@ def _method(found: Identification) -> dict[str, Any]:
 
 
 def _drag(report: IdentificationReport) -> Iterator[str]:
-    """Yield what quadratic drag gains, where it was tried."""
+    """Yield the gain by quadratic drag, where it was tried."""
     if report.with_drag is None or report.joint is None:
         return
     drag = report.with_drag.fit
@@ -255,10 +242,7 @@ def _drag(report: IdentificationReport) -> Iterator[str]:
 
 
 def as_text(report: IdentificationReport) -> Iterator[str]:
-    """Yield the lines beside the tables: intervals, warnings, what was found in the record.
-
-    What a reader must know before any number comes first.
-    """
+    """Yield the lines beside the tables: doubts first, then intervals, warnings, findings."""
     for text in foremost(report):
         yield f"Warning: {text}"
     best = _best(report)
@@ -282,7 +266,7 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
 
 
 def foremost(report: IdentificationReport) -> list[str]:
-    """Return doubts about the records, and which method another stands in for."""
+    """Return doubts about the records, and which method another replaces."""
     first = doubts(report.experiment, *report.runs)
     return [*first, report.passed_over] if report.passed_over else first
 
@@ -306,14 +290,8 @@ def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str
     """Return heads and rows of table 1: percent errors of each method's simulation."""
     rows = []
     for name, errors in report.table.errors.items():
-        percent = [
-            "at rest" if math.isnan(row.errors[name]) else f"{row.errors[name]:.3g} %"
-            for row in report.table.rows
-        ]
-        overall = [
-            "" if math.isnan(r) else f"{r:.3g} %" for r in (errors.period_rms, errors.peak_rms)
-        ]
-        rows.append([name, *percent, *overall])
+        each = [percent(row.errors[name]) or "at rest" for row in report.table.rows]
+        rows.append([name, *each, percent(errors.period_rms), percent(errors.peak_rms)])
     units = {"period": "s", "peak": "rad"}
     measured = [f"{r.what} {r.measured:.4g} {units[r.what]}" for r in report.table.rows]
     return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows

@@ -1,4 +1,4 @@
-"""Records as a fit takes them, and their way to the core: there time counts in ``1 / w0``."""
+"""Records as a fit takes them, and as the core does, which counts time in ``1 / w0``."""
 
 from __future__ import annotations
 
@@ -19,131 +19,76 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 FORCED_WINDOW_SWINGS: Final = 3.0
-"""The longest window of a forced run, in periods of small swings: forced motions may be chaotic,
-and what is not known of a state grows in them."""
+"""Longest window of a forced run, periods of small swings: chaos amplifies errors of a state."""
 
 EXACTNESS: Final = 1e-6
-"""The integrator's error allowed to a step, over the smallest standard error of a reading."""
+"""Integrator's error allowed a step, over the smallest standard error of a reading."""
 
 SHARPEST: Final = 0.1
-"""The least noise before the rounding, over a count: the edges of real counts are not perfect, and
-readings that may not err at all would be walls to a search."""
+"""Least noise before the rounding, over a count: without noise readings would be hard walls."""
 
 TOLERANCES: Final = (1e-13, 1e-8)
-"""Its least and its greatest value."""
+"""Least and greatest error a step that the integrator is asked for."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pivot:
-    """A recorded motion of the pivot.
+    """A recorded motion of the pivot."""
 
-    Parameters
-    ----------
-    time : ndarray of float, shape (n,)
-        In s, on the clock of the run; each after the one before it.
-    vertical, horizontal : ndarray of float, shape (n,), or None
-        Upward, and toward positive theta: accelerations in m/s^2, velocities in m/s or positions
-        in m.
-    quantity : str
-        Which of them: ``acceleration``, ``velocity`` or ``position``.
-    """
-
-    time: NDArray[np.float64]
-    vertical: NDArray[np.float64] | None = None
-    horizontal: NDArray[np.float64] | None = None
-    quantity: str = "acceleration"
+    time: NDArray[np.float64]  # s, on the clock of the run, increasing
+    vertical: NDArray[np.float64] | None = None  # shape (n,), upward: m/s^2, m/s or m
+    horizontal: NDArray[np.float64] | None = None  # likewise, toward positive theta
+    quantity: str = "acceleration"  # or velocity, position
 
 
 @dataclasses.dataclass(frozen=True)
 class RodSensor:
-    """A gyroscope or an accelerometer on the rod, whose readings a fit compares instead of angles.
+    """A gyroscope or accelerometer on the rod, whose readings a fit compares instead of angles.
 
-    A gyroscope reads ``rate th' + bias``, an accelerometer
-    ``place (th'' cos(tilt) + th'**2 sin(tilt)) + gravity sin(th + tilt) + bias``, where
-    ``bias`` and ``tilt`` are fitted. Where friction turns round, at every turn, ``th''`` and the
-    reading jump by ``2 place Tr``, which the reading whose interval of sampling holds the turn
-    shares; while friction holds the pendulum, ``th''`` is 0.
-
-    Parameters
-    ----------
-    angle : ndarray of float, shape (n,)
-        About which angles the readings were taken, rad: where the search starts.
-    rate : float
-        Reading per rad/s; 0 of an accelerometer.
-    place : float
-        Reading per rad/s^2; 0 of a gyroscope.
-    gravity : float
-        Reading of the whole of gravity; 0 where the sensor gives none.
-    unit : float
-        What a bias is given in, over the unit of the readings.
-    leans : bool
-        Whether its axis has a tilt.
+    A gyroscope reads ``rate th' + bias``, an accelerometer ``place (th'' cos(tilt) + th'**2
+    sin(tilt)) + gravity sin(th + tilt) + bias``; ``bias`` and ``tilt`` are fitted. Where friction
+    changes its sign, at every turn, ``th''`` jumps by ``2 Tr`` and the reading by ``2 place Tr``:
+    the reading whose interval of sampling holds the turn has a share of it. While friction holds
+    the pendulum, ``th''`` is 0.
     """
 
-    angle: NDArray[np.float64]
-    rate: float = 0.0
-    place: float = 0.0
-    gravity: float = 0.0
-    unit: float = 1.0
-    leans: bool = True
+    angle: NDArray[np.float64]  # rad, shape (n,): where the search starts
+    rate: float = 0.0  # reading per rad/s; 0 of an accelerometer
+    place: float = 0.0  # reading per rad/s^2; 0 of a gyroscope
+    gravity: float = 0.0  # reading of all of gravity; 0 where the sensor shows none
+    unit: float = 1.0  # unit of a bias over the unit of the readings
+    leans: bool = True  # whether its axis has a tilt
 
 
 @dataclasses.dataclass(frozen=True)
 class FitRun:
-    """A record to be fitted.
+    """A record to be fitted; arrays have the shape (n,)."""
 
-    Parameters
-    ----------
-    time : ndarray of float, shape (n,)
-        In s; each after the one before it. The drive's phase counts from ``time = 0``.
-    theta : ndarray of float, shape (n,)
-        What the sensor read, rad, unwrapped; of a sensor on the rod in the unit of its factors.
-    sigma : float or ndarray of float, shape (n,)
-        Standard error of the readings, rad; above 0; the rounding to counts included.
-    trusted : ndarray of bool, shape (n,), or None
-        Which samples count; all if none.
-    drive : mapping of str to float or None
-        ``p``, ``Omega`` (rad/s) and ``phi`` (rad; None or left out: not known) of a harmonic drive.
-    pivot : Pivot or None
-        A recorded motion of the pivot instead.
-    lab_time_s : float
-        Time in the laboratory at ``time = 0``, for effects that drift.
-    longest_s : float or None
-        The longest window; none: the whole record for a free decay, three swings for a forced run.
-    name : str
-        What to call it.
-    rod_sensor : RodSensor or None
-        What read, if it was no sensor of the angle; effects on the reading do not act on it.
-    count : float or None
-        The step of the sensor, rad, where readings are intervals: the angle with the noise lay
-        within half a count of what was read. None where ``sigma`` says all.
-    """
-
-    time: NDArray[np.float64]
-    theta: NDArray[np.float64]
-    sigma: float | NDArray[np.float64]
-    trusted: NDArray[np.bool_] | None = None
-    drive: Mapping[str, float | None] | None = None
-    pivot: Pivot | None = None
-    lab_time_s: float = 0.0
-    longest_s: float | None = None
+    time: NDArray[np.float64]  # s, increasing; the drive's phase counts from time 0
+    theta: NDArray[np.float64]  # reading, rad unwrapped; of a rod sensor in its own unit
+    sigma: float | NDArray[np.float64]  # standard error with rounding, rad, above 0
+    trusted: NDArray[np.bool_] | None = None  # samples that count; None: all
+    drive: Mapping[str, float | None] | None = None  # p, Omega (rad/s), phi (rad; may be unknown)
+    pivot: Pivot | None = None  # a recorded motion instead of a drive
+    lab_time_s: float = 0.0  # laboratory time at time 0, for drifts
+    longest_s: float | None = None  # longest window, s; None: all, or 3 swings if forced
     name: str = ""
-    rod_sensor: RodSensor | None = None
-    count: float | None = None
+    rod_sensor: RodSensor | None = None  # effects on the reading do not act on it
+    count: float | None = None  # sensor's step, rad, where readings are intervals
 
     @property
     def angle(self) -> NDArray[np.float64]:
-        """The angle, rad; of a sensor on the rod the one that was made of its readings."""
+        """Angle, rad; of a sensor on the rod the one that was computed from its readings."""
         return self.theta if self.rod_sensor is None else self.rod_sensor.angle
 
     @property
     def forced(self) -> bool:
-        """Whether its pivot moves."""
+        """Whether the pivot moves."""
         return self.drive is not None or self.pivot is not None
 
 
 def rig_of(run: FitRun, model: Rig) -> Rig:
-    """Return the pendulum of one run: its drive, its time in the laboratory."""
+    """Return the pendulum of one run, with its drive and its time in the laboratory."""
     drive = {"p": 0.0, "Omega": 0.0, "phi": 0.0}
     if run.drive is not None:
         drive |= {name: value or 0.0 for name, value in run.drive.items()}
@@ -158,7 +103,10 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
     sigma = np.broadcast_to(np.asarray(run.sigma, dtype=np.float64), time.shape)
     if not (np.all(np.isfinite(sigma)) and np.all(sigma > 0)):
         raise InputError("sigma must be finite numbers above 0, it is not everywhere")
-    weight = 1.0 / (sigma if run.count is None else _before_rounding(sigma, run.count))
+    if run.count is not None:  # the noise before readings were rounded
+        least = (SHARPEST * run.count) ** 2
+        sigma = np.sqrt(np.maximum(sigma**2 - run.count**2 / 12, least))
+    weight = 1.0 / sigma
     if run.trusted is not None:
         weight = np.where(np.asarray(run.trusted, dtype=bool), weight, 0.0)
     longest = run.longest_s
@@ -176,17 +124,11 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
     }
 
 
-def _before_rounding(sigma: NDArray[np.float64], count: float) -> NDArray[np.float64]:
-    """Return the noise before readings were rounded, ``sqrt(sigma^2 - count^2 / 12)``."""
-    least = (SHARPEST * count) ** 2
-    return np.asarray(np.sqrt(np.maximum(sigma**2 - count**2 / 12, least)), np.float64)
-
-
 def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
     sensor = run.rod_sensor
     if sensor is None:
         return None
-    # What the pivot does is no part of a rate, but of an acceleration.
+    # The pivot's motion does not enter a rate, but an acceleration.
     if run.forced and (sensor.place or sensor.gravity):
         raise InputError(f"{run.name or 'run'}: an accelerometer on a moving pivot is not fitted")
     return {
@@ -234,6 +176,6 @@ def bare_windows(
 
 
 def tolerance_of(runs: Sequence[FitRun]) -> float:
-    """Return the error allowed to a step of the integrator."""
+    """Return the error that the integrator may make in a step."""
     smallest = min(float(np.min(run.sigma)) for run in runs)
     return float(np.clip(EXACTNESS * smallest, *TOLERANCES))

@@ -1,4 +1,4 @@
-"""What each reading says about parameters: derivatives sample by sample, initial states aside."""
+"""Derivatives of each reading by parameters, those of the initial states projected out."""
 
 from __future__ import annotations
 
@@ -25,67 +25,40 @@ STATE: Final = 2
 """Columns of an initial state."""
 
 FOLLOWED: Final = 1e-6
-"""What the initial state follows to within this part of it, it follows: the rest is rounding."""
+"""Part of a column below which its remainder after the projection is rounding: set to 0."""
 
 BLIND: Final = 1e-11
-"""A direction of the state that changes readings by less than this part of the other is unseen."""
+"""Relative size below which a direction of the initial state does not change the readings."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of the model's readings over their standard errors.
+    """Derivatives over the standard errors, a row a sample that counts, states projected out."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        The parameters, as in a fit.
-    columns : ndarray of float, shape (n, k)
-        One row a sample that counts, by the parameters in SI, what each window's initial state can
-        follow taken off.
-    residual : ndarray of float, shape (n,)
-        Reading less model over the standard error, the same taken off.
-    run, sample, window : ndarray of int, shape (n,)
-        Which run, sample and window each row is of.
-    """
-
-    names: tuple[str, ...]
-    columns: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    run: NDArray[np.int64]
+    names: tuple[str, ...]  # parameters, as in a fit
+    columns: NDArray[np.float64]  # shape (n, k), by the parameters in SI
+    residual: NDArray[np.float64]  # shape (n,), reading less model
+    run: NDArray[np.int64]  # shape (n,): run, sample and window of each row
     sample: NDArray[np.int64]
     window: NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True)
 class WindowSlopes:
-    """Derivatives in one window, over the standard errors; rows of zeros do not count.
-
-    Parameters
-    ----------
-    run, first : int
-        Which run, and its first sample.
-    columns : ndarray of float, shape (n, k)
-        By the parameters, in SI.
-    states : ndarray of float, shape (n, 2)
-        By the initial angle, and by the initial velocity in rad per ``1 / w0``.
-    residual : ndarray of float, shape (n,)
-        Reading less model; of readings that are intervals the residual that stands for it.
-    weight : ndarray of float, shape (n,)
-        One over the standard errors, or what stands for it.
-    """
+    """Derivatives in one window over the standard errors; rows of zeros do not count."""
 
     run: int
-    first: int
-    columns: NDArray[np.float64]
-    states: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    first: int  # first sample
+    columns: NDArray[np.float64]  # shape (n, k), by the parameters in SI
+    states: NDArray[np.float64]  # shape (n, 2), by angle and velocity (rad w0)
+    residual: NDArray[np.float64]  # shape (n,), reading less model, or its substitute for intervals
+    weight: NDArray[np.float64]  # shape (n,), one over the standard error, or its substitute
 
     def columns_as_in(self, other: WindowSlopes) -> NDArray[np.float64]:
         """Return the columns with the weights of the same window of another pass.
 
-        The weight of a reading that is an interval goes by the motion, and that of two passes
-        differs by what keeps a phase in them: little, but more than tells columns apart.
+        The weight of a reading that is an interval depends on the motion; that of two passes
+        differs slightly, but by more than the differences between columns.
         """
         ratio = np.divide(
             other.weight, self.weight, out=np.zeros_like(self.weight), where=self.weight > 0
@@ -95,9 +68,9 @@ class WindowSlopes:
     def freed(
         self, further: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-        """Return parameters' columns, further ones, residual and place of the samples that count.
+        """Return columns, further ones, residual and places of the samples that count.
 
-        What the initial state can follow is taken off.
+        The initial state is projected out.
         """
         counted = self.states.any(axis=1) | self.columns.any(axis=1)
         basis = _basis(self.states[counted])
@@ -115,10 +88,7 @@ class WindowSlopes:
 def window_slopes(
     fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
 ) -> tuple[tuple[str, ...], list[WindowSlopes]]:
-    """Return the parameters' names and the derivatives window by window.
-
-    Parameters and errors are those of :func:`sensitivities`.
-    """
+    """Return the parameters' names and the derivatives window by window."""
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
     units = Units(model.w0, si=True)
@@ -144,29 +114,15 @@ def window_slopes(
 def sensitivities(
     fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
 ) -> Sensitivities:
-    """Return the derivatives by a fit's parameters and by further ones.
+    """Return the derivatives by a fit's parameters and by further ones, ``candidates``.
 
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        Where they are taken.
-    runs : sequence of FitRun
-        Its records.
-    candidates : sequence of str
-        Further parameters, as of :func:`pendmap.identification.fit.score`.
-    model : Rig
-        The fit's model with the candidates' effects in it.
-
-    Raises
-    ------
-    InputError
-        If a name is not known, or the motion is lost.
+    ``model`` is the fit's, with the candidates' effects in it.
     """
     return freed_together(*window_slopes(fit, runs, candidates, model))
 
 
 def freed_together(names: tuple[str, ...], windows: Sequence[WindowSlopes]) -> Sensitivities:
-    """Return the derivatives of all windows, what each initial state can follow taken off."""
+    """Return the derivatives of all windows, initial states projected out."""
     columns, residuals, labels = [], [], []
     for index, window in enumerate(windows):
         own, _, residual, counted = window.freed(np.zeros((len(window.residual), 0)))
@@ -184,7 +140,7 @@ def lengths(columns: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _basis(states: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an orthonormal basis of what the initial state can do."""
+    """Return an orthonormal basis of the changes that the initial state can make."""
     sizes = np.linalg.norm(states, axis=0)
     seen = states[:, sizes > BLIND * max(float(sizes.max(initial=0.0)), 1e-300)]
     if not seen.size:

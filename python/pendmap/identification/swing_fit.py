@@ -19,50 +19,34 @@ if TYPE_CHECKING:
 BLOCK: Final = 12
 """Turns in a row that share their form: ``w0^2``, both dampings and the rest position."""
 _ROUNDS: Final = 12
+"""Most Gauss-Newton steps."""
 _SETTLED: Final = 6
 """Rounds after which no more samples are left out."""
 _LOSS: Final = 4
-"""Turns that show what a swing loses."""
+"""Turns from which the loss of a swing is estimated."""
 _OUTLIER: Final = 5.0
+"""Standard deviations beyond which a sample is left out."""
 _DOUBT: Final = 3.0
-"""Standard errors of a block's noise beyond which its misfit is taken for the form's."""
+"""Standard errors of a block's noise beyond which its misfit is the form's."""
 _NORMAL_MAD: Final = 0.674489750196
 
 
 @dataclasses.dataclass(frozen=True)
 class SwingFit:
-    """Turns, or crossings, that were fitted by swings.
+    """Fitted turns, or crossings, of W windows."""
 
-    Parameters
-    ----------
-    instant, state : array, shape (W,)
-        s; angle at a turn, rad, or velocity at a crossing, rad/s.
-    stderr_instant, stderr_state : array, shape (W,)
-        Standard errors: of the noise, of the shared form, and of what the form misses.
-    form : array, shape (W, 4)
-        ``w0^2``, ``c_over_m``, ``Tr`` and ``zero``, alike within a block.
-    form_covariance : array, shape (W, 4, 4)
-        Of the form.
-    sigma : float
-        Noise of a sample as the fits leave it, or as it was given, rad.
-    factor : array, shape (W,)
-        Noise of each block over ``sigma``: above 1 where the form misses something.
-    points : array of int, shape (W,)
-        Samples that were used.
-    """
-
-    instant: Floats
-    state: Floats
-    stderr_instant: Floats
+    instant: Floats  # s, shape (W,)
+    state: Floats  # angle at a turn, rad, or velocity at a crossing, rad/s
+    stderr_instant: Floats  # of the noise, the shared form, and its misfit
     stderr_state: Floats
-    form: Floats
-    form_covariance: Floats
-    sigma: float
-    factor: Floats
-    points: NDArray[np.intp]
+    form: Floats  # w0^2, c_over_m, Tr, zero: (W, 4), alike in a block
+    form_covariance: Floats  # shape (W, 4, 4)
+    sigma: float  # noise of a sample, rad, as given or fitted
+    factor: Floats  # noise of each block over sigma: above 1 by the form's misfit
+    points: NDArray[np.intp]  # samples that were used
 
     def rows(self, which: Sequence[int]) -> SwingFit:
-        """Return some of the windows, in the order given; one may be asked for again."""
+        """Return some of the windows, in the order given, repeated where asked."""
         parts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         some: dict[str, Any] = {
             name: part[list(which)] if name != "sigma" else part for name, part in parts.items()
@@ -81,19 +65,10 @@ def fit_swings(
 
     Least squares by Gauss and Newton. Within a block of 12 turns each has its instant and its
     state; the form is common, held by wide priors (10 % of ``w0^2``, the damping that turns show
-    give or take all of it), for what a few swings do not tell. Nothing ties one block to the next:
-    a damping of any law shows as forms that change. Samples 5 standard deviations off are left out.
-
-    Parameters
-    ----------
-    windows : Windows
-        W windows, in order of time.
-    start : tuple of array
-        Instants (W,), states (W,) and forms (W, 4) to begin with.
-    sigma : float, optional
-        Noise of a sample, rad; by default that of the quiet half of the blocks.
-    known : SwingFit, optional
-        Forms that are taken as they are, with their errors, row by row.
+    give or take all of it) where a few swings do not determine it. Blocks are independent: a
+    damping of any law shows as forms that change. Samples 5 standard deviations off are left out.
+    ``start`` has instants (W,), states (W,) and forms (W, 4). ``sigma``, rad, is by default that of
+    the quiet half of the blocks. ``known`` forms are not fitted, and count with their errors.
     """
     instant, state, form = (part.copy() for part in start)
     blocks = _blocks(instant.size)
@@ -137,7 +112,7 @@ def _blocks(count: int) -> list[slice]:
 def _prior(
     instant: Floats, state: Floats, form: Floats, blocks: list[slice]
 ) -> tuple[Floats, Floats]:
-    """Where the form is held, and how tightly: standard deviations, one row a window.
+    """Return where the form is held, and its standard deviations, a row a window.
 
     Damping is held about what the turns of a block lose; how that is shared between ``c_over_m``
     and ``Tr`` is left open.
@@ -160,7 +135,7 @@ def _prior(
 def _rows(
     windows: Windows, instant: Floats, state: Floats, form: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Derivatives by instant and state, (W, M, 2), by the form, (W, M, 4), and the residuals."""
+    """Return derivatives by instant and state (W, M, 2), by the form (W, M, 4), and residuals."""
     count = instant.size
     each = np.stack((
         1e-5 * np.maximum(np.abs(state), 1e-3),
@@ -194,10 +169,10 @@ def _step(
     blocks: list[slice],
     prior: tuple[Floats, Floats, Floats, Floats] | None,
 ) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
-    """The Gauss-Newton step, (W, 6), and the parts of the covariance for unit noise.
+    """Return the Gauss-Newton step, (W, 6), and the parts of the covariance for unit noise.
 
-    The parts: ``(L'L)^-1`` of the local unknowns, how they follow the form, and its inverse normal
-    matrix, each a row a window.
+    The parts, a row a window: ``(L'L)^-1`` of the local unknowns, their derivatives by the form,
+    and its inverse normal matrix.
     """
     local, shared, residual = rows
     across = np.swapaxes(local, 1, 2)
@@ -217,7 +192,7 @@ def _step(
         normal = np.einsum("wmi,wmj->ij", free[block], free[block]) + np.diag(hold)
         pull = np.einsum("wmi,wm->i", free[block], left[block])
         pull += hold * (centre[block][0] - form[block][0])
-        # The parameters differ by orders of magnitude: scaled, the matrix is a sound one.
+        # Parameters differ by orders of magnitude: the matrix is scaled to be invertible.
         unit = 1 / np.sqrt(np.diag(normal))
         solved = np.linalg.pinv(normal * np.outer(unit, unit), hermitian=True) * np.outer(
             unit, unit
@@ -229,7 +204,7 @@ def _step(
 
 
 def _scales(residual: Floats, used: NDArray[np.bool_], blocks: list[slice]) -> Floats:
-    """A robust noise of each block's samples, rad, shape (W,)."""
+    """Return a robust noise of each block's samples, rad, shape (W,)."""
     scale = np.ones(residual.shape[0])
     for block in blocks:
         some = np.abs(residual[block][used[block]])
@@ -277,13 +252,10 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     shared = form_inverse * scale[:, None, None] if known is None else known.form_covariance
     covariance = inverse * scale[:, None, None] + follows @ shared @ np.swapaxes(follows, 1, 2)
     error = np.sqrt(np.maximum(np.einsum("wii->wi", covariance), 0.0))
-    # What too few samples leave open is not known at all.
+    # Too few samples determine nothing.
     open_ = points < 2  # noqa: PLR2004 (instant and state)
     error[open_] = np.inf
     return SwingFit(instant, state, error[:, 0], error[:, 1], form, shared, sigma, factor, points)
-
-
-# Swings of a pendulum through given states: the form that few samples a period are fitted by.
 
 
 FORM: Final = 4
@@ -295,28 +267,14 @@ _STEPS: Final = 20
 
 @dataclasses.dataclass(frozen=True)
 class Windows:
-    """Samples around instants, in rows of equal length.
+    """Samples around W instants, in rows of equal length M."""
 
-    Parameters
-    ----------
-    time, theta : array, shape (W, M)
-        s and rad.
-    used : array of bool, shape (W, M)
-        Which of them there are: rows differ in length.
-    crossing : array of bool, shape (W,)
-        Whether the instant is that of a crossing of zero, or else that of a turn.
-    held : array of bool, shape (W,)
-        Whether the pendulum was held before the turn.
-    side : array, shape (W,)
-        Sign of the turn, or of the velocity at the crossing.
-    """
-
-    time: Floats
-    theta: Floats
-    used: NDArray[np.bool_]
-    crossing: NDArray[np.bool_]
-    held: NDArray[np.bool_]
-    side: Floats
+    time: Floats  # s, shape (W, M)
+    theta: Floats  # rad
+    used: NDArray[np.bool_]  # which samples there are: rows differ in length
+    crossing: NDArray[np.bool_]  # crossing of zero or turn, shape (W,)
+    held: NDArray[np.bool_]  # whether held before the turn
+    side: Floats  # sign of the turn, or of the velocity at the crossing
 
     @classmethod
     def around(
@@ -328,7 +286,7 @@ class Windows:
         crossing: bool = False,
         held: bool = False,
     ) -> Windows:
-        """Take the samples within spans of time; ``held`` is said of the first."""
+        """Take the samples within spans of time; ``held`` applies to the first."""
         t, x = record
         edges = [np.searchsorted(t, (low, high + 1e-9 * (high - low))) for low, high in spans]
         first = np.array([e[0] for e in edges], np.intp)
@@ -343,27 +301,11 @@ class Windows:
 
 
 def curves(windows: Windows, instant: Floats, state: Floats, form: Floats) -> tuple[Floats, Floats]:
-    """Return angle and velocity at the samples of windows.
+    """Return angle (rad) and velocity (rad/s) at the samples of windows, shape (W, M).
 
     Each window's curve solves ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0`` from
     its instant on to both sides; ``sgn(th')`` is that of the half cycle on each side, so windows
-    must end before the next turn.
-
-    Parameters
-    ----------
-    windows : Windows
-        W of them.
-    instant : array, shape (W,)
-        s.
-    state : array, shape (W,)
-        The angle at a turn, rad, or the velocity at a crossing of zero, rad/s.
-    form : array, shape (W, 4)
-        ``w0^2``, ``c_over_m``, ``Tr`` and ``zero``.
-
-    Returns
-    -------
-    angle, velocity : ndarray, shape (W, M)
-        rad and rad/s.
+    must end before the next turn. ``state`` is the angle at a turn or the velocity at a crossing.
     """
     lag = np.where(windows.used, windows.time - instant[:, None], 0.0)
     angle, speed = np.empty(lag.shape), np.empty(lag.shape)
@@ -387,7 +329,7 @@ def _acceleration(x: Floats, v: Floats, sign: Floats, form: Floats) -> Floats:
 def _integrated(
     begin: tuple[Floats, Floats], step: Floats, sign: Floats, form: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Angle, velocity and acceleration at the steps, each (W, steps + 1), by Runge and Kutta."""
+    """Return angle, velocity, acceleration, (W, steps + 1), by the Runge-Kutta method."""
     x, v = begin
     rows = [(x, v, _acceleration(x, v, sign, form))]
     for _ in range(_STEPS):
@@ -408,7 +350,7 @@ def _integrated(
 def _between(
     path: tuple[Floats, Floats, Floats], at: Floats, step: Floats
 ) -> tuple[Floats, Floats]:
-    """Angle and velocity at places between the steps, by cubics through values and slopes."""
+    """Return angle and velocity between the steps, by cubics through values and slopes."""
     angle, speed, bend = path
     low = np.minimum(at.astype(np.intp), _STEPS - 1)
     s = at - low

@@ -1,4 +1,4 @@
-"""The paper's table 1 and figure 7: what a simulation of each model misses of the record."""
+"""The paper's table 1 and figure 7: errors of each model's simulation against a record's peaks."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 PERIODS: Final = (0.26, 1.54)
-"""Periods of the paper's table, s. No rig near 6 rad/s has the first: its shortest one stands in
-for it."""
+"""Periods of the paper's table, s; the shortest one of a slower rig stands for the first."""
 PEAKS: Final = (1.2, 2.53)
 """Peaks of the paper's table, rad."""
 
@@ -33,15 +32,15 @@ ROUGH: Final = (
     "no errors of periods and peaks: the angle is made of an acceleration, too roughly to judge a "
     "model; the residual of the acceleration does"
 )
-"""Why a record of an acceleration alone has none."""
+"""Why a record of an acceleration alone has no table."""
 
 _SAME: Final = 1e-9
-"""Events closer than this are one, s."""
+"""Interval below which events are one, s."""
 
 
 @dataclasses.dataclass(frozen=True)
 class State:
-    """Where a simulation begins: time (s), angle (rad, as recorded) and velocity (rad/s)."""
+    """Start of a simulation: time (s), angle (rad, as recorded) and velocity (rad/s)."""
 
     time: float
     theta: float
@@ -55,10 +54,9 @@ class PeakErrors:
     Parameters
     ----------
     method : str
-        Which model.
+        Name of the model.
     period_time, period, period_error : array, shape (Q,)
-        When each full cycle begins (s), its measured length (s), and the error. NaN where the
-        simulation has come to rest.
+        Begin of each full cycle (s), measured length (s), error; NaN where the simulation rests.
     peak_index, peak, peak_error : array, shape (P,)
         Number of each peak, its measured size (rad), and the error.
     """
@@ -91,7 +89,7 @@ class Row:
     what : str
         ``period`` or ``peak``.
     asked, measured : float
-        What the paper's table has, and what is nearest to it in this record, s or rad.
+        Value in the paper's table, and the nearest one in this record, s or rad.
     errors : mapping of str to float
         By method: the error's absolute value, percent; NaN where the simulation rests by then.
     """
@@ -125,8 +123,7 @@ def _rms(errors: Floats) -> float:
 def first_state(peaks: Peaks) -> State:
     """Return the state from which models are simulated: the first peak, at rest.
 
-    It is the release where the record shows it. In a record that begins in motion no sample gives a
-    velocity as surely as the first turn does.
+    It is the release where the record shows it; else no sample gives a velocity as precisely.
     """
     turned = peaks.turned
     return State(float(turned.time[0]), float(turned.amplitude[0]), 0.0)
@@ -138,7 +135,7 @@ def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Float
     kinds = run["event_kind"].values
     turned = np.isin(kinds, ("turn", "stick", "stuck for ever"))
     times, angles = run["event_time"].values[turned], run["event_theta"].values[turned]
-    # A stop that lasts is told twice, when it begins and when it proves to be for ever.
+    # A lasting stop is two events: its begin, and its confirmation.
     new = np.concatenate(([True], np.diff(times) > _SAME)) if times.size else np.empty(0, bool)
     times, angles = times[new], angles[new]
     if start.velocity == 0 and (times.size == 0 or times[0] > _SAME):
@@ -149,19 +146,10 @@ def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Float
 def peak_errors(
     found: Identification, peaks: Peaks, start: State, *, offset: float | None = None
 ) -> PeakErrors:
-    """Compare a model's simulation with peaks, number by number.
+    """Return the errors of a model's simulation from ``start``, the first of ``peaks``.
 
-    Parameters
-    ----------
-    found : Identification
-        With a ``w0``.
-    peaks : Peaks
-        What it is compared with.
-    start : State
-        Where the simulation begins, at the first of ``peaks``, as recorded: the zero error that
-        was found is taken off.
-    offset : float, optional
-        Zero error of ``peaks``, rad; by default the one that was found. 0 for true peaks.
+    ``start`` is as recorded: the zero error that was found is subtracted. ``offset`` is that of
+    ``peaks`` where it is another, rad.
     """
     zero = found["offset"] if "offset" in found.estimates else 0.0
     shown = zero if offset is None else offset
@@ -173,18 +161,7 @@ def peak_errors(
 
 
 def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakErrors:
-    """Compare simulated peaks with measured ones, number by number.
-
-    Parameters
-    ----------
-    method : str
-        What the simulation is called.
-    peaks : Peaks
-        The measured ones.
-    times, angles : array, shape (n,)
-        The simulated ones from the first measured peak on, s and rad, as the sensor would read
-        them.
-    """
+    """Compare simulated peaks (s, rad, as the sensor reads them) with measured ones by number."""
     turned = peaks.turned
     number = turned.index - turned.index[0]
     made_time, made = (np.full(int(number[-1]) + 1, math.nan) for _ in range(2))
@@ -248,7 +225,7 @@ def table_of(
     periods: Sequence[float] = PERIODS,
     peaks: Sequence[float] = PEAKS,
 ) -> Table1:
-    """Do the same with peaks that are known; see :func:`table1`."""
+    """Return table 1 of peaks that are known; see :func:`table1`."""
     if len(found.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return Table1((), {})
     start = first_state(found)
@@ -262,7 +239,7 @@ def table_of(
             lost[name] = str(error)
     rows = [_row("period", asked, errors) for asked in periods]
     rows += [_row("peak", asked, errors) for asked in peaks]
-    # Several asked ones may have the same nearest measured one.
+    # One measured value may be nearest to several asked ones.
     told: dict[tuple[str, float], Row] = {}
     for row in rows:
         if row is not None:
@@ -271,14 +248,14 @@ def table_of(
 
 
 def table_of_run(run: Run, found: Peaks, identifications: Mapping[str, Identification]) -> Table1:
-    """Do the same for a run; empty where its angle is none that was measured."""
+    """Return table 1 of a run; empty where its angle was not measured."""
     if run.accelerometer is not None:
         return Table1((), {}, ROUGH)
     return table_of(found, identifications)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:
-    """The row of what is nearest to a value, or none where no model has anything."""
+    """Return the row of the value nearest to ``asked``, None where no model has any."""
     column, measured = {}, math.nan
     for name, each in errors.items():
         there, wrong = (
@@ -286,7 +263,7 @@ def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | Non
         )
         if there.size == 0:
             return None
-        # Not the last ones: an asked period below all would pick the noisiest.
+        # An asked period below all measured ones would select the last, noisiest ones.
         near = int(
             np.argmin(np.abs(there - max(asked, float(np.median(there[there.size // 2 :])))))
         )

@@ -1,4 +1,4 @@
-"""Where a record turns, roughly; where it was held, and where it rests."""
+"""Turns of a record, roughly; its two ends (release and stop); starting values from half swings."""
 
 from __future__ import annotations
 
@@ -23,54 +23,29 @@ if TYPE_CHECKING:
 _SMOOTHING: Final = 0.1
 """Half width of the running mean over the period."""
 _SURE: Final = 6.0
-"""A turn is believed once the angle has come back by this many standard errors."""
+"""Standard errors by which the angle must come back for a turn to count."""
 _FEWEST: Final = 8
+"""Samples that a record must have."""
 _GAP: Final = 10.0
-"""A pause of this many samples is a gap, before the period is known."""
+"""Pause in samples that is a gap, before the period is known."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """The rough course of a record.
+    """The rough course of a record of N samples."""
 
-    Parameters
-    ----------
-    turns : ndarray of int
-        Samples next to which the smoothed angle turns, in order; tops and bottoms alternate.
-    period : float
-        Of the late swings, s.
-    smooth : ndarray, shape (N,)
-        Running mean of the angle, rad.
-    noise : float
-        Standard error of ``smooth``, rad.
-    rest : int or None
-        Sample from which the record rests, if it does.
-    left : int
-        First sample that is clearly off the level at which the record begins.
-    """
-
-    turns: NDArray[np.intp]
-    period: float
-    smooth: Floats
-    noise: float
-    rest: int | None
-    left: int
+    turns: NDArray[np.intp]  # samples at turns of the smoothed angle; tops and bottoms alternate
+    period: float  # of the late swings, s
+    smooth: Floats  # running mean of the angle, rad, shape (N,)
+    noise: float  # standard error of smooth, rad
+    rest: int | None  # sample from which the record rests
+    left: int  # first sample that is off the initial level
 
 
 def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     """Find the turns of a record by hysteresis, first of the raw, then of the smoothed angle.
 
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s, increasing, and rad.
-    sigma : float
-        Standard deviation of the noise, rad.
-
-    Returns
-    -------
-    Outline or None
-        ``None`` if it does not swing: fewer than two turns.
+    None is returned of fewer than two turns.
     """
     if time.size < _FEWEST:
         return None
@@ -85,10 +60,10 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     halves = np.diff(time[rough])
     period = 2 * float(np.median(halves[halves.size // 2 :]))
     smooth, count = _running_mean(time, calm, _SMOOTHING * period)
-    # The median of five has a little more noise than the samples' mean would leave.
+    # The median of five has slightly more noise than the mean.
     noise = 1.2 * max(sigma, 1e-9 * span) / math.sqrt(count)
     gaps = np.flatnonzero(steps > _SMOOTHING * period) + 1
-    # Towards the end the mean is over ever fewer samples: what it does there is noise.
+    # Near the end the mean is over ever fewer samples: its turns there are noise.
     ahead = int(np.searchsorted(time, time[-1] - _SMOOTHING * period))
     turns = zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
     turns = _far_apart(turns, time, period)
@@ -106,13 +81,13 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
 
 
 def median_of_five(x: Floats) -> Floats:
-    """The median of five neighbours: single outliers vanish, a monotone run stays as it is."""
+    """Return the median of five neighbours: outliers vanish, monotone runs stay."""
     padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
 def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
-    """Mean over all samples within ``half`` seconds, and how many these are, typically."""
+    """Return the mean over all samples within ``half`` s, and their median number."""
     first = np.searchsorted(time, time - half)
     last = np.searchsorted(time, time + half, side="right")
     # At the ends the window shrinks on both sides, or the mean would lag behind.
@@ -125,7 +100,7 @@ def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
 
 
 def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
-    """Samples of the extremes from which the signal comes back by more than a threshold."""
+    """Return samples of the extremes from which the signal comes back by more than a threshold."""
     found: list[int] = []
     values = x.tolist()
     low = high = 0
@@ -136,7 +111,7 @@ def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
         if value < values[low]:
             low = k
         if rising is not False and value < values[high] - threshold:
-            # The first extreme is where the record begins: whether it is a turn is not known here.
+            # The first extreme is the begin of the record, which need not be a turn.
             if rising is not None:
                 found.append(high)
             rising, low = False, k
@@ -148,14 +123,14 @@ def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
 
 
 def zigzags(x: Floats, threshold: float, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The same for each part between two gaps: what is next to a gap need not be a turn."""
+    """Return the extremes of each part between gaps: a sample next to a gap need not be a turn."""
     begins = np.concatenate(([0], gaps))
     parts = [_zigzag(part, threshold) for part in np.split(x, gaps)]
     return np.concatenate([part + at for part, at in zip(parts, begins, strict=True)])
 
 
 def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[np.intp]:
-    """The turns without pairs that follow one another sooner than any pendulum swings."""
+    """Return the turns without pairs that follow one another sooner than a pendulum swings."""
     kept: list[int] = []
     for k in turns.tolist():
         if kept and time[k] - time[kept[-1]] < 0.3 * period:
@@ -165,38 +140,47 @@ def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[
     return np.array(kept, np.intp)
 
 
-# The two ends of a decay: the release, and the last half cycle that stops.
-
-
+_RESOLVED: Final = 8.0
+"""Standard errors by which a peak must differ from the one before."""
 _SURE_END: Final = 4.0
+"""Standard errors by which a velocity at the release, or a way to the stop, is seen."""
 _LATENESS: Final = 5 / 32
-"""What a quartic makes of ``s abs(s)``: half the slope that it has at 0, over the window."""
+"""Slope at 0 of the quartic fitted to ``s abs(s)``, over 2 and over the window."""
 _DOUBT: Final = 0.2
+"""Part of the lateness by friction that counts as error."""
 _STILL: Final = 1e-3
-"""A velocity below this, over amplitude and w0, is none: the even form itself is off by as much."""
+"""Velocity over amplitude and w0 that counts as 0: the error of the even form itself."""
 
 
 @dataclasses.dataclass(frozen=True)
 class End:
-    """The end of a half cycle: when, where (rad), how surely, of which kind; the window, s."""
+    """The end of a half cycle."""
 
-    time: float
-    angle: float
+    time: float  # s
+    angle: float  # rad
     stderr_time: float
     stderr_angle: float
-    kind: str
-    window: float = 0.0
+    kind: str  # release, turn, clipped or stop
+    window: float = 0.0  # half width, s
+
+    def resolved_from(self, before: End) -> bool:
+        """Whether its angle differs from that of the end before it by more than their errors.
+
+        A clipped end, whose error is infinite, is never compared.
+        """
+        error = math.hypot(before.stderr_angle, self.stderr_angle)
+        return not math.isfinite(error) or abs(self.angle - before.angle) > _RESOLVED * error
 
     def late(self, theta_r: float) -> End:
-        """Return the turn as it is without the lateness that friction gives a quartic's turn.
+        """Return the turn without the lateness that friction gives a quartic's turn.
 
-        ``5/32 h theta_r / sin A`` for a window of half width ``h``; what is not known of it (the
-        law of friction, the next order) is in the error.
+        It is ``5/32 h theta_r / sin A`` for a window of half width ``h``. Its uncertainty (by the
+        law of friction, and the next order) counts as error.
         """
         size = abs(self.angle)
         bend = math.sin(min(max(size, 2 * theta_r + 1e-9), 3.0))
         shift = _LATENESS * self.window * theta_r / bend
-        # The next order is larger by theta_r / A: near the end it is all that is known.
+        # The next order is larger by theta_r / A: near the end it dominates.
         unsure = shift * min(_DOUBT + theta_r / max(size, 1e-9), 1.0)
         error = math.hypot(self.stderr_time, unsure)
         return dataclasses.replace(self, time=self.time - shift, stderr_time=error)
@@ -208,18 +192,8 @@ def release(
     """Return the release from rest at which the record begins, if it does.
 
     Either the first sample is the release (then the angle is even about it), or the pendulum was
-    held for a while (then a level part joins a falling one without a step of the velocity).
-
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s and rad.
-    sigma : float
-        Noise, rad.
-    scale : (float, float)
-        Rough natural frequency, rad/s, and half width of a window, s.
-    course : Outline
-        The rough course of the record.
+    held (then a level part joins a falling one without a step of the velocity). ``scale`` holds the
+    rough natural frequency, rad/s, and the half width of a window, s.
     """
     if course.left == 0:
         return None
@@ -235,7 +209,7 @@ def release(
     moving = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 4), sigma=sigma)
     if even is None or moving is None:
         return None
-    # A velocity, or a bend away from the middle, is a record that begins in motion.
+    # A record with a velocity, or a bend away from the middle, begins in motion.
     (angle, gain), (bend, _) = even.at(float(time[0])), even.at(float(time[0]), 2)
     speed, speed_gain = moving.at(float(time[0]), 1)
     slack = _STILL * abs(angle) * w0
@@ -247,19 +221,7 @@ def release(
 def stop(
     time: Floats, theta: Floats, sigma: float, course: Outline, before: list[End]
 ) -> End | None:
-    """Return where the pendulum came to rest in the half cycle after the last turn, if it is seen.
-
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s and rad.
-    sigma : float
-        Noise, rad.
-    course : Outline
-        The rough course of the record.
-    before : list of End
-        The peaks before it.
-    """
+    """Return where the pendulum stopped in the half cycle after the last turn, if it is seen."""
     if course.rest is None or not before:
         return None
     last, rests = before[-1], float(time[course.rest])
@@ -293,7 +255,7 @@ def _joined(
         residual = x - rows @ coefficients
         return float(residual @ residual), coefficients, inverse
 
-    # The sum of squares is flat where the level takes all and has ripples: first a scan.
+    # The sum of squares has flat parts and ripples: a scan precedes the search.
     scan = np.linspace(max(leaves - half, begin), leaves + half / 2, 61)
     nearest = int(np.argmin([solved(float(at))[0] for at in scan]))
     low, high = float(scan[max(nearest - 1, 0)]), float(scan[min(nearest + 1, 60)])
@@ -308,38 +270,24 @@ def _joined(
     return End(at, float(coefficients[0]), min(error, half), level_error, kind)
 
 
-# Where a search may start: natural frequency and damping to some percent, from half swings.
-
-
 FEWEST_SWINGS: Final = 2
 """Half swings that a start needs."""
 QUIET: Final = 10.0
-"""Readings at rest lie within so many standard errors."""
+"""Standard errors within which readings at rest lie."""
 
 
 def rough_start(
     time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
 ) -> dict[str, float] | None:
-    """Return starting values of ``w0``, ``c_over_m`` and ``Tr`` of a free decay.
+    """Return starting values of ``w0``, ``c_over_m`` and ``Tr``, None of fewer than two swings.
 
     A half swing of amplitude ``A`` takes ``2 K(m) / w0`` with ``m = sin(A/2)**2``; from one to the
     next the energy ``w0**2 (1 - cos A)`` falls by ``c_over_m w0 8 (E(m) - (1 - m) K(m))`` (the
-    integral of the velocity over the angle) and ``2 A Tr``.
-
-    Parameters
-    ----------
-    time, theta : ndarray of float, shape (n,)
-        In s and rad.
-    sigma : float
-        Standard error of the readings, rad: smaller swings are left out.
-
-    Returns
-    -------
-    dict or None
-        None where there are fewer than three swings.
+    integral of the velocity over the angle) and ``2 A Tr``. Swings below four ``sigma`` are left
+    out.
     """
     tail = theta[-max(len(theta) // 10, 1) :]
-    # Of a motion that goes on at the end the mean says little.
+    # The mean of a motion that continues at the end is not its centre.
     centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0
     half = swings(time, theta - centre, least=4.0 * sigma)
     peaks = np.minimum(np.abs(half.peak), math.pi - 1e-3)
@@ -355,20 +303,14 @@ def rough_start(
 
 
 def rough_damping(peaks: NDArray[np.float64]) -> tuple[float, float]:
-    """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from peaks in a row.
-
-    Parameters
-    ----------
-    peaks : ndarray of float, shape (n,)
-        Three or more, rad, in (0, pi).
-    """
+    """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from 3 peaks or more."""
     from scipy.optimize import nnls  # noqa: PLC0415 (heavy)
 
     m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
     action = 8 * (ellipe(m) - (1 - m) * ellipk(m))
     columns = np.stack([0.5 * (action[1:] + action[:-1]), peaks[1:] + peaks[:-1]], axis=1)
     lost = np.diff(np.cos(peaks))
-    # Energies of small swings are known better: their error is about A sigma.
+    # The error of an energy is about A sigma: small swings count more.
     weight = 1 / (peaks[1:] + peaks[:-1])
     (viscous, friction), _ = nnls(columns * weight[:, None], lost * weight)
     return float(viscous), float(friction)

@@ -1,4 +1,4 @@
-"""Standard errors and intervals of what is computed from numbers with errors."""
+"""Standard errors and intervals of quantities computed from numbers with errors."""
 
 from __future__ import annotations
 
@@ -18,21 +18,14 @@ if TYPE_CHECKING:
 
 
 Z95: Final = 1.959963984540054
-"""The 97.5 % point of the standard normal distribution."""
+"""97.5 % point of the standard normal distribution."""
 
 
 def jacobian(function: Callable[[Floats], Floats], values: Floats, steps: Floats) -> Floats:
-    """Return the derivatives of a function by central differences, shape (M, N).
+    """Return derivatives by central differences, shape (M, N), with half differences ``steps``.
 
-    Parameters
-    ----------
-    function : callable
-        Takes an array of shape (N,), returns one of shape (M,).
-    values : array, shape (N,)
-        Where.
-    steps : array, shape (N,)
-        Half the differences: a tenth of a standard error is small for the function and large for
-        rounding. A zero leaves that column 0.
+    A tenth of a standard error is small for the function and large for rounding. A step of 0 leaves
+    its column 0.
     """
     base = function(values)
     result = np.zeros((base.size, values.size))
@@ -43,6 +36,12 @@ def jacobian(function: Callable[[Floats], Floats], values: Floats, steps: Floats
     return result
 
 
+def propagated(function: Callable[[Floats], Floats], values: Floats, stderr: Floats) -> Floats:
+    """Return the covariance of a function of independent values, by the delta method."""
+    slopes = jacobian(function, values, stderr / 10)
+    return np.asarray(slopes * stderr**2 @ slopes.T)
+
+
 def bootstrap(
     function: Callable[[Floats], Floats],
     values: Floats,
@@ -51,10 +50,9 @@ def bootstrap(
     draws: int = 1000,
     seed: int = 0,
 ) -> Floats:
-    """Return what a function makes of normally scattered values, shape (draws, M).
+    """Return a function of normally scattered values, shape (draws, M); NaN where it fails.
 
-    Rows in which it fails (a logarithm of a negative difference) are NaN. Honest where the function
-    bends within the errors, which the delta method does not see.
+    Valid where the function is nonlinear within the errors, which the delta method ignores.
     """
     rng = np.random.default_rng(seed)
     scattered = values + stderr * rng.standard_normal((draws, values.size))
@@ -69,7 +67,7 @@ def estimates(
     *,
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> dict[str, Estimate]:
-    """Return numbers with standard errors and, if no others are given, normal 95 % intervals."""
+    """Return numbers with standard errors, and normal 95 % intervals where none are given."""
     given = intervals or {}
     result = {}
     for j, name in enumerate(names):
@@ -80,17 +78,9 @@ def estimates(
 
 
 def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Floats, float]:
-    """Fit ``y = c_0 + c_1 x`` with weights.
+    """Fit ``y = c_0 + c_1 x`` with weights: coefficients, covariance, misfit.
 
-    Returns
-    -------
-    coefficients : ndarray, shape (2,)
-        ``c_0, c_1``.
-    covariance : ndarray, shape (2, 2)
-        Widened by chi^2 per degree of freedom where that is above 1: where a straight line is not
-        the law, its misfit is larger than the noise.
-    misfit : float
-        chi^2 per degree of freedom.
+    The misfit is chi^2 per degree of freedom; the covariance is widened by it where it is above 1.
     """
     rows = np.column_stack((np.ones_like(x), x)) / stderr[:, None]
     inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
@@ -100,27 +90,14 @@ def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Fl
     return coefficients, inverse * max(misfit, 1.0), misfit
 
 
-# Least squares on differences of successive peaks: neighbours share a peak and its error.
-
-
 def chain_covariance(
     pairs: NDArray[np.intp], left: Floats, right: Floats, variance: Floats
 ) -> Floats:
-    """Return the covariance of ``y_j = left_j e_k + right_j e_{k+1}``, ``k = pairs_j``.
+    """Return the covariance of ``left_j e_k + right_j e_{k+1}``, ``k = pairs_j``, shape (2, Q).
 
-    Parameters
-    ----------
-    pairs : array of int, shape (Q,)
-        Number of the first of the two peaks; increasing.
-    left, right : array, shape (Q,)
-        Derivatives by the first and the second peak.
-    variance : array, shape (P,)
-        Of the peaks, which are independent.
-
-    Returns
-    -------
-    ndarray, shape (2, Q)
-        Diagonal, and what is next to it (last entry unused): the form of scipy's banded solvers.
+    Differences of successive peaks share a peak and its error; ``variance``, shape (P,), is that of
+    the peaks, which are independent. The rows are the diagonal and the subdiagonal (last entry
+    unused), the form of scipy's banded solvers.
     """
     result = np.zeros((2, pairs.size))
     result[0] = left**2 * variance[pairs] + right**2 * variance[pairs + 1]
@@ -132,25 +109,10 @@ def chain_covariance(
 def chain_least_squares(
     rows: Floats, y: Floats, covariance: Floats
 ) -> tuple[Floats, Floats, float]:
-    """Fit ``y = rows @ values`` by generalised least squares.
+    """Fit ``y = rows @ values`` by generalised least squares: values, covariance, misfit.
 
-    Parameters
-    ----------
-    rows : array, shape (Q, M)
-        Derivatives by the unknowns.
-    y : array, shape (Q,)
-        What is measured.
-    covariance : array, shape (2, Q)
-        As of :func:`chain_covariance`.
-
-    Returns
-    -------
-    values : ndarray, shape (M,)
-        The unknowns.
-    covariance : ndarray, shape (M, M)
-        Theirs, widened by chi^2 per degree of freedom where that is above 1.
-    misfit : float
-        chi^2 per degree of freedom.
+    ``covariance`` is that of :func:`chain_covariance`. The misfit is chi^2 per degree of freedom;
+    the covariance of the values, shape (M, M), is widened by it where it is above 1.
     """
     factor = (cholesky_banded(covariance, lower=True), True)
     weighted = cho_solve_banded(factor, rows)

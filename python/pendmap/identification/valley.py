@@ -1,9 +1,8 @@
-"""Exponents brought near their best before they are fitted with all else.
+"""Search for an exponent, with all other parameters fitted at each value.
 
-A size and its exponent make a valley of the sum of squares that is narrow and bends: a fit of both
-creeps along it. Its floor is followed here: at each exponent all else is fitted, and from how the
-readings change with it, what the others cannot follow taken off, comes the next one (variable
-projection: Golub & Pereyra 1973, SIAM Journal on Numerical Analysis 10, 413).
+An effect's size and its exponent make a narrow, bent valley of the sum of squares. This follows its
+floor by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413): the next exponent
+follows from how the readings change with it, less what the other parameters can compensate.
 """
 
 from __future__ import annotations
@@ -25,25 +24,25 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
 
 STAGES: Final = 8
-"""Exponents that are tried at most."""
+"""Most exponents tried."""
 
 REACH: Final = 0.2
-"""The longest step of an exponent: less than from one of the scan to the next."""
+"""Longest step of an exponent: less than the spacing of the scan."""
 
 FARTHEST: Final = 3.0
-"""The most that the logarithm of a size changes at once."""
+"""Largest change of the logarithm of a size in one step."""
 
 SHORTER: Final = 0.25
-"""Of the reach, after an exponent at which the fit was worse."""
+"""Factor on the reach after a step that made the fit worse."""
 
 SHORTEST: Final = 0.01
-"""The least reach."""
+"""Least reach: the search ends below it."""
 
 PROMISED: Final = 0.01
-"""Of the sum of squares: what promises less is near enough."""
+"""Expected gain in the sum of squares below which the search ends."""
 
 HOPE: Final = 3.0
-"""So many times as much as a step promises is the most that is hoped for."""
+"""Upper bound on the gain of a step, as a multiple of the expected gain."""
 
 
 def nearer(  # noqa: PLR0913 (what to fit, and how)
@@ -55,10 +54,10 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
     *,
     target: float = math.inf,
 ) -> TrajectoryFit:
-    """Return a fit in which an exponent, which is not fitted, is near its best.
+    """Return a fit in which an exponent, which is not fitted, is near its best value.
 
-    ``again`` fits a model from a start on, with the windows of a fit. What promises far less than
-    the sum of squares ``target`` is given up.
+    ``again`` fits a model from given starting values, with the windows of a fit. The search ends
+    where the sum of squares ``target`` is out of reach.
     """
     reach = REACH
     for _ in range(STAGES):
@@ -69,7 +68,7 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
             break
         step = math.copysign(min(abs(step), reach), step)
         start = {name: e.value - step * follow[name] for name, e in fit.estimates.items()}
-        # A size goes with its exponent as a power does; what is nearly 0 has no derivative by it.
+        # A size depends exponentially on its exponent; a size near 0 has no derivative by it.
         power = max(-FARTHEST, min(-step * follow[size] / fit[size], FARTHEST))
         start[size] = fit[size] * math.exp(power)
         try:
@@ -87,7 +86,7 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
 def _step(
     fit: TrajectoryFit, runs: Sequence[FitRun], exponent: str
 ) -> tuple[float, float, dict[str, float]]:
-    """Return an exponent's step, what it gains, and by how much all else makes up for it."""
+    """Return an exponent's step, its expected gain, and the others' derivatives by the exponent."""
     seen = sensitivities(fit, runs, [exponent], fit.model)
     place = seen.names.index(exponent)
     own, others = seen.columns[:, place], np.delete(seen.columns, place, axis=1)
@@ -103,7 +102,7 @@ def _step(
 
 
 def _with(model: Rig, exponent: str, step: float) -> Rig:
-    """Return a model whose exponent is a step on, within its range."""
+    """Return a model whose exponent is changed by a step, within its range."""
     name, _, parameter = exponent.rpartition(".")
     effects: list[Any] = []
     for effect in model.effects:

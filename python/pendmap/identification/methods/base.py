@@ -1,23 +1,21 @@
-"""What every method of identification gives back."""
+"""Result of every method of identification, and what methods of peaks share."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from pendmap.formatting import Estimate, counted, estimate_text
+from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.uncertainty import Z95
 from pendmap.model import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import numpy as np
-    from numpy.typing import NDArray
-
-
-_Z95: Final = 1.959963984540054
-"""The 97.5 % point of the standard normal distribution."""
+    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -27,15 +25,15 @@ class Identification:
     Parameters
     ----------
     method : str
-        Its name, as in the JSON of ``pendmap identify``.
+        Its name in the registry, as in the JSON of ``pendmap identify``.
     estimates : mapping of str to Estimate
         By the names of :class:`pendmap.Rig` (``w0`` in rad/s, ``c_over_m`` in 1/s, ``Tr`` in
         rad/s^2, ...) and ``offset`` (rad), whatever the method knows. ``zeta`` and ``theta_r``
         follow from them. Empty where the method is not applicable.
     used : str
-        Which data it used, in words.
+        Data that it used, in words.
     warnings : tuple of str
-        What speaks against trusting it.
+        Reasons to doubt it.
     applicable : bool
         Whether the method can be applied to the record; if not, ``warnings`` say why.
     covariance : tuple of (tuple of str, ndarray) or None
@@ -43,12 +41,12 @@ class Identification:
     misfit : float or None
         chi^2 per degree of freedom of the method's own model, where it has one.
     model : Rig or None
-        The pendulum, where the method finds more of it than ``estimates`` tell: effects.
+        The pendulum, where the method finds effects beside ``estimates``.
     converged : bool
-        Whether its search came to an end; a model is made of no other.
+        Whether its search converged; no model is made of others.
     """
 
-    method: str
+    method: str = ""
     estimates: Mapping[str, Estimate] = dataclasses.field(default_factory=dict)
     used: str = ""
     warnings: tuple[str, ...] = ()
@@ -63,7 +61,7 @@ class Identification:
 
     @property
     def short(self) -> str:
-        """The method and what it found, in a line; numbers in SI, their errors in brackets."""
+        """Method and estimates on a line; numbers in SI, standard errors in brackets."""
         if not self.applicable:
             return f"{self.method}: {'; '.join(self.warnings)}"
         found = ", ".join(
@@ -85,8 +83,7 @@ class Identification:
     def derived(self) -> dict[str, Estimate]:
         """``zeta = c_over_m / (2 w0)`` and ``theta_r = Tr / w0**2`` (rad), as far as known.
 
-        Errors by the delta method from the covariance; without one the errors of the two numbers
-        count as independent.
+        Errors follow by the delta method; without a covariance the two numbers are independent.
         """
         made = {}
         for name, numerator, power in (("zeta", "c_over_m", 1), ("theta_r", "Tr", 2)):
@@ -102,7 +99,7 @@ class Identification:
             shared = self._shared(numerator, "w0")
             variance = (scale * over.stderr) ** 2 + (lever * w0.stderr) ** 2
             error = math.sqrt(max(variance + 2 * scale * lever * shared, 0.0))
-            made[name] = Estimate(value, error, (value - _Z95 * error, value + _Z95 * error))
+            made[name] = Estimate(value, error, (value - Z95 * error, value + Z95 * error))
         return made
 
     def _shared(self, one: str, other: str) -> float:
@@ -116,9 +113,7 @@ class Identification:
 
     @property
     def rig(self) -> Rig:
-        """The pendulum that was found; what the method does not know is 0, and so is a negative
-        damping, which no pendulum has.
-        """  # noqa: D205 (one sentence)
+        """The pendulum that was found; parameters not found, and negative damping, are 0."""
         if self.model is not None:
             return self.model
         known: dict[str, Any] = {
@@ -132,11 +127,27 @@ class Identification:
         return Rig(**known)
 
 
-# What a method of peaks says where a record has too few of them.
+def on_record(from_peaks: Callable[..., Identification]) -> Callable[..., Identification]:
+    """Return a method of peaks as one of a record, whose peaks are found unless they are given."""
+
+    def identify(
+        time: ArrayLike,
+        theta: ArrayLike,
+        *,
+        sigma: float | None = None,
+        trusted: ArrayLike | None = None,
+        peaks: Peaks | None = None,
+        **choices: Any,  # noqa: ANN401 (those of the method)
+    ) -> Identification:
+        """Identify damping from a record, s and rad; ``choices`` are those of ``from_peaks``."""
+        if peaks is None:
+            peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+        return from_peaks(peaks, **choices)
+
+    return identify
 
 
-def too_few(  # noqa: PLR0913 (what is counted, and how it is said)
-    method: str,
+def too_few(  # noqa: PLR0913 (what is counted, and how it is worded)
     count: int,
     least: int,
     *,
@@ -145,24 +156,17 @@ def too_few(  # noqa: PLR0913 (what is counted, and how it is said)
     warnings: Sequence[str] = (),
     because: str = "",
 ) -> Identification:
-    """Return a method that cannot be applied, and how many peaks it lacks.
-
-    Parameters
-    ----------
-    method : str
-        Its name.
-    count, least : int
-        Peaks that it could use, and how many it needs.
-    of : int, optional
-        Peaks that the record has, where some of them lie outside what the method may use.
-    where : str
-        What the method may use, in words, like ``under 12 degrees``.
-    warnings : sequence of str
-        What was said before.
-    because : str
-        Why there are no more, in words.
-    """
+    """Return that a method needs ``least`` peaks ``where`` a record of ``of`` has ``count``."""
     peaks = counted(count, "peak") if of is None else f"{count} of {counted(of, 'peak')}"
     text = " ".join(part for part in (peaks, where) if part)
     text = f"not applicable: {text}, {least} are needed" + (f": {because}" if because else "")
-    return Identification(method, warnings=(*warnings, text), applicable=False)
+    return Identification(warnings=(*warnings, text), applicable=False)
+
+
+def unphysical(values: Mapping[str, float]) -> list[str]:
+    """Return a warning for each damping below 0."""
+    return [
+        f"unphysical: {name} is {values[name]:.4g}, below 0"
+        for name in ("c_over_m", "Tr")
+        if values.get(name, 0.0) < 0
+    ]

@@ -1,4 +1,7 @@
-"""The combined decrement of viscous damping and Coulomb friction, as the paper prints it."""
+"""The combined decrement of viscous damping and Coulomb friction, as the paper prints it.
+
+Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, too_few
+from pendmap.identification.methods.base import Identification, too_few, unphysical
 from pendmap.identification.methods.decrement import Reading, from_amplitudes
 from pendmap.identification.peaks import Peaks, find_peaks, samples
-from pendmap.identification.uncertainty import bootstrap, estimates, jacobian
+from pendmap.identification.uncertainty import bootstrap, estimates, propagated
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -21,16 +24,18 @@ if TYPE_CHECKING:
 CUT: Final = math.radians(12.0)
 """Peaks above this are dropped, rad: there the pendulum is not linear."""
 
-_NAMES: Final[dict[Reading, str]] = {
-    "all": "combined",
-    "odd_ends": "combined_odd_ends",
-    "odd_triplets": "combined_odd_triplets",
-}
 _FEWEST: Final = 4
+"""Peaks below the cut that are needed."""
+_USES: Final[dict[Reading, str]] = {
+    "all": "of them the first two and the last two",
+    "odd_ends": "of them the first two and the last two that begin at an odd peak",
+    "odd_triplets": "the mean over all triplets that begin at an odd peak",
+}
+"""How each reading uses the peaks, in words of the result."""
 
 
 def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
-    """Return the peaks below a cut that follow one another, and what had to be said about them."""
+    """Return the peaks below a cut that follow one another, and warnings about them."""
     small = peaks.turned
     above = np.flatnonzero(np.abs(small.amplitude) >= cut)
     small = small.select(np.arange(len(small)) > (above[-1] if above.size else -1))
@@ -47,11 +52,17 @@ def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
 def from_peaks(
     peaks: Peaks, *, reading: Reading = "all", cut: float = CUT, why: str = ""
 ) -> Identification:
-    """Identify damping from peaks; see :func:`identify`.
+    """Identify viscous damping and Coulomb friction by the combined decrement as printed.
 
-    ``why`` says what else than the record's end there is, where no peaks are below the cut.
+    Peaks above the cut (12 degrees) are dropped; eq. 2.7 gives ``delta``, eq. 2.10 ``theta_r``, the
+    mean period ``w0 = 2 pi / (mean_period sqrt(1 - zeta^2))``; standard errors are by the delta
+    method, intervals by a parametric bootstrap of the peaks. The paper starts "only on odd half
+    cycles": ``odd_ends`` takes 2.7 between the first and the last pair of peaks that begin at an
+    odd one, ``odd_triplets`` the mean over the triplets that do. The method is biased: by the
+    nonlinearity (1.5 % in delta at 12 degrees), by a zero error of the angle, and because 2.7 uses
+    four peaks of all; the module ``repaired`` corrects that. ``why`` is the reason where a record
+    has no peaks below the cut, if it is not the record's end.
     """
-    name = _NAMES[reading]
     small, warnings = small_peaks(peaks, cut)
     size = np.abs(small.amplitude)
     while size.size > _FEWEST and not size[-2] > size[-1]:
@@ -64,7 +75,6 @@ def from_peaks(
     if size.size < least:
         none = len(peaks) and not len(small)
         return too_few(
-            name,
             size.size,
             least,
             of=len(peaks.turned),
@@ -83,9 +93,8 @@ def from_peaks(
     found = compute(values)
     if not np.isfinite(found).all():
         text = "not applicable: a difference of peaks has the wrong sign, 2.7 has no logarithm"
-        return Identification(name, warnings=(*warnings, text), applicable=False)
-    slopes = jacobian(compute, values, stderr / 10)
-    covariance = slopes * stderr**2 @ slopes.T
+        return Identification(warnings=(*warnings, text), applicable=False)
+    covariance = propagated(compute, values, stderr)
     draws = bootstrap(compute, values, stderr)
     failed = float(np.mean(~np.isfinite(draws).all(axis=1)))
     names = ("w0", "c_over_m", "Tr")
@@ -97,30 +106,15 @@ def from_peaks(
             "the errors are too small"
         )
     warnings += unphysical(dict(zip(names, found, strict=True)))
-    used = (
-        f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
-        f"degrees); {_USES[reading]}; the mean of {count - 2} overlapping periods"
-    )
-    result = estimates(names, found, covariance, intervals=intervals)
     return Identification(
-        name, result, used, tuple(warnings), covariance=(names, np.asarray(covariance))
+        estimates=estimates(names, found, covariance, intervals=intervals),
+        used=(
+            f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
+            f"degrees); {_USES[reading]}; the mean of {count - 2} overlapping periods"
+        ),
+        warnings=tuple(warnings),
+        covariance=(names, covariance),
     )
-
-
-_USES: Final[dict[Reading, str]] = {
-    "all": "of them the first two and the last two",
-    "odd_ends": "of them the first two and the last two that begin at an odd peak",
-    "odd_triplets": "the mean over all triplets that begin at an odd peak",
-}
-
-
-def unphysical(values: dict[str, float]) -> list[str]:
-    """Return a warning for each damping that is negative, which none is."""
-    return [
-        f"unphysical: {name} is {values[name]:.4g}, below 0"
-        for name in ("c_over_m", "Tr")
-        if values.get(name, 0.0) < 0
-    ]
 
 
 def identify(  # noqa: PLR0913 (record, then what may be chosen)
@@ -133,40 +127,7 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
     reading: Reading = "all",
     cut: float = CUT,
 ) -> Identification:
-    """Identify viscous damping and Coulomb friction by the combined decrement as printed.
-
-    Peaks above 12 degrees are dropped; eq. 2.7 gives ``delta``, eq. 2.10 ``theta_r``, the mean
-    period ``w0 = 2 pi / (mean_period sqrt(1 - zeta^2))``. The method is biased: by the pendulum's
-    nonlinearity (1.5 % in delta at 12 degrees), by a zero error of the angle, and because 2.7 uses
-    four peaks of all. :mod:`pendmap.identification.methods.repaired` mends that.
-
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s, and rad from the downward rest, unwrapped.
-    sigma : float, optional
-        Noise of a sample, rad; by default estimated.
-    trusted : array of bool, shape (N,), optional
-        Samples that may be used.
-    peaks : Peaks, optional
-        Those of the record, where they are known; by default found.
-    reading : {"all", "odd_ends", "odd_triplets"}
-        The paper starts "only on odd half cycles": ``odd_ends`` takes 2.7 between the first and
-        the last pair of peaks that begin at an odd one, ``odd_triplets`` the mean over the
-        triplets that do.
-    cut : float
-        Peaks above are dropped, rad.
-
-    Returns
-    -------
-    Identification
-        ``w0``, ``c_over_m``, ``Tr``; standard errors by the delta method, intervals by a
-        parametric bootstrap of the peaks. Not applicable where the record ends above the cut.
-
-    References
-    ----------
-    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
-    """
+    """Identify damping by the printed method from a record, s and rad; see :func:`from_peaks`."""
     if peaks is None:
         peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     why = _unresolved(*samples(time, theta, trusted), peaks, cut)
@@ -174,13 +135,13 @@ def identify(  # noqa: PLR0913 (record, then what may be chosen)
 
 
 def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> str:
-    """Return that peaks were lost, in words, where a record goes on below a cut."""
+    """Return that peaks were lost, in words, where a record continues below a cut."""
     if time.size < _FEWEST or len(peaks) < 2:  # noqa: PLR2004 (one half swing)
         return ""
     size = np.abs(theta - np.median(theta[-(theta.size // 4) :]))
     above = np.flatnonzero(size >= cut)
     first = int(above[-1]) + 1 if above.size else 0
-    # Within a half swing after the last large peak nothing is lost; turns are those of noise.
+    # Within a half swing after the last large peak no peak is lost: turns are noise.
     if first == time.size or time[-1] - time[first] < 2 * np.diff(peaks.time).min():
         return ""
     late = theta[first:]
@@ -188,27 +149,3 @@ def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> str:
     if turns < _FEWEST:
         return ""
     return "peaks are not resolved: too few samples a period"
-
-
-def identify_odd_ends(
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    peaks: Peaks | None = None,
-) -> Identification:
-    """Identify with eq. 2.7 between two odd ends; see :func:`identify`."""
-    return identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks, reading="odd_ends")
-
-
-def identify_odd_triplets(
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    peaks: Peaks | None = None,
-) -> Identification:
-    """Identify with the mean of the odd triplets; see :func:`identify`."""
-    return identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks, reading="odd_triplets")

@@ -1,4 +1,4 @@
-"""Eqs. 2.4 to 2.10: peaks from damping, and damping from peaks."""
+"""Eqs. 2.4 to 2.10 of Horton, Wiercigroch & Xu (2008): peaks from damping, damping from peaks."""
 
 from __future__ import annotations
 
@@ -17,30 +17,20 @@ if TYPE_CHECKING:
 
 
 Reading = Literal["all", "odd_ends", "odd_triplets"]
-"""Which peaks the printed method uses; see ``methods.combined``."""
+"""Peaks that the printed method uses; see ``methods.combined``."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Decrement:
-    """What the combined method makes of the peaks of a small decay.
+    """Result of the combined method for a small decay."""
 
-    Parameters
-    ----------
-    delta : float
-        ``zeta / sqrt(1 - zeta^2)``, eq. 2.7.
-    theta_r : float
-        ``Tr / w0^2``, rad, eq. 2.10.
-    mean_period : float
-        Mean of all overlapping full cycles, s.
-    """
-
-    delta: float
-    theta_r: float
-    mean_period: float
+    delta: float  # zeta / sqrt(1 - zeta^2), eq. 2.7
+    theta_r: float  # Tr / w0^2, rad, eq. 2.10
+    mean_period: float  # of all overlapping full cycles, s
 
     @property
     def zeta(self) -> float:
-        """The damping ratio."""
+        """Damping ratio."""
         return self.delta / math.sqrt(1 + self.delta**2)
 
     @property
@@ -62,8 +52,8 @@ class Decrement:
 def recursion(first: float, delta: float, theta_r: float, count: int) -> Floats:
     """Return the absolute values of peaks by eqs. 2.4 to 2.6, shape (count,).
 
-    ``abs(th_k) = -theta_r (E + 1) + E abs(th_{k-1})``, ``E = exp(-delta pi)``. From the peak on
-    that does not reach zero any more values are negative, and mean nothing.
+    ``abs(th_k) = -theta_r (E + 1) + E abs(th_{k-1})``, ``E = exp(-delta pi)``. Negative values,
+    from the peak on that does not reach zero, mean nothing.
     """
     shrink = math.exp(-delta * math.pi)
     result = np.empty(count)
@@ -76,8 +66,8 @@ def recursion(first: float, delta: float, theta_r: float, count: int) -> Floats:
 def decrement(peaks: Floats) -> float:
     """Return ``delta`` by eq. 2.7, from the first two and the last two absolute peaks.
 
-    ``delta = ln[(th_0 - th_1) / (th_{k-1} - th_k)] / ((k - 1) pi)``. All between them cancel.
-    NaN where the ratio is not above 0.
+    ``delta = ln[(th_0 - th_1) / (th_{k-1} - th_k)] / ((k - 1) pi)``; all peaks between cancel. NaN
+    where the ratio is not above 0.
     """
     ratio = (peaks[0] - peaks[1]) / (peaks[-2] - peaks[-1])
     if not ratio > 0:

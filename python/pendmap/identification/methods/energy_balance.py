@@ -1,14 +1,17 @@
-"""Energy balance: what each half cycle loses, against the work of the two kinds of damping."""
+"""Energy balance: the loss of each half cycle against the work of the two kinds of damping.
+
+Liang & Feeny (2006), "Balancing energy to estimate damping parameters in forced oscillators",
+J. Sound Vib.; the balance here is that of a free decay, half cycle by half cycle.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, too_few
-from pendmap.identification.methods.combined import unphysical
+from pendmap.identification.methods.base import Identification, too_few, unphysical
 from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.period import frequency, viscous_work
 from pendmap.identification.uncertainty import chain_covariance, chain_least_squares, estimates
@@ -20,17 +23,16 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_NAME = "energy_balance"
-_FEWEST = 5
-_MISFIT = 2.0
-_LARGEST = 2.0
+_FEWEST: Final = 5
+"""Peaks that are needed."""
+_MISFIT: Final = 2.0
+"""chi^2 per degree of freedom above which a warning comes."""
+_LARGEST: Final = 2.0
 """Peaks below this give w0, rad: above, damping itself changes the half cycle's time."""
-_PHASE = 0.5
-"""Half width of the windows in which the velocity is fitted, in radians of phase w0 t."""
-_SAMPLES = 25
-"""Samples a period below which a warning comes: the nine that a quartic is fitted to then reach 1
-rad of phase each way, twice as far as meant, and the velocity is smoothed by more than its error.
-"""
+_PHASE: Final = 0.5
+"""Half width of the windows in which the velocity is fitted, radians of phase w0 t."""
+_SAMPLES: Final = 25
+"""Samples a period below which a warning comes: the nine of a quartic smooth the velocity then."""
 
 
 def identify(
@@ -44,45 +46,24 @@ def identify(
     """Identify viscous damping and Coulomb friction by the energy that each half cycle loses.
 
     ``w0^2 (cos(x_{k+1} - b) - cos(x_k - b)) = c_over_m int th'^2 dt + Tr abs(x_{k+1} - x_k)``
-    between the peaks ``x_k``, with the angle's zero error ``b``; small angles are not asked for.
-    The integral runs over the measured cycle: velocities by local quartics, their noise's share
-    taken off. Neighbouring half cycles share a peak, so the least squares are generalised ones.
-
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s, and rad from the downward rest, unwrapped.
-    sigma : float, optional
-        Noise of a sample, rad; by default estimated.
-    trusted : array of bool, shape (N,), optional
-        Samples that may be used; a half cycle with a gap takes the integral of a pendulum's.
-    peaks : Peaks, optional
-        Those of the record, where they are known; by default found.
-
-    Returns
-    -------
-    Identification
-        ``w0`` (amplitude-corrected period), ``c_over_m``, ``Tr``, ``offset``.
-
-    References
-    ----------
-    Liang & Feeny (2006), "Balancing energy to estimate damping parameters in forced oscillators",
-    J. Sound Vib.; the balance here is that of a free decay, half cycle by half cycle.
+    between the peaks ``x_k``, with the angle's zero error ``b``, at any amplitude. The integral is
+    over the measured cycle: velocities by local quartics, less the noise's share; across a gap it
+    is that of a pendulum. Neighbouring half cycles share a peak: least squares are generalised.
     """
     if peaks is None:
         peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     t, x = samples(time, theta, trusted)
     turned = peaks.turned
     if len(turned) < _FEWEST:
-        return too_few(_NAME, len(turned), _FEWEST)
+        return too_few(len(turned), _FEWEST)
     pairs = np.flatnonzero(np.diff(turned.index) == 1)
     small = turned.select(np.abs(turned.amplitude) < _LARGEST)
     if len(small) < _FEWEST:
         where = f"under {_LARGEST:g} rad"
-        return too_few(_NAME, len(small), _FEWEST, of=len(turned), where=where)
+        return too_few(len(small), _FEWEST, of=len(turned), where=where)
     if pairs.size < _FEWEST - 1:
         text = f"not applicable: {pairs.size} whole half cycles, {_FEWEST - 1} are needed"
-        return Identification(_NAME, warnings=(text,), applicable=False)
+        return Identification(warnings=(text,), applicable=False)
     w0 = frequency(small).w0
     work = _measured_work((t, x), turned, pairs, w0)
     zero, values, covariance, misfit = 0.0, np.empty(0), np.empty((0, 0)), 1.0
@@ -94,7 +75,7 @@ def identify(
     period = frequency(small, zeta=min(abs(zeta), 0.9), offset=zero)
     names = ("w0", "c_over_m", "Tr", "offset")
     found = np.array([period.w0, values[0], values[1], zero])
-    # Energies are counted in w0^2: its error goes over to both dampings.
+    # Energies are in units of w0^2: its error propagates to both dampings.
     full = np.zeros((4, 4))
     full[1:, 1:] = covariance
     lever = np.array([1.0, 2 * found[1] / period.w0, 2 * found[2] / period.w0, 0.0])
@@ -111,15 +92,13 @@ def identify(
             f"the balance does not close: chi^2 per degree of freedom is {misfit:.3g}; the errors "
             "are widened by it"
         )
-    used = (
-        f"{pairs.size} half cycles between peaks {turned.index[0]} and {turned.index[-1]}; w0 from "
-        f"the {len(small)} peaks under {math.degrees(_LARGEST):.3g} degrees"
-    )
     return Identification(
-        _NAME,
-        estimates(names, found, full),
-        used,
-        tuple(warnings),
+        estimates=estimates(names, found, full),
+        used=(
+            f"{pairs.size} half cycles between peaks {turned.index[0]} and {turned.index[-1]}; w0 "
+            f"from the {len(small)} peaks under {math.degrees(_LARGEST):.3g} degrees"
+        ),
+        warnings=tuple(warnings),
         covariance=(names, full),
         misfit=misfit,
     )
@@ -128,7 +107,7 @@ def identify(
 def _balance(
     peaks: Peaks, pairs: NDArray[np.intp], work: Floats, w0: float, zero: float
 ) -> tuple[Floats, Floats, float]:
-    """Solve for ``c_over_m``, ``Tr`` and the change of the zero; covariance; chi^2 a freedom."""
+    """Return ``c_over_m``, ``Tr`` and the change of the zero; covariance; chi^2 a freedom."""
     x = peaks.amplitude - zero
     later = pairs + 1
     lost = w0**2 * (np.cos(x[later]) - np.cos(x[pairs]))
@@ -138,7 +117,7 @@ def _balance(
     rows = np.column_stack((work, way, tilt))
     variance = np.maximum(peaks.stderr_amplitude, 1e-12) ** 2
     noise = chain_covariance(pairs, w0**2 * np.sin(x[pairs]), -(w0**2) * np.sin(x[later]), variance)
-    # A peak's noise also moves the energy in second order: it matters where the peak is small.
+    # Noise changes the energy of a small peak in second order too.
     second = w0**4 * variance**2 / 2
     noise[0] += second[pairs] + second[later]
     return chain_least_squares(rows, lost, noise)
@@ -147,7 +126,7 @@ def _balance(
 def _measured_work(
     record: tuple[Floats, Floats], peaks: Peaks, pairs: NDArray[np.intp], w0: float
 ) -> Floats:
-    """``int th'^2 dt`` over each half cycle, rad^2/s."""
+    """Return ``int th'^2 dt`` over each half cycle, rad^2/s."""
     time, theta = record
     speed, gain = smoothed_velocity(time, theta, _PHASE / w0)
     power = speed**2 - (peaks.sigma * gain) ** 2

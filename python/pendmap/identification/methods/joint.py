@@ -25,22 +25,12 @@ if TYPE_CHECKING:
 
 
 QUANTITIES: Final = {"m/s2": "acceleration", "m/s": "velocity", "m": "position"}
-"""What a recorded motion of the pivot is, by its unit."""
+"""Quantity that a recorded motion of the pivot has, by its unit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class JointFit:
-    """A pendulum fitted to several runs, and what it was fitted to.
-
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        Curves and residuals in the order of ``runs``.
-    runs : tuple of Run
-        The records.
-    readings : tuple of Reading
-        What the readings of each are worth.
-    """
+    """A pendulum fitted to several runs, in the order of its curves and residuals."""
 
     fit: TrajectoryFit
     runs: tuple[Run, ...]
@@ -57,7 +47,7 @@ class JointFit:
 def as_fit_run(run: Run, reading: Reading) -> FitRun:
     """Return a run as the fit takes it.
 
-    Times count from the first sample, but for the phase of a drive, which counts from 0.
+    Times count from the first sample; under a drive from 0, for its phase.
     """
     time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
     pivot = None
@@ -81,22 +71,19 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
 
 
 def as_angles(run: Run) -> NDArray[np.float64]:
-    """Return a run's readings: its angles, or those of a sensor on the rod over its gain.
-
-    The gain makes them angles of small free swings.
-    """
+    """Return a run's angles; of a sensor on the rod the readings over the gain of small swings."""
     return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
 
 
 def reading_of_run(run: Run) -> Reading:
-    """Return what the readings of a run are worth; see :func:`reading_of`."""
+    """Return the standard errors of a run's readings; see :func:`reading_of`."""
     time, sensor = from_first(run.time)[0], run.rod_sensor
     if sensor is None:
         return reading_of(time, run.theta, trusted=run.trusted, count=run.count_rad)
     found = reading_of(time, as_angles(run), trusted=run.trusted)
     law = found.law
     if law is not None and run.gyroscope is not None:
-        # What a late reading of a rate is off by, the acceleration says.
+        # The error of a late reading of a rate is proportional to the acceleration.
         law = dataclasses.replace(law, grows_with="acceleration")
     return dataclasses.replace(found, law=law, gain=abs(sensor.gain), unit=sensor.unit)
 
@@ -120,25 +107,11 @@ def fit_together(
     known: dict[str, float] | None = None,
     effects: Sequence[Effect | str] = (),
 ) -> JointFit:
-    """Fit natural frequency, damping, the sensor's zero and effects to runs.
+    """Fit natural frequency, damping, the sensor's zero and effects to one run or more.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        One or more; the start comes from the first.
-    start : Rig, optional
-        Where the search begins, with its effects.
-    known : dict of str to float, optional
-        Starting values of some parameters.
-    effects : sequence of Effect or str
-        Whatever else acts, parameters in SI, or its name; their sizes are fitted.
-
-    Raises
-    ------
-    InputError
-        If no run can be fitted.
-    TooShortError
-        If the first gives no start and none is given.
+    ``start``, with its effects, or ``known`` parameters are where the search begins, else it is
+    found from the first run: TooShortError is raised where that gives none. Sizes of ``effects``
+    are fitted.
     """
     if not runs:
         raise InputError("runs must hold one record or more, got none")

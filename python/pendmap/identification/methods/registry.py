@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Method:
-    """A method: a record in, an identification out.
+    """A method: a record in, an identification that bears its name out.
 
     Parameters
     ----------
@@ -50,32 +49,44 @@ class Method:
     reads_peaks: bool = True
 
 
+def _named(
+    name: str, compute: Callable[..., Identification], choices: dict[str, Any]
+) -> Callable[..., Identification]:
+    """Return a method's function with some choices made and the name in its results."""
+
+    def computed(*given: Any, **known: Any) -> Identification:  # noqa: ANN401 (as compute has them)
+        return dataclasses.replace(compute(*given, **choices, **known), method=name)
+
+    return computed
+
+
+def _method(name: str, module: Any, **choices: Any) -> Method:  # noqa: ANN401 (a module)
+    from_peaks = getattr(module, "from_peaks", None)
+    return Method(
+        _named(name, module.identify, choices),
+        None if from_peaks is None else _named(name, from_peaks, choices),
+        reads_peaks=module is not trajectory,
+    )
+
+
+BEST: Final = "trajectory"
+"""The default method."""
+
 METHODS: Final[dict[str, Method]] = {
-    "trajectory": Method(trajectory.identify, reads_peaks=False),
-    "combined": Method(combined.identify, combined.from_peaks),
-    "combined_odd_ends": Method(
-        combined.identify_odd_ends, functools.partial(combined.from_peaks, reading="odd_ends")
-    ),
-    "combined_odd_triplets": Method(
-        combined.identify_odd_triplets,
-        functools.partial(combined.from_peaks, reading="odd_triplets"),
-    ),
-    "combined_repaired": Method(repaired.identify, repaired.from_peaks),
-    "log_decrement": Method(log_decrement.identify, log_decrement.from_peaks),
-    "de_paula": Method(de_paula.identify, de_paula.from_peaks),
-    "energy_balance": Method(energy_balance.identify),
+    BEST: _method(BEST, trajectory),
+    "combined": _method("combined", combined),
+    "combined_odd_ends": _method("combined_odd_ends", combined, reading="odd_ends"),
+    "combined_odd_triplets": _method("combined_odd_triplets", combined, reading="odd_triplets"),
+    "combined_repaired": _method("combined_repaired", repaired),
+    "log_decrement": _method("log_decrement", log_decrement),
+    "de_paula": _method("de_paula", de_paula),
+    "energy_balance": _method("energy_balance", energy_balance),
 }
 """Every method by its name, the default first, then in the order of the paper's tables."""
 
 
 def check_names(methods: Iterable[str] | None) -> list[str]:
-    """Return the names of methods, all by default.
-
-    Raises
-    ------
-    InputError
-        If one is not known.
-    """
+    """Return the names of methods, all by default; refuse those that are not known."""
     if isinstance(methods, str):
         raise InputError(f"methods must be a list of names, like [{methods!r}], got {methods!r}")
     names = list(METHODS) if methods is None else list(dict.fromkeys(methods))
@@ -132,7 +143,7 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
         peaks = peaks.later(-first)
     found = {}
     for name in names:
-        # The trajectory method names the times that it used, and counts from the first one itself.
+        # The trajectory method reports times of the record, and subtracts the first one itself.
         own, known = (elapsed, {"peaks": peaks}) if METHODS[name].reads_peaks else (time, {})
         found[name] = METHODS[name].identify(own, theta, sigma=sigma, trusted=trusted, **known)
         if progress is not None:
@@ -141,52 +152,47 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
 
 
 def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[str, Identification]:
-    """Do the same where nothing but peaks was measured.
+    """Identify damping where nothing but peaks was measured.
 
-    Methods that need every sample say that they are not applicable. Where the peaks have no
-    standard errors their own scatter tells them; too few for that, and there are no intervals.
+    Peaks without standard errors get those of their own scatter; of too few there are no intervals.
     """
     found = {}
-    peaks = with_scatter(peaks.later(-float(peaks.time[0])) if len(peaks) else peaks)
+    peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
+    if not peaks.known:
+        size = peaks.time.shape
+        peaks = dataclasses.replace(
+            peaks,
+            stderr_time=np.full(size, scatter(peaks.time)),
+            stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
+        )
     for name in check_names(methods):
         from_peaks = METHODS[name].from_peaks
-        text = "not applicable: the record holds peaks alone, and this method needs every sample"
-        found[name] = (
-            Identification(name, warnings=(text,), applicable=False)
-            if from_peaks is None
-            else from_peaks(peaks)
-        )
-    return found if peaks.known else {n: _without_errors(one) for n, one in found.items()}
-
-
-def _without_errors(found: Identification) -> Identification:
-    """Return it without errors of 0, which nobody has; a fit tells its own from what it leaves."""
-    if any(each.stderr for each in found.estimates.values()):
-        return found
-    bare = {name: Estimate(each.value) for name, each in found.estimates.items()}
-    return dataclasses.replace(found, estimates=bare, covariance=None)
-
-
-# The noise of peaks that somebody else has measured: what a smooth course does not explain.
+        if from_peaks is None:
+            text = (
+                "not applicable: the record holds peaks alone, and this method needs every sample"
+            )
+            found[name] = Identification(name, warnings=(text,), applicable=False)
+            continue
+        found[name] = one = from_peaks(peaks)
+        # Errors of 0 are none; a fit estimates its own from its residuals.
+        if not peaks.known and not any(each.stderr for each in one.estimates.values()):
+            bare = {n: Estimate(each.value) for n, each in one.estimates.items()}
+            found[name] = dataclasses.replace(one, estimates=bare, covariance=None)
+    return found
 
 
 FEWEST: Final = 16
-"""Values from which a scatter is told: eight differences, to about a third."""
+"""Values from which a scatter is estimated: eight differences, to about a third."""
 
 _DIFFERENCE: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-"""Fourth difference, which a cubic leaves 0."""
+"""Fourth difference, which is 0 of a cubic."""
 
 
 def scatter(values: NDArray[np.float64]) -> float:
     """Return the standard deviation of the noise of values in a row; 0 where there are few.
 
-    Fourth differences of every second value, since a zero error moves odd and even peaks apart;
-    of white noise they have 70 times its variance. Robust: the median counts.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (P,)
-        Of a course that a cubic through nine of them follows.
+    The median of fourth differences counts, of every second value, since a zero error moves odd and
+    even peaks apart; of white noise they have 70 times its variance.
     """
     if values.size < FEWEST:
         return 0.0
@@ -195,15 +201,3 @@ def scatter(values: NDArray[np.float64]) -> float:
         weight * values[2 * k : 2 * k + size] for k, weight in enumerate(_DIFFERENCE)
     )
     return normal_scale(np.asarray(differences)) / float(np.sqrt(np.sum(_DIFFERENCE**2)))
-
-
-def with_scatter(peaks: Peaks) -> Peaks:
-    """Return peaks without standard errors with those that their own scatter shows."""
-    if peaks.known:
-        return peaks
-    size = peaks.time.shape
-    return dataclasses.replace(
-        peaks,
-        stderr_time=np.full(size, scatter(peaks.time)),
-        stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
-    )

@@ -4,84 +4,50 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from pendmap.identification.methods.base import Identification, too_few
-from pendmap.identification.methods.combined import CUT, small_peaks, unphysical
+from pendmap.identification.methods.base import Identification, on_record, too_few, unphysical
+from pendmap.identification.methods.combined import CUT, small_peaks
 from pendmap.identification.methods.decrement import recursion
-from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.period import frequency
 from pendmap.identification.uncertainty import estimates, jacobian
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
+
+    from pendmap.identification.peaks import Peaks
 
     Floats = NDArray[np.float64]
 
 
-_NAME = "combined_repaired"
-_FEWEST = 6
-_MISFIT = 2.0
-
-
-def identify(  # noqa: PLR0913 (the record, and what is known of it)
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    peaks: Peaks | None = None,
-    cut: float = CUT,
-) -> Identification:
-    """Identify viscous damping and Coulomb friction by the repaired combined decrement.
-
-    All peaks under the cut are fitted by ``x_k = b + s (-1)^k a_k`` with ``a_k`` by eqs. 2.4 to
-    2.6: unknown are ``a_0``, ``delta``, ``theta_r`` and the angle's zero error ``b``; weights are
-    the peaks' standard errors. The half cycle that stops is not among them. ``w0`` comes from the
-    amplitude-corrected period ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, fitted to the times of all
-    of them. What is left of the paper's bias is that of the linear recursion at 12 degrees.
-
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s, and rad from the downward rest, unwrapped.
-    sigma : float, optional
-        Noise of a sample, rad; by default estimated.
-    trusted : array of bool, shape (N,), optional
-        Samples that may be used.
-    peaks : Peaks, optional
-        Those of the record, where they are known; by default found.
-    cut : float
-        Peaks above are dropped, rad.
-
-    Returns
-    -------
-    Identification
-        ``w0``, ``c_over_m``, ``Tr``, ``offset``, with their covariance.
-
-    References
-    ----------
-    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, eqs. 2.4 to 2.6.
-    """
-    if peaks is None:
-        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    return from_peaks(peaks, cut=cut)
+_FEWEST: Final = 6
+"""Peaks below the cut that are needed."""
+_MISFIT: Final = 2.0
+"""chi^2 per degree of freedom above which a warning comes."""
 
 
 def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
-    """Identify damping from peaks; see :func:`identify`."""
+    """Identify viscous damping and Coulomb friction by the repaired combined decrement.
+
+    All peaks under the cut (rad) are fitted by ``x_k = b + s (-1)^k a_k`` with ``a_k`` by eqs. 2.4
+    to 2.6 of Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A. Unknown are ``a_0``,
+    ``delta``, ``theta_r`` and the angle's zero error ``b``; weights are the peaks' standard errors.
+    The half cycle that stops is left out. ``w0`` comes from the amplitude-corrected period
+    ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, fitted to all their times. The remaining bias is of the
+    linear recursion at 12 degrees.
+    """
     small, warnings = small_peaks(peaks, cut)
     count = len(small)
     if count < _FEWEST:
         under = f"under {math.degrees(cut):.3g} degrees"
         total = len(peaks.turned)
-        return too_few(_NAME, count, _FEWEST, of=total, where=under, warnings=warnings)
+        return too_few(count, _FEWEST, of=total, where=under, warnings=warnings)
     measured = small.amplitude
     sign = math.copysign(1.0, measured[0]) * (-1.0) ** np.arange(count)
-    # Peaks that somebody else measured may come without errors: then all weigh the same.
+    # Peaks measured elsewhere may come without errors: then all weigh the same.
     error = small.stderr_amplitude
     known = bool(np.all(error > 0))
     error = error if known else np.ones(count)
@@ -110,7 +76,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         )
     _, delta, theta_r, zero = fit.x
     zeta = delta / math.sqrt(1 + delta**2)
-    # The fitted peaks are so much surer than the measured ones that their errors do not count.
+    # Errors of fitted peaks are negligible beside those of measured ones.
     times = small.stderr_time
     smooth = dataclasses.replace(
         small,
@@ -136,15 +102,16 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     names = ("w0", "c_over_m", "Tr", "offset")
     found = si(values)
     warnings += unphysical(dict(zip(names, found, strict=True)))
-    used = (
-        f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
-        "degrees), all of them, and their times"
-    )
     return Identification(
-        _NAME,
-        estimates(names, found, outer),
-        used,
-        tuple(warnings),
+        estimates=estimates(names, found, outer),
+        used=(
+            f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
+            "degrees), all of them, and their times"
+        ),
+        warnings=tuple(warnings),
         covariance=(names, np.asarray(outer)),
         misfit=misfit,
     )
+
+
+identify = on_record(from_peaks)

@@ -1,4 +1,4 @@
-"""Starting values for a fit to the whole record."""
+"""Starting values for a fit to the whole record: from methods of peaks, or a global search."""
 
 from __future__ import annotations
 
@@ -29,13 +29,14 @@ _FRICTION: Final = (1e-6, 0.3)
 _ZERO: Final = 0.2
 """Largest zero error that is searched, rad."""
 _MISFIT: Final = 25.0
-"""chi^2 per degree of freedom above which a method's values are no start."""
+"""chi^2 per degree of freedom above which a method's values are not used as a start."""
 _MOST_PEAKS: Final = 80
+"""Peaks that the global search compares at most."""
 
 
 @dataclasses.dataclass(frozen=True)
 class StartingValues:
-    """Where a fit may begin.
+    """Starting values of a fit.
 
     Parameters
     ----------
@@ -84,11 +85,11 @@ def starting_values(
     """
     peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     balance = energy_balance.identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks)
-    if _sound(balance):
-        return _clipped(balance)
-    mended = repaired.from_peaks(peaks)
-    if _sound(mended):
-        return _clipped(mended)
+    start = _start_of(balance, "energy_balance")
+    if start is None:
+        start = _start_of(repaired.from_peaks(peaks), "combined_repaired")
+    if start is not None:
+        return start
     if len(peaks.turned) > 3:  # noqa: PLR2004 (four unknowns)
         return global_start(peaks)
     return _guess(*samples(time, theta, trusted), peaks)
@@ -100,7 +101,7 @@ def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
     Differential evolution over ``c_over_m / w0``, ``Tr / w0^2``, the first peak and the zero error
     on :func:`pendmap.identification.period.envelope`; distances count by
     ``2 (sqrt(1 + r^2) - 1)``, so that false peaks cannot lead it away. ``w0`` is the median over
-    half cycles of what each says alone, its amplitude taken into account.
+    half cycles of the amplitude-corrected one of each.
 
     Parameters
     ----------
@@ -120,14 +121,14 @@ def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
     numbers = turned.index - turned.index[0]
     count = int(numbers[-1]) + 1
     some = np.unique(np.linspace(0, len(turned) - 1, _MOST_PEAKS).round().astype(int))
-    measured, at = turned.amplitude, numbers
-    sign = math.copysign(1.0, measured[0]) * (-1.0) ** at
+    measured = turned.amplitude
+    sign = math.copysign(1.0, measured[0]) * (-1.0) ** numbers
     size = np.abs(measured)
     error = np.hypot(np.maximum(turned.stderr_amplitude, 1e-12), 1e-3 * size.max())
 
     def cost(unknown: Floats) -> Floats:
         gamma, theta_r, scale, zero = unknown.reshape(4, -1)
-        made = envelope(scale * size[0], 10.0**gamma, 10.0**theta_r, count)[at[some]]
+        made = envelope(scale * size[0], 10.0**gamma, 10.0**theta_r, count)[numbers[some]]
         off = (zero + sign[some, None] * made - measured[some, None]) / error[some, None]
         return np.asarray(np.sum(2 * (np.sqrt(1 + off**2) - 1), axis=0))
 
@@ -146,36 +147,29 @@ def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
 
 
 def _frequency(peaks: Peaks, zero: float) -> float:
-    """The median over half cycles of the amplitude-corrected natural frequency, rad/s."""
+    """Return the median over half cycles of the amplitude-corrected frequency, rad/s."""
     size = np.minimum(np.abs(peaks.amplitude - zero), math.pi - 1e-3)
     quarter = ellipk(np.sin(size / 2) ** 2)
     steps = np.diff(peaks.index)
     return float(np.median(steps * (quarter[1:] + quarter[:-1]) / np.diff(peaks.time)))
 
 
-def _sound(found: Identification) -> bool:
+def _start_of(found: Identification, source: str) -> StartingValues | None:
+    """Return starting values from a method's result; None where they are no start."""
     if not found.applicable:
-        return False
+        return None
     for name in ("c_over_m", "Tr"):
         estimate = found.estimates[name]
         if not math.isfinite(estimate.value) or estimate.value < -3 * (estimate.stderr or 0.0):
-            return False
-    return found["w0"] > 0 and not (found.misfit is not None and found.misfit > _MISFIT)
-
-
-def _clipped(found: Identification) -> StartingValues:
-    """Values as a fit needs them: one that must not be negative begins at 0."""
-    return StartingValues(
-        found["w0"],
-        max(found["c_over_m"], 0.0),
-        max(found["Tr"], 0.0),
-        found["offset"],
-        found.method,
-    )
+            return None
+    if not found["w0"] > 0 or (found.misfit is not None and found.misfit > _MISFIT):
+        return None
+    damping = max(found["c_over_m"], 0.0), max(found["Tr"], 0.0)
+    return StartingValues(found["w0"], *damping, found["offset"], source)
 
 
 def _guess(time: Floats, theta: Floats, peaks: Peaks) -> StartingValues:
-    """From one swing: its half period, and a damping that most rigs have."""
+    """Return w0 by the half period of one swing, and a damping that most rigs have."""
     if len(peaks) > 1:
         w0 = _frequency(peaks, 0.0)
     else:

@@ -1,7 +1,7 @@
-"""The best method: the whole record of a free decay against the equation of motion.
+"""Trajectory method: the whole record of a free decay against the equation of motion.
 
 ``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')``, with further terms by effects, is followed
-from release to rest, stops included, and all its numbers are adapted to all readings at once
+from release to rest, stops included, and all parameters are fitted to all readings at once
 (:mod:`pendmap.identification.fit`). Nothing is linearised, no peak is picked.
 """
 
@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, check_number
-from pendmap.identification.fit import TrajectoryFit, fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.start import starting_values
 from pendmap.identification.parameters import SENSOR
-from pendmap.identification.readings import Reading, reading_of
+from pendmap.identification.readings import reading_of
 from pendmap.identification.runs import FitRun
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
@@ -35,97 +35,43 @@ if TYPE_CHECKING:
     from pendmap.identification.readings import Reading
 
 
-METHOD: Final = "trajectory"
 TOO_GOOD: Final = 0.7
-"""A sum of squares below this part of its degrees of freedom shows that sigma is too large."""
+"""chi^2 per degree of freedom below which a warning says that sigma is too large."""
+OFFSET: Final = "encoder_offset"
+"""The effect that is the sensor's zero."""
+POOR: Final = 0.1
+"""Residual over the record's own scatter above which the search went astray."""
+LACKING: Final = 4.0
+"""Widening above which readings count alike: by their law the slowest alone would decide."""
 
 
-def identify(  # noqa: PLR0913 (the record, and what is known of it)
+class TooShortError(InputError):
+    """The record gives no start: fewer than two half swings, or none that fall."""
+
+
+def identify(
     time: NDArray[np.float64],
     theta: NDArray[np.float64],
-    *,
-    sigma: float | None = None,
-    trusted: NDArray[np.bool_] | None = None,
-    start: Rig | Mapping[str, float] | None = None,
-    offset: bool = True,
-    friction: bool = True,
-    effects: Sequence[Effect] = (),
-    free: Sequence[str] | None = None,
+    **choices: Any,  # noqa: ANN401 (those of fit_decay)
 ) -> Identification:
-    """Return the damping found in a free decay by fitting its whole trajectory.
+    """Identify the damping of a free decay by fitting its whole trajectory.
 
-    Parameters
-    ----------
-    time : ndarray of float, shape (n,)
-        In s; each after the one before it.
-    theta : ndarray of float, shape (n,)
-        Readings of the angle from the downward rest, rad, unwrapped.
-    sigma : float, optional
-        Their standard error, rad; if none is given, the noise of the record as it is seen without
-        any model.
-    trusted : ndarray of bool, shape (n,), optional
-        Which samples count; all if none are given.
-    start : Rig or mapping of str to float, optional
-        Where the search starts; else from zero crossings and the energy of each half swing.
-    offset : bool
-        Whether the sensor may read zero at another angle; ``offset`` is what it reads at rest
-        there.
-    friction : bool
-        Whether there may be Coulomb friction.
-    effects : sequence of Effect
-        Whatever else acts, parameters in SI.
-    free : sequence of str, optional
-        Which of their parameters (``effect.parameter``) are fitted; if none are given, all but
-        those that are shapes: exponents, orders and widths.
-
-    Returns
-    -------
-    Identification
-        ``w0``, ``c_over_m``, ``Tr``, ``offset`` and the effects' parameters. Damping may come out
-        negative, which no pendulum has and a warning says: something else is missing then.
-
-    Raises
-    ------
-    InputError
-        If the arrays do not fit together.
-
-    References
-    ----------
-    Bock (1983), Progress in Scientific Computing 2, 95, for the method; Venzon & Moolgavkar (1988),
-    Applied Statistics 37, 87, for the intervals.
+    ``choices`` are those of :func:`fit_decay`. Results are ``w0``, ``c_over_m``, ``Tr``, ``offset``
+    and the effects' parameters. Damping may come out negative: a warning says that an effect is
+    missing then.
     """
     try:
-        fit, reading = fit_decay(
-            time,
-            theta,
-            sigma=sigma,
-            trusted=trusted,
-            start=start,
-            offset=offset,
-            friction=friction,
-            effects=effects,
-            free=free,
-        )
+        fit, reading = fit_decay(time, theta, **choices)
     except TooShortError as error:
-        return Identification(METHOD, warnings=(str(error),), applicable=False)
+        return Identification(warnings=(str(error),), applicable=False)
     return identification_of(fit, [reading], span(np.asarray(time)))
 
 
 def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str) -> Identification:
-    """Return a fit as every method gives its result.
-
-    Parameters
-    ----------
-    fit : TrajectoryFit
-        To one record or more.
-    readings : sequence of Reading
-        Of each record.
-    part : str
-        Which part of them, in words.
-    """
+    """Return a fit as every method gives its result; ``part`` says which part of the records."""
     renamed = {f"{OFFSET}.d": "offset"}
     names = tuple(renamed.get(name, name) for name in fit.names)
-    # Where the model does not fit, the noise is not what the errors come from.
+    # Where the model does not fit, errors come from the misfit.
     wider = math.sqrt(fit.widening)
     found = [
         dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
@@ -141,7 +87,6 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
     noise = " to ".join(f"{x:.2e}" for x in sorted({min(sigmas), max(sigmas)}))
     noise += f" {units.pop() if len(units) == 1 else 'rad'}"
     return Identification(
-        METHOD,
         estimates=estimates,
         used=f"{fit.samples} readings of {total}, {part}, {how}; noise {noise}",
         warnings=tuple(_warnings(fit, estimates, readings)),
@@ -152,26 +97,18 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
     )
 
 
-def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
+def fit_decay(
     time: NDArray[np.float64],
     theta: NDArray[np.float64],
     *,
     sigma: float | None = None,
     trusted: NDArray[np.bool_] | None = None,
-    start: Rig | Mapping[str, float] | None = None,
-    offset: bool = True,
-    friction: bool = True,
-    effects: Sequence[Effect] = (),
-    free: Sequence[str] | None = None,
+    **choices: Any,  # noqa: ANN401 (those of fit_from_start)
 ) -> tuple[TrajectoryFit, Reading]:
-    """Return the fit behind :func:`identify`, with curve and residuals, and the standard errors.
+    """Return the fit to a free decay (s, and rad from the downward rest) and its readings.
 
-    Parameters and errors are those of :func:`identify`.
-
-    Raises
-    ------
-    TooShortError
-        If the record gives no start and none is given.
+    ``sigma`` (rad) is by default the noise as estimated without a model; ``choices`` are those of
+    :func:`fit_from_start`.
     """
     time, theta = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, theta))
     if time.shape != theta.shape or time.ndim != 1:
@@ -195,15 +132,7 @@ def fit_decay(  # noqa: PLR0913 (the record, and what is known of it)
         lab_time_s=first,
         count=reading.interval,
     )
-    found, (reading,) = fit_from_start(
-        [run],
-        [reading],
-        start=start,
-        offset=offset,
-        friction=friction,
-        effects=effects,
-        free=free,
-    )
+    found, (reading,) = fit_from_start([run], [reading], **choices)
     return found, reading
 
 
@@ -235,7 +164,7 @@ def _warnings(
         found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
     if not fit.converged:
         found.append("the search did not converge")
-    # How a sensor leans shows in wide swings alone: nobody asks for it.
+    # A sensor's tilt shows in wide swings alone: its interval is not reported.
     wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
     lost = [name for name, e in wanted.items() if e.ci95 is None]
     if lost:
@@ -251,26 +180,6 @@ def _warnings(
     return found
 
 
-# From a record to a fit: a start that the record gives, then the search.
-#
-# Where a rough start leads astray, a second one is taken from the methods of peaks.
-
-
-OFFSET: Final = "encoder_offset"
-"""The effect that is the sensor's zero."""
-POOR: Final = 0.1
-"""Residuals above this part of the record's own scatter are no fit: the search went astray."""
-
-
-LACKING: Final = 4.0
-"""Where the sum of squares is so many times what noise makes of it, the model lacks more than the
-noise: by its law the slowest readings alone would say what the model is."""
-
-
-class TooShortError(InputError):
-    """The record gives no start: fewer than two half swings, or none that fall."""
-
-
 def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     runs: Sequence[FitRun],
     readings: Sequence[Reading],
@@ -283,28 +192,20 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
 ) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
     """Return the fit to several records, from a start that the first gives, and their readings.
 
-    Where a rough start leads to a poor fit, a second one begins where the methods of peaks, or a
-    global search over their envelope, say; the better one counts. Readings whose noise grows with
-    speed count by it, unless the model lacks more than the noise: then they count alike.
-
-    Parameters
-    ----------
-    runs, readings : sequence
-        The records, and what their readings are worth.
-    start, offset, friction, effects, free
-        As of :func:`identify`; effects may be names, whose sizes then begin small.
-
-    Raises
-    ------
-    TooShortError
-        If the first record gives no start and none is given.
+    Where a rough start leads to a poor fit, a second one begins with the values of the methods of
+    peaks, or of a global search over their envelope; the better one counts. Readings whose noise
+    grows with speed count by it, unless the model lacks an effect: then they count alike.
+    ``start`` comes by default from zero crossings and the energy of each half swing; TooShortError
+    is raised where the first record gives none. ``offset`` fits the sensor's zero, ``friction``
+    Coulomb friction; ``effects`` act besides (SI), and begin small if given by name. ``free`` names
+    their fitted parameters (``effect.parameter``), by default all but exponents, orders and widths.
     """
     first = runs[0]
     good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
     time, theta = first.time[good], first.angle[good]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
-    # A sensor on the rod does not see where the angle is 0; it has a bias instead.
+    # A sensor on the rod has a bias instead of a zero.
     zeroed = offset and any(run.rod_sensor is None for run in runs)
 
     def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
@@ -339,7 +240,7 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
 
 
 def _sizes(effects: Sequence[Effect]) -> list[str]:
-    """Return the names of all parameters of effects but those of shape."""
+    """Return the names of effects' parameters, without those of shape."""
     return [f"{effect.name}.{size}" for effect in effects for size in effect.sizes]
 
 
@@ -349,13 +250,7 @@ def _start_of(
     theta: NDArray[np.float64],
     sigma: float,
 ) -> Rig:
-    """Return where a search starts: what is given, the rest from the half swings of the record.
-
-    Raises
-    ------
-    TooShortError
-        If ``w0`` is not known and the record gives no start.
-    """
+    """Return where a search starts: given values, the others from the record's half swings."""
     if isinstance(start, Rig):
         return start
     known: dict[str, Any] = dict(start or {})
@@ -367,7 +262,7 @@ def _start_of(
 def _by_peaks(
     time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
 ) -> dict[str, float]:
-    """Return a start from the methods of peaks, which know rotations too."""
+    """Return a start from the methods of peaks, which handle rotations too."""
     try:
         start = starting_values(time, theta, sigma=sigma)
     except InputError:
