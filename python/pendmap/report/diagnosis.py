@@ -205,23 +205,20 @@ def parameters_by_run(found: Discrepancy) -> Section:
     blocks: list[Block] = []
     if not sizes:
         blocks.append("There is no effect to compare between runs.")
-    names = [run.name for run in found.data.fitted]
+    names, head = [run.name for run in found.data.fitted], "standard error, the others held"
     if sizes and len(names) == 1:
         blocks.append("There is one run, and nothing to compare it with.")
     for size in sizes:
         pairs = found.runs.coefficients[size]
         spread = found.runs.between(size) / max(abs(found.best.fitted.fit[size]), 1e-300)
-        said = _said(
-            found.nearest.fitted.fit.estimates[size], math.sqrt(found.nearest.fitted.widening)
-        )
+        nearest = found.nearest.fitted
+        said = _said(nearest.fit.estimates[size], math.sqrt(nearest.widening))
         label = unit_of(size, found.definition)
         shown = [(n, v, e) for n, (v, e) in zip(names, pairs, strict=True) if math.isfinite(e)]
         blind = [n for n, (_, e) in zip(names, pairs, strict=True) if not math.isfinite(e)]
-        differ = (
-            f" Beyond noise they differ by {share(spread)} of it."
-            if spread
-            else " They differ by no more than noise."
-        )
+        differ = " They differ by no more than noise."
+        if spread:
+            differ = f" Beyond noise they differ by {share(spread)} of it."
         if len(names) == 1:
             blocks.append((Name(size), f": {said} {label}".rstrip() + "."))
             continue
@@ -232,11 +229,7 @@ def parameters_by_run(found: Discrepancy) -> Section:
                 differ if len(shown) > 1 else "",
             ),
             Table(
-                (
-                    "run",
-                    f"value ({label})" if label else "value",
-                    "standard error, the others held",
-                ),
+                ("run", f"value ({label})" if label else "value", head),
                 tuple((Name(n), within(v, e), number(e, 2)) for n, v, e in shown),
             ),
         ]
@@ -259,11 +252,7 @@ def ranked(found: Discrepancy) -> Section:
             "fitted with all other parameters: they have the fall of the sum of squares with "
             "Schwarz's penalty, and the least one on a held-out set."
         ),
-        Table(
-            tuple(head),
-            tuple((Name(row[0]), *row[1:]) for row in rows),
-            words=("shape",),
-        ),
+        Table(tuple(head), tuple((Name(row[0]), *row[1:]) for row in rows), words=("shape",)),
         Picture("ranking", "Scores of the candidates at the baseline."),
         *_functions(found),
     ]
@@ -294,6 +283,7 @@ def _functions(found: Discrepancy) -> Iterator[Block]:
 
 
 def _alternatives(found: Discrepancy, each: Identifiability) -> Iterator[Block]:
+    """Yield the table of alternatives of an effect."""
     name = each.candidate.name
     if not each.alternatives:
         yield ("Nothing else of the library could stand in for ", Name(name), ".")
@@ -307,24 +297,23 @@ def _alternatives(found: Discrepancy, each: Identifiability) -> Iterator[Block]:
             "gain which another effect does not reach."
         ),
     )
-    yield Table(
-        ("instead", "gain", "behind", "share", "separation", "why not"),
-        tuple(
-            (
-                Name(alternative.candidate.title),
-                gained(alternative.gain),
-                gained(alternative.behind),
-                number(alternative.separation, 2),
-                gained(alternative.separation * each.gain),
-                _why(alternative),
-            )
-            for alternative in each.alternatives[:ALTERNATIVES]
-        ),
-        words=("why not",),
+    head = ("instead", "gain", "behind", "share", "separation", "why not")
+    rows = tuple(
+        (
+            Name(other.candidate.title),
+            gained(other.gain),
+            gained(other.behind),
+            number(other.separation, 2),
+            gained(other.separation * each.gain),
+            _why(other),
+        )
+        for other in each.alternatives[:ALTERNATIVES]
     )
+    yield Table(head, rows, words=("why not",))
 
 
 def _why(alternative: Alternative) -> str:
+    """Return why an alternative was not accepted."""
     if alternative.contains:
         return "does the same with more parameters and gains no more"
     if alternative.alike:

@@ -62,6 +62,7 @@ def verdict(found: Discrepancy) -> Section:
 
 
 def _statistics(found: Discrepancy) -> Iterator[Text]:
+    """Yield the statistics of the verdict."""
     judged = found.assessment
     form = judged.form
     yield (
@@ -80,19 +81,16 @@ def _statistics(found: Discrepancy) -> Iterator[Text]:
     if judged.identified:
         most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
         left["held_out"] = (f"{number(most, 3)} of chi-squared over degrees of freedom held out",)
+    rare = f"below {number(RARE, 1)}"
     for key, words in left.items():
-        chance_of = _rare(form.chances[key])
-        yield ("Noise alone would leave ", *words, f" with a probability {chance_of}.")
+        chance_of = form.chances[key]
+        said = f"of {number(chance_of, 2)}" if chance_of > RARE else rare
+        yield ("Noise alone would leave ", *words, f" with a probability {said}.")
     yield (
         f"The least of these {count} probabilities, times {count} because so many were looked at, "
-        f"is {number(form.chance, 2) if form.chance > RARE else f'below {number(RARE, 1)}'}. Below "
+        f"is {number(form.chance, 2) if form.chance > RARE else rare}. Below "
         f"{limits.rest:g} it counts as no chance: something is left."
     )
-
-
-def _rare(probability: float) -> str:
-    said = number(probability, 2) if probability > RARE else number(RARE, 1)
-    return f"of {said}" if probability > RARE else f"below {said}"
 
 
 def gap(found: Discrepancy) -> Iterator[Section]:

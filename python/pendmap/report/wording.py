@@ -135,26 +135,15 @@ def lead(found: Discrepancy) -> Parts:
         )
     if found.verdict == "named":
         with_it = "With them" if len(found.effects) > 1 else "With it"
-        return (
-            Strong("The model lacks"),
-            " ",
-            *names,
-            f". {with_it} the residual on held-out data falls {to}; {noise}.",
-        )
+        end = f". {with_it} the residual on held-out data falls {to}; {noise}."
+        return (Strong("The model lacks"), " ", *names, end)
     if found.verdict == "ambiguous":
-        alike = [joined(each, "or") for each in found.equivalent]
-        classes: Parts = tuple(
-            part for k, each in enumerate(alike) for part in (*(("; ",) if k else ()), *each)
+        classes = [part for each in found.equivalent for part in ("; ", *joined(each, "or"))]
+        end = (
+            f". These records do not tell which. With the first, the residual on held-out data "
+            f"falls {to}; {noise}."
         )
-        return (
-            Strong("The model lacks one of a class"),
-            ": ",
-            *classes,
-            (
-                f". These records do not tell which. With the first, the residual on held-out data "
-                f"falls {to}; {noise}."
-            ),
-        )
+        return (Strong("The model lacks one of a class"), ": ", *classes[1:], end)
     if found.verdict == "partial":
         verb = "They close" if len(found.effects) > 1 else "It closes"
         end = (
@@ -162,17 +151,14 @@ def lead(found: Discrepancy) -> Parts:
             f"held-out data falls {to}; {noise}."
         )
         return (Strong("What the model lacks is nearly"), " ", *names, end)
-    near: Parts = ()
-    if nearest:
-        verb = "close" if len(nearest) > 1 else "closes"
-        part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
-        end = f", {verb} {part}; no name is claimed."
-        near = (" What comes nearest, ", *joined(nearest), end)
-    return (
-        Strong("Something is missing that no candidate explains"),
-        f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}.",
-        *near,
-    )
+    missing = Strong("Something is missing that no candidate explains")
+    end = f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}."
+    if not nearest:
+        return missing, end
+    verb = "close" if len(nearest) > 1 else "closes"
+    part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
+    near = f", {verb} {part}; no name is claimed."
+    return (missing, end, " What comes nearest, ", *joined(nearest), near)
 
 
 def compared(found: Discrepancy, table: Table) -> Table:
