@@ -123,7 +123,7 @@ def _separation(ahead: Prospects, total: Information, found: ScoredModel, pair: 
     size = [shared.index(pair.effect.free[0])]
     value = found.fitted.fit[pair.effect.free[0]] ** 2
     places = [ahead.now.places[shape.title] for shape in pair.shapes]
-    # The rival takes the shape that comes nearest.
+    # The alternative takes the nearest shape.
     right = min(float(total.own(size, [*base, *p])[0, 0]) for p in places)
     nearest = min(places, key=lambda p: float(ahead.old.own(size, [*base, *p])[0, 0]))
     weights = ahead.old.followed(size, nearest, base)[:, 0]
