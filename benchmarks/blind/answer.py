@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.blind.cases import SOUND, Case, record
 from benchmarks.blind.difficulty import difficulty, disturbance
 from pendmap import virtual_rig
-from pendmap.comparison.data import evidence_of
+from pendmap.comparison.data import split_records
 from pendmap.diagnosis import diagnose
-from pendmap.diagnosis.baseline import baseline
+from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.errors import InputError
 from pendmap.model.effects import library
 
@@ -99,13 +99,13 @@ def run(case: Case) -> dict[str, Any]:
 def _difficulty(case: Case) -> tuple[dict[str, Any], list[str]]:
     """Return how hard a case is; what spoils its records does not count."""
     plain = dataclasses.replace(case, **SOUND)
-    base, _ = baseline(evidence_of(record(plain).experiment))
+    base, _ = fit_baseline(split_records(record(plain).experiment))
     return difficulty(plain, base)
 
 
 def answer(found: Discrepancy) -> dict[str, Any]:
     """Return what a diagnosis says, and what it rests on."""
-    judgement, held = found.judgement, found.best.held
+    assessment, held = found.assessment, found.best.hold_out
     return {
         "verdict": found.verdict,
         "named": [effect.name for effect in found.effects],
@@ -113,22 +113,22 @@ def answer(found: Discrepancy) -> dict[str, Any]:
         "probability": [effect.probability for effect in found.effects],
         "named_families": [family(effect.name) for effect in found.effects],
         "classes": found.equivalent,
-        "nearest": list(found.nearest.trial.names),
+        "nearest": list(found.nearest.fitted.names),
         "parameters": {e.name: [dict(e.parameters), dict(e.ci95)] for e in found.effects},
         "held": held.chi2 / held.degrees,
-        "closed": judgement.closed,
-        "ratio": [judgement.ratio, judgement.ratio_allowed],
-        "left": [judgement.left, judgement.uneven, judgement.chance],
-        "form": [judgement.form.chance, dict(judgement.form.chances), judgement.form.further],
+        "closed": assessment.closed,
+        "ratio": [assessment.ratio, assessment.ratio_allowed],
+        "left": [assessment.left, assessment.uneven, assessment.chance],
+        "form": [assessment.form.chance, dict(assessment.form.chances), assessment.form.further],
         "standings": [
             {
                 "name": s.candidate.name,
                 "gain": s.gain,
                 "share": s.share,
                 "equivalent": s.equivalent,
-                "rivals": [[r.candidate.name, r.behind, r.contains] for r in s.rivals[:4]],
+                "rivals": [[r.candidate.name, r.behind, r.contains] for r in s.alternatives[:4]],
             }
-            for s in judgement.standings
+            for s in assessment.identified
         ],
         "attempts": [[a.names, a.score, a.gain, a.held_gain, a.accepted] for a in found.attempts],
     }

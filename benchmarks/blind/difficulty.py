@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.blind.cases import record
-from pendmap.comparison.data import Evidence, evidence_of
-from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.candidates import candidates
-from pendmap.diagnosis.fitted_model import fitted
-from pendmap.diagnosis.refit import refitted
-from pendmap.diagnosis.scores import scores_of
+from pendmap.comparison.data import DataSplit, split_records
+from pendmap.diagnosis.baseline import fit_baseline
+from pendmap.diagnosis.candidates import list_candidates
+from pendmap.diagnosis.fitted_model import fit_model
+from pendmap.diagnosis.refit import refit_with
+from pendmap.diagnosis.scores import score_candidates
 from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from benchmarks.blind.cases import Case
-    from pendmap.diagnosis.fitted_model import Trial, Windows
+    from pendmap.diagnosis.fitted_model import FittedModel, Windows
     from pendmap.diagnosis.scores import Scores
 
 CLEAR = 25.0
@@ -39,7 +39,7 @@ CONTAINED = 1e-3
 
 
 def difficulty(
-    case: Case, base: Trial, without: Sequence[str] = ()
+    case: Case, base: FittedModel, without: Sequence[str] = ()
 ) -> tuple[dict[str, Any], list[str]]:
     """Return ``G``, ``s`` and equals of a case on noise-free records, and who is not told apart.
 
@@ -52,17 +52,17 @@ def difficulty(
     for effect in case.effects:
         alone = dataclasses.replace(case, effects=(effect,))
         recorded = record(alone, clean=True)
-        evidence = _with_noise(evidence_of(recorded.experiment), recorded.sigma)
+        data = _with_noise(split_records(recorded.experiment), recorded.sigma)
         # From the noisy fit: what is measured is the effect, not how well a start is found.
-        windows = _windows_at(evidence, base)
-        begin = fitted(evidence, base.fit.model, base.free, start=base.start, windows=windows)
+        windows = _windows_at(data, base)
+        begin = fit_model(data, base.fit.model, base.free, start=base.start, windows=windows)
         # What disturbances or the other effect of a pair did to the windows may lead astray.
-        begin = min((begin, baseline(evidence)[0]), key=lambda trial: trial.chi2)
+        begin = min((begin, fit_baseline(data)[0]), key=lambda fitted: fitted.chi2)
         gains.append(begin.chi2)
         own = effect.split(":")[0]
-        reached, own_equals = _impostors(evidence, begin, own, without)
+        reached, own_equals = _impostors(data, begin, own, without)
         if case.what == "form":
-            left = _left(evidence, begin, own)
+            left = _left(data, begin, own)
         near = {name for name, gain in reached.items() if begin.chi2 - gain < CLEAR}
         alike |= near | own_equals
         equals |= own_equals
@@ -78,29 +78,31 @@ def difficulty(
 def disturbance(case: Case) -> float:
     """Return what a perfect model of a case's disturbances alone would gain."""
     recorded = record(dataclasses.replace(case, effects=("none",), size=1.0))
-    base, _ = baseline(_with_noise(evidence_of(recorded.experiment), recorded.sigma))
+    base, _ = fit_baseline(_with_noise(split_records(recorded.experiment), recorded.sigma))
     return base.chi2 - base.fit.degrees
 
 
-def _left(evidence: Evidence, begin: Trial, own: str) -> float:
+def _left(data: DataSplit, begin: FittedModel, own: str) -> float:
     """Return what the library's effect of a name leaves of a form that differs from its own."""
-    scores = scores_of(
-        evidence, begin, [c for c in candidates({"Tr"}, driven=True) if c[0].name == own]
+    scores = score_candidates(
+        data, begin, [c for c in list_candidates({"Tr"}, driven=True) if c[0].name == own]
     )
-    found = _refitted(evidence, begin, scores, scores.best()[0])
+    found = _refitted(data, begin, scores, scores.best()[0])
     return begin.chi2 if found is None else found.chi2
 
 
-def _refitted(evidence: Evidence, begin: Trial, scores: Scores, place: int) -> Trial | None:
+def _refitted(
+    data: DataSplit, begin: FittedModel, scores: Scores, place: int
+) -> FittedModel | None:
     """Return a model with a candidate; a reading here counts as one, since its noise is known."""
-    return refitted(evidence, Thresholds(), begin, scores, [place], 1.0)
+    return refit_with(data, Thresholds(), begin, scores, [place], 1.0)
 
 
 def _impostors(
-    evidence: Evidence, begin: Trial, own: str, without: Sequence[str]
+    data: DataSplit, begin: FittedModel, own: str, without: Sequence[str]
 ) -> tuple[dict[str, float], set[str]]:
     """Return what each other effect gains of what one alone leaves, and the one's equals."""
-    scores = scores_of(evidence, begin, candidates({"Tr", *without}, driven=evidence.forced))
+    scores = score_candidates(data, begin, list_candidates({"Tr", *without}, driven=data.forced))
     gains, equals = {}, set()
     places = scores.best()
     at = next((k for k in places if scores.scores[k].candidate.name == own), None)
@@ -116,7 +118,7 @@ def _impostors(
         near = begin.chi2 - gain < CLEAR and not more
         if len(gains) < REFITTED and gain > WORTH * begin.chi2 and not near:
             # To first order an effect gains less than it may: its shape was only scanned.
-            found = _refitted(evidence, begin, scores, k)
+            found = _refitted(data, begin, scores, k)
             gain = max(gain, begin.chi2 - found.chi2) if found else gain
             if more and begin.chi2 - gain < max(CONTAINED * begin.chi2, 1.0):
                 equals.add(name)
@@ -125,14 +127,14 @@ def _impostors(
     return gains, equals
 
 
-def _windows_at(evidence: Evidence, base: Trial) -> Windows:
+def _windows_at(data: DataSplit, base: FittedModel) -> Windows:
     """Return a fit's windows for runs of the same motion with other instants.
 
     Readings without noise and counts may be put together where those with them are not.
     """
     moved = []
     for run, first, last, theta, velocity in base.fit.windows:
-        old, new = base.runs[run].time, evidence.fitted[run].time
+        old, new = base.runs[run].time, data.fitted[run].time
         if old.size == new.size:
             moved.append((run, first, last, theta, velocity))
             continue
@@ -143,7 +145,7 @@ def _windows_at(evidence: Evidence, base: Trial) -> Windows:
     return tuple(moved)
 
 
-def _with_noise(evidence: Evidence, sigma: float) -> Evidence:
-    fitted = tuple(dataclasses.replace(run, sigma=sigma) for run in evidence.fitted)
-    held = tuple(dataclasses.replace(run, sigma=sigma) for run in evidence.held)
-    return dataclasses.replace(evidence, fitted=fitted, held=held)
+def _with_noise(data: DataSplit, sigma: float) -> DataSplit:
+    fitted = tuple(dataclasses.replace(run, sigma=sigma) for run in data.fitted)
+    held = tuple(dataclasses.replace(run, sigma=sigma) for run in data.held)
+    return dataclasses.replace(data, fitted=fitted, held=held)

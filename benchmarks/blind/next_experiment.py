@@ -66,7 +66,7 @@ def record(request: virtual_rig.Request) -> Experiment:
         return read_experiment(where.experiment)
 
 
-def enlarged(
+def add_effects(
     request: virtual_rig.Request, old: Experiment, proposal: Proposal, *, pause: float = 20.0
 ) -> Experiment:
     """Return old records with those of a proposal, made by the same rig; no new one is held out."""
@@ -87,10 +87,10 @@ def enlarged(
 
 def outcome(found: Discrepancy, truth: str, others: set[str]) -> dict[str, Any]:
     """Return which name was left, and how far the nearest of the others fell behind the truth."""
-    for standing in found.judgement.standings:
-        name = standing.candidate.name
-        behind = {r.candidate.name: r.behind for r in standing.rivals}
-        alike = {r.candidate.name for r in standing.rivals if r.alike}
+    for each in found.assessment.identified:
+        name = each.candidate.name
+        behind = {r.candidate.name: r.behind for r in each.alternatives}
+        alike = {r.candidate.name for r in each.alternatives if r.alike}
         if name == truth:
             near = [behind[other] for other in others if other in behind]
             left = "right" if not alike & others else "both"
@@ -129,7 +129,7 @@ def case(seed: int) -> list[dict[str, Any]]:
         choices["weaker"] = weaker[int(rng.integers(len(weaker)))]
     rows = []
     for choice, prospect in choices.items():
-        again = diagnose(enlarged(request, old, prospect.proposal))
+        again = diagnose(add_effects(request, old, prospect.proposal))
         others = set(outlook.about) - {truth}
         rows.append(
             {

@@ -57,7 +57,7 @@ from benchmarks.blind.report import right, strength, true_names, wilson
 from benchmarks.blind.sindy_choice import choose
 from benchmarks.blind.sindy_forms import Setting, prepared, regression
 from benchmarks.peers.report import machine, note, say, table
-from pendmap.comparison.data import evidence_of
+from pendmap.comparison.data import split_records
 from pendmap.identification.methods.joint import as_fit_run
 
 WIDTH = 2.0
@@ -86,8 +86,8 @@ def case_of(row: dict[str, Any]) -> Case:
 def run(row: dict[str, Any]) -> dict[str, Any]:
     """Make a row's experiment again and let SINDy answer."""
     result: dict[str, Any] = {"what": row["what"], "seed": row["seed"]}
-    evidence = evidence_of(record(case_of(row)).experiment)
-    runs = [as_fit_run(*pair) for pair in zip(evidence.runs, evidence.readings, strict=True)]
+    records = split_records(record(case_of(row)).experiment)
+    runs = [as_fit_run(*pair) for pair in zip(records.runs, records.readings, strict=True)]
     begin = time.process_time()
     data = prepared(runs, WIDTH)
     shared = time.process_time() - begin

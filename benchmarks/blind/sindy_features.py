@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from pendmap.diagnosis.candidates import Candidate, candidates
+from pendmap.diagnosis.candidates import Candidate, list_candidates
 from pendmap.model import Rig
 from pendmap.virtual_rig import EFFECTS
 from pendmap.virtual_rig.effects.base import Drive
@@ -148,7 +148,7 @@ def smoothed(runs: Sequence[FitRun], width: float) -> tuple[list[States], Parame
 def features(every: Iterable[States], rig: Parameters) -> list[tuple[Candidate, Feature]]:
     """Return the features that these records may show."""
     forced = any(s.run.drive is not None for s in every)
-    pool = candidates({"viscous_damping", "coulomb_friction"}, driven=forced)
+    pool = list_candidates({"viscous_damping", "coulomb_friction"}, driven=forced)
     found = []
     for candidate in (c for shapes in pool for c in shapes):
         kind = EFFECTS[candidate.name]

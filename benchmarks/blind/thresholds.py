@@ -30,10 +30,10 @@ from benchmarks.blind.cases import Case, record
 from benchmarks.blind.run import drawn, rows_of
 from benchmarks.peers.report import machine, note, say, table
 from pendmap import comparison
-from pendmap.comparison.data import Evidence
-from pendmap.diagnosis import diagnose, fitted_model, held, model_error, physical, refit, scores
-from pendmap.diagnosis.fitted_model import Trial
-from pendmap.diagnosis.held import Held
+from pendmap.comparison.data import DataSplit
+from pendmap.diagnosis import diagnose, fitted_model, hold_out, refit, scores
+from pendmap.diagnosis.fitted_model import FittedModel
+from pendmap.diagnosis.hold_out import HoldOut
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
 from pendmap.identification.fit import TrajectoryFit
@@ -41,7 +41,7 @@ from pendmap.identification.runs import FitRun
 from pendmap.model.effects import library
 from pendmap.records import Experiment
 from pendmap.residuals import by_run, torque
-from pendmap.residuals.noise import Remainder
+from pendmap.residuals.noise import ResidualNoise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -59,20 +59,20 @@ def changed(name: str, factor: float) -> Thresholds:
     return dataclasses.replace(Thresholds(), **{name: new})
 
 
-KNOWN_BY_ITSELF = (Experiment, FitRun, Held, Remainder, TrajectoryFit, Trial)
+KNOWN_BY_ITSELF = (Experiment, FitRun, HoldOut, ResidualNoise, TrajectoryFit, FittedModel)
 """Arguments that are the same ones from search to search where all before them were."""
 
 REMEMBERED = {
-    "evidence_of": comparison.data,
-    "weighted": model_error,
-    "fitted": fitted_model,
-    "within_physics": physical,
-    "scores_of": scores,
-    "tried": held,
-    "predictive": held,
-    "profiles": refit,
+    "split_records": comparison.data,
+    "weight_records": fitted_model,
+    "fit_model": fitted_model,
+    "impose_physics": fitted_model,
+    "score_candidates": scores,
+    "evaluate_hold_out": hold_out,
+    "hold_out_losses": hold_out,
+    "profile_intervals": refit,
     "residual_torque": torque,
-    "run_by_run": by_run,
+    "parameters_by_run": by_run,
 }
 """Functions whose results are remembered, and their modules."""
 
@@ -86,7 +86,7 @@ def remembered(compute: Callable[..., Any]) -> Callable[..., Any]:
         if isinstance(value, KNOWN_BY_ITSELF):
             kept.append(value)
             return id(value)
-        if isinstance(value, Evidence):
+        if isinstance(value, DataSplit):
             parts = (value.fitted, value.held, value.fitted_of, value.held_of, value.inside)
             return [key_of(part) for part in parts]
         if isinstance(value, tuple | list):

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import pendmap
-from pendmap.diagnosis.fitted_model import Trial
+from pendmap.diagnosis.fitted_model import FittedModel
 from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.residuals.noise import Remainder
+    from pendmap.residuals.noise import ResidualNoise
 
     Floats = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def counted(rng: np.random.Generator, noise: Floats) -> Floats:
     return np.asarray(COUNT * np.round((motion + noise) / COUNT) - motion, np.float64)
 
 
-def remainder(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> Remainder:
+def noise_of(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> ResidualNoise:
     """Return what residuals hold beside the swing, which is fitted here.
 
     ``floor`` is the variance of rounding, in the residuals' units squared.
@@ -58,10 +58,10 @@ def remainder(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> 
     if fitted:
         basis = swing(residuals.shape[1])
         residuals = residuals - residuals @ basis.T @ basis
-    return trial(residuals, floor).remainder
+    return fitted_to(residuals, floor).noise
 
 
-def trial(residuals: Floats, floor: float = 0.0) -> Trial:
+def fitted_to(residuals: Floats, floor: float = 0.0) -> FittedModel:
     """Return a fit that leaves these residuals, each run's along a row."""
     count, samples = residuals.shape
     runs = [FitRun(INTERVAL * np.arange(samples), np.zeros(samples), 1.0) for _ in residuals]
@@ -75,4 +75,4 @@ def trial(residuals: Floats, floor: float = 0.0) -> Trial:
         estimates={},
         model=pendmap.Rig(w0=W0),
     )
-    return Trial(fit, (), (), tuple(runs), (floor,) * count)  # type: ignore[arg-type]
+    return FittedModel(fit, (), (), tuple(runs), (floor,) * count)  # type: ignore[arg-type]

@@ -88,7 +88,7 @@ def test_the_torque_of_a_spring_is_called_elastic_with_reserve(tmp_path: Path) -
     assert effect.name == "elastic_restoring"
     assert effect.approximate
     assert effect.parameters["k"] == pytest.approx(36.25, rel=1e-3)
-    assert found.best.trial.fit.model.w0 < 0.1
+    assert found.best.fitted.fit.model.w0 < 0.1
 
 
 def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Path) -> None:

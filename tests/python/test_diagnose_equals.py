@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pendmap import virtual_rig
-from pendmap.comparison.data import evidence_of
-from pendmap.diagnosis.baseline import baseline
+from pendmap.comparison.data import split_records
+from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import Candidate
-from pendmap.diagnosis.scores import Scores, scores_of
+from pendmap.diagnosis.scores import Scores, score_candidates
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ def scored(folder: Path, names: list[str | Candidate], *, forced: int) -> Scores
     request = virtual_rig.Request("hidden", seed=4, effects=("none",), free=2, forced=forced)
     where = virtual_rig.places(folder / "plain", replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
-    evidence = evidence_of(read_experiment(where.experiment))
+    data = split_records(read_experiment(where.experiment))
     pool = [[Candidate(n) if isinstance(n, str) else n] for n in names]
-    return scores_of(evidence, baseline(evidence)[0], pool)
+    return score_candidates(data, fit_baseline(data)[0], pool)
 
 
 @pytest.mark.parametrize(

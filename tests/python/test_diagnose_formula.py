@@ -13,7 +13,7 @@ import pytest
 from bumpy import BUMP, FILE, experiment, torque
 from pendmap import Formula, InputError, Rig, load_formulas, load_model
 from pendmap.diagnosis import TorqueFunction, diagnose
-from pendmap.diagnosis.functions import call_once
+from pendmap.diagnosis.functions import check_functions
 from pendmap.diagnosis.result import as_text
 from pendmap.records import read_experiment
 
@@ -67,13 +67,13 @@ def test_functions_are_scored_beside(tmp_path: Path) -> None:
     found = diagnose(records, effects=functions)
     assert found.verdict not in {"none", "named"}
     shares = [line for line in as_text(found) if line.startswith("Share")]
-    assert len(shares) == bool(found.nearest.trial.names)
+    assert len(shares) == bool(found.nearest.fitted.names)
     nearest = [line for line in shares if "closed by what is nearest: " in line]
     assert nearest == (shares if found.verdict == "unknown" else [])
     table, slope = found.functions
     assert (table.name, slope.name) == ("table", "slope")
     assert table.size == pytest.approx(1.0, abs=0.3)
-    level = found.base.trial.remainder.level
+    level = found.base.fitted.noise.level
     best = max(score.gain for score in found.scores.scores) / level
     assert table.gain > best
     assert table.gain > 2 * slope.gain
@@ -101,7 +101,7 @@ def test_a_function_s_faults_are_said_on_one_line(
     records = read_experiment(experiment(tmp_path / "records"))
     # Before anything is fitted, which takes a while.
     module = importlib.import_module("pendmap.diagnosis.diagnose")
-    monkeypatch.setattr(module, "baseline", pytest.fail)
+    monkeypatch.setattr(module, "fit_baseline", pytest.fail)
     with (
         np.errstate(divide="ignore", invalid="ignore"),
         pytest.raises(InputError, match=said) as caught,
@@ -114,7 +114,7 @@ def test_what_a_function_has_no_value_for_between_readings_is_no_fault(tmp_path:
     records = read_experiment(experiment(tmp_path / "records"))
     # Readings in counts stay: exactly 0 is no velocity, and no angle, of a motion.
     function = TorqueFunction("mine", lambda th, v, *_: v / np.abs(v) + np.sin(th) / th)
-    call_once(records.runs, [function])
+    check_functions(records.runs, [function])
 
 
 def test_what_cannot_be_a_candidate_is_refused(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_a_chirp_of_the_only_forced_run_is_named(
             lost.append(error)
             raise
 
-    for module in ("fitted_model", "held"):
+    for module in ("fitted_model", "hold_out"):
         monkeypatch.setattr(f"pendmap.diagnosis.{module}.fit_runs", watched)
     request = virtual_rig.Request(
         "hidden", seed=3, effects=("drive_chirp",), size=4.0, free=4, forced=1
@@ -148,9 +148,9 @@ def test_what_no_library_has_is_named_with_reserve_where_it_closes_a_part(tmp_pa
     found, _ = diagnosed(tmp_path, "base_sway", seed=1, without=("base_sway", "impulses"))
     assert found.verdict in {"unknown", "partial"}
     assert all(effect.approximate for effect in found.effects)
-    assert found.judgement.form.chance < 1e-3
+    assert found.assessment.form.chance < 1e-3
     # The model that is given out has what is claimed, and nothing else.
-    assert set(found.best.trial.names) - {"encoder_offset"} <= {e.name for e in found.effects}
+    assert set(found.best.fitted.names) - {"encoder_offset"} <= {e.name for e in found.effects}
 
 
 def test_what_a_first_step_would_lose_is_found(tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_what_a_first_step_would_lose_is_found(tmp_path: Path) -> None:
     )
     assert found.verdict != "unknown"
     assert "asymmetric_viscous" in _names(found)
-    assert found.best.held.chi2 < found.base.held.chi2
+    assert found.best.hold_out.chi2 < found.base.hold_out.chi2
 
 
 @pytest.mark.parametrize("most", [0, 1])
@@ -173,11 +173,11 @@ def test_no_more_is_added_than_is_allowed(most: int, tmp_path: Path) -> None:
     pair = ("quadratic_drag", "bearing_harmonic")
     given = {"size": 4.0, "noise": 0.1, "free": 3, "forced": 0}
     found, _ = diagnosed(tmp_path, *pair, seed=1, max_effects=most, **given)
-    counted = [name for name in found.nearest.trial.names if name != "encoder_offset"]
+    counted = [name for name in found.nearest.fitted.names if name != "encoder_offset"]
     assert len(counted) <= most
     if not most:
         # The sensor's zero does not count, but it is not claimed.
-        assert found.best.trial.chosen == ()
+        assert found.best.fitted.chosen == ()
         assert found.best is found.base
         assert found.attempts == ()
         assert found.effects == ()

@@ -8,42 +8,42 @@ from typing import TYPE_CHECKING
 import pytest
 
 from hidden import diagnosed
-from pendmap.diagnosis.fitted_model import fitted
-from pendmap.diagnosis.refit import better_side
+from pendmap.diagnosis.fitted_model import fit_model
+from pendmap.diagnosis.refit import try_mirrored_places
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from pendmap.diagnosis import Discrepancy
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.fitted_model import FittedModel
 
 
-def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> Trial:
+def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> FittedModel:
     """The model fitted again from another value of a parameter, held there or not."""
-    trial = found.best.trial
+    fitted = found.best.fitted
     effect, parameter = key.split(".")
-    model = trial.fit.model
+    model = fitted.fit.model
     effects = tuple(
         dataclasses.replace(e, parameters={**e.parameters, parameter: value})
         if e.name == effect
         else e
         for e in model.effects
     )
-    return fitted(
-        found.evidence,
+    return fit_model(
+        found.data,
         dataclasses.replace(model, effects=effects),
-        [name for name in trial.free if name != key or not held],
-        trial.chosen,
-        start={n: v for n, v in trial.start.items() if n != key} | ({} if held else {key: value}),
-        windows=trial.fit.windows,
+        [name for name in fitted.free if name != key or not held],
+        fitted.chosen,
+        start={n: v for n, v in fitted.start.items() if n != key} | ({} if held else {key: value}),
+        windows=fitted.fit.windows,
         steps=100,
     )
 
 
 def _risen(found: Discrepancy, key: str, value: float) -> float:
     """By how much the least sum of squares rises with a parameter held, over that of noise."""
-    trial = found.best.trial
-    return (_from(found, key, value, held=True).chi2 - trial.chi2) / trial.widening
+    fitted = found.best.fitted
+    return (_from(found, key, value, held=True).chi2 - fitted.chi2) / fitted.widening
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_place_that_may_be_on_either_side_is_given_twice(tmp_path: Path) -> No
     there, other = named.parameters["th0"], named.elsewhere["th0"]
     assert there * other < 0
     th0 = truth["rough_spot"]["th0"]
-    error = found.best.trial.fit.estimates["rough_spot.th0"].stderr
+    error = found.best.fitted.fit.estimates["rough_spot.th0"].stderr
     assert min(abs(there - th0), abs(other - th0)) < 3 * error
 
 
@@ -85,11 +85,11 @@ def test_a_place_that_is_known_is_given_once(tmp_path: Path) -> None:
     assert named.elsewhere == {}
     assert named.parameters["th0"] * truth["rough_spot"]["th0"] > 0
     # A fit that began on the other side stays there, until it is asked to change over.
-    key, best = "rough_spot.th0", found.best.trial
+    key, best = "rough_spot.th0", found.best.fitted
     astray = _from(found, key, -named.parameters["th0"], held=False)
     assert astray.chi2 > best.chi2 + 20
     assert astray.fit[key] * named.parameters["th0"] < 0
-    back = better_side(found.evidence, astray)
+    back = try_mirrored_places(found.data, astray)
     assert back.chi2 == pytest.approx(best.chi2, abs=0.5)
     assert back.fit[key] == pytest.approx(named.parameters["th0"], rel=1e-2)
-    assert better_side(found.evidence, best) is best
+    assert try_mirrored_places(found.data, best) is best

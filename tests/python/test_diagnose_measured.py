@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pendmap.diagnosis import diagnose
-from pendmap.diagnosis.physical import within_physics
+from pendmap.diagnosis.fitted_model import impose_physics
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
@@ -64,22 +64,22 @@ def check_named(diagnosis: Discrepancy) -> None:
     names = [effect.name for effect in diagnosis.effects]
     assert names[0] == "quadratic_drag"
     assert not [name for name in names if name.endswith("warm_up")]
-    estimates = diagnosis.best.trial.fit.estimates
+    estimates = diagnosis.best.fitted.fit.estimates
     for name in ("c_over_m", "Tr", "quadratic_drag.q"):
         assert name not in estimates or estimates[name].value >= 0
-    trial = diagnosis.best.trial
-    assert within_physics(diagnosis.evidence, trial) is trial
+    fitted = diagnosis.best.fitted
+    assert impose_physics(diagnosis.data, fitted) is fitted
     # Far more is left than noise: what is named is not all.
     assert diagnosis.verdict == "partial"
     assert all(effect.approximate for effect in diagnosis.effects)
-    assert diagnosis.judgement.closed > 0.9
+    assert diagnosis.assessment.closed > 0.9
 
 
 @pytest.mark.parametrize("name", BY_HAND)
 def test_the_drag_is_named_first_and_little_more_is_left_than_by_hand(name: str) -> None:
     diagnosis = found(name)
     check_named(diagnosis)
-    fit = diagnosis.best.trial.fit
+    fit = diagnosis.best.fitted.fit
     # One initial state for the whole record.
     assert len(fit.windows) == 1
     assert fit.rms <= 1.2 * BY_HAND[name]
@@ -89,6 +89,6 @@ def test_the_drag_is_named_first_and_little_more_is_left_than_by_hand(name: str)
 def test_decays_of_one_pendulum_foretell_the_one_held_out() -> None:
     diagnosis = found("cartpend")
     check_named(diagnosis)
-    (held,) = diagnosis.evidence.held
+    (held,) = diagnosis.data.held
     assert held.name == f"cartpend_{HELD}"
     assert diagnosis.gap.held_out_after <= 1.3 * HELD_BY_HAND

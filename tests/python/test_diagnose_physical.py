@@ -12,11 +12,10 @@ from scipy.integrate import solve_ivp
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import report, virtual_rig
-from pendmap.comparison.data import Evidence, evidence_of
+from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis import diagnose, diagnosed_model
 from pendmap.diagnosis.candidates import Candidate
-from pendmap.diagnosis.fitted_model import Trial, fitted
-from pendmap.diagnosis.physical import within_physics
+from pendmap.diagnosis.fitted_model import FittedModel, fit_model, impose_physics
 from pendmap.diagnosis.result import as_text
 from pendmap.diagnosis.summary import as_json
 from pendmap.errors import InputError
@@ -37,27 +36,27 @@ def decay(c_over_m: float = 0.0, drag: float = Q, seed: int = 1) -> Experiment:
     return Experiment(Path("there"), (run,))
 
 
-def with_effect(evidence: Evidence, effect: str, steps: int = 40, **parameters: float) -> Trial:
+def with_effect(data: DataSplit, effect: str, steps: int = 40, **parameters: float) -> FittedModel:
     """Fit an effect, or only see how well its parameters are known where they are put."""
     shape = dict(list(parameters.items())[1:])
     model = Rig(W0, c_over_m=0.05, Tr=TR, effects=(Effect(effect, parameters),))
     free = [*BASE, *(f"{effect}.{name}" for name in parameters)]
-    return fitted(evidence, model, free, [Candidate(effect, shape)], steps=steps)
+    return fit_model(data, model, free, [Candidate(effect, shape)], steps=steps)
 
 
 def test_damping_that_the_fit_makes_negative_is_held_at_0_and_the_rest_fitted_again() -> None:
     # The damping is 0 in truth; this noise takes its fit below.
-    evidence = evidence_of(decay(seed=4))
-    free = with_effect(evidence, "quadratic_drag", q=0.01)
+    data = split_records(decay(seed=4))
+    free = with_effect(data, "quadratic_drag", q=0.01)
     assert free.fit["c_over_m"] < -1e-4
-    held = within_physics(evidence, free)
+    held = impose_physics(data, free)
     assert held is not None
     assert held.zeroed == ("c_over_m",)
     assert held.fit.model.c_over_m == 0
     assert "c_over_m" not in held.fit.estimates
     # The coefficient alone at 0, the others as they were, fits worse than those found again.
     start = {n: v for n, v in free.start.items() if n != "c_over_m"}
-    kept = fitted(evidence, held.fit.model, held.free, held.chosen, start=start, steps=0)
+    kept = fit_model(data, held.fit.model, held.free, held.chosen, start=start, steps=0)
     assert free.chi2 < held.chi2 < kept.chi2
     for name, true in (("w0", W0), ("Tr", TR), ("quadratic_drag.q", Q)):
         estimate = held.fit.estimates[name]
@@ -65,17 +64,17 @@ def test_damping_that_the_fit_makes_negative_is_held_at_0_and_the_rest_fitted_ag
 
 
 def test_what_is_physical_stays_as_it_is() -> None:
-    evidence = evidence_of(decay(c_over_m=0.05))
-    trial = with_effect(evidence, "quadratic_drag", q=0.01)
-    assert within_physics(evidence, trial) is trial
+    data = split_records(decay(c_over_m=0.05))
+    fitted = with_effect(data, "quadratic_drag", q=0.01)
+    assert impose_physics(data, fitted) is fitted
 
 
 def test_a_drag_that_drives_is_no_effect() -> None:
     # Damping less a part that grows with the velocity: drag of the wrong sign fits it best.
-    evidence = evidence_of(decay(c_over_m=0.15, drag=-0.01))
-    trial = with_effect(evidence, "quadratic_drag", q=0.01)
-    assert trial.fit["quadratic_drag.q"] == pytest.approx(-0.01, rel=0.1)
-    assert within_physics(evidence, trial) is None
+    data = split_records(decay(c_over_m=0.15, drag=-0.01))
+    fitted = with_effect(data, "quadratic_drag", q=0.01)
+    assert fitted.fit["quadratic_drag.q"] == pytest.approx(-0.01, rel=0.1)
+    assert impose_physics(data, fitted) is None
 
 
 @pytest.mark.parametrize(
@@ -85,9 +84,9 @@ def test_a_drag_that_drives_is_no_effect() -> None:
 def test_a_time_constant_is_a_swing_at_least_and_the_record_at_most(
     tau: float, *, possible: bool
 ) -> None:
-    evidence = evidence_of(decay(c_over_m=0.05))
-    trial = with_effect(evidence, "viscous_warm_up", steps=0, b=0.01, tau=tau)
-    assert (within_physics(evidence, trial) is not None) is possible
+    data = split_records(decay(c_over_m=0.05))
+    fitted = with_effect(data, "viscous_warm_up", steps=0, b=0.01, tau=tau)
+    assert (impose_physics(data, fitted) is not None) is possible
 
 
 def test_the_model_that_is_printed_is_the_one_that_is_written(tmp_path: Path) -> None:
@@ -95,12 +94,12 @@ def test_the_model_that_is_printed_is_the_one_that_is_written(tmp_path: Path) ->
     found, _ = diagnosed(
         tmp_path, "cubic_damping", seed=5, size=3.0, free=3, forced=0, max_effects=0
     )
-    trial = found.best.trial
-    assert trial.zeroed == ("Tr",)
+    fitted = found.best.fitted
+    assert fitted.zeroed == ("Tr",)
     fields = as_json(found)
     assert fields["set_to_zero"] == ["Tr"]
     assert "unphysical" not in fields
-    assert fields["model_file"]["rms"] == trial.fit.rms
+    assert fields["model_file"]["rms"] == fitted.fit.rms
     assert "Tr" not in fields["parameters"]
     (line,) = (line for line in as_text(found) if line.startswith("Tr is held at 0"))
     assert "no pendulum drives itself" in line
@@ -142,7 +141,7 @@ def test_a_drift_takes_no_friction_below_0(part: float, *, possible: bool) -> No
     path = solve_ivp(rhs, (0, TIME[-1]), (2.4, 0.0), "LSODA", TIME, rtol=1e-9, atol=1e-10)
     theta = path.y[0] + np.random.default_rng(1).normal(0, 1e-3, TIME.shape)
     run = Run("a", "a.csv", "free", TIME, theta, np.ones(TIME.size, bool))
-    evidence = evidence_of(Experiment(Path("there"), (run,)))
-    trial = with_effect(evidence, "coulomb_drift", r=-0.1 * TR / TIME[-1])
-    assert trial.fit["coulomb_drift.r"] == pytest.approx(-part * TR / TIME[-1], rel=0.1)
-    assert (within_physics(evidence, trial) is not None) is possible
+    data = split_records(Experiment(Path("there"), (run,)))
+    fitted = with_effect(data, "coulomb_drift", r=-0.1 * TR / TIME[-1])
+    assert fitted.fit["coulomb_drift.r"] == pytest.approx(-part * TR / TIME[-1], rel=0.1)
+    assert (impose_physics(data, fitted) is not None) is possible

@@ -13,19 +13,18 @@ import pytest
 import pendmap
 from driven_decays import motion
 from hidden import diagnosed
-from pendmap.comparison.data import evidence_of
-from pendmap.diagnosis.alternatives import Rival, Standing
-from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.candidates import candidates
+from pendmap.comparison.data import split_records
+from pendmap.diagnosis.baseline import fit_baseline
+from pendmap.diagnosis.candidates import list_candidates
 from pendmap.diagnosis.search import search
-from pendmap.diagnosis.state import Found, State
+from pendmap.diagnosis.state import ScoredModel, State
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.diagnosis.verdict import judge, probabilities
+from pendmap.diagnosis.verdict import Alternative, Identifiability, decide_verdict, probabilities
 from pendmap.records import Experiment, Run
-from pendmap.residuals.by_run import RunByRun, run_by_run
+from pendmap.residuals.by_run import RunByRun, parameters_by_run
 
 if TYPE_CHECKING:
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.fitted_model import FittedModel
 
 CHANCE, SURE = Thresholds().rest, Thresholds().sure
 
@@ -47,8 +46,8 @@ def test_probability_falls_with_what_is_left_and_with_how_many_effects_it_took()
 def test_nothing_left_is_chance(tmp_path: Path) -> None:
     found, _ = diagnosed(tmp_path, free=3, forced=0)
     assert found.verdict == "none"
-    assert found.judgement.form.chance > CHANCE
-    assert all(0 <= chance <= 1 for chance in found.judgement.form.chances.values())
+    assert found.assessment.form.chance > CHANCE
+    assert all(0 <= chance <= 1 for chance in found.assessment.form.chances.values())
 
 
 def test_a_form_that_the_library_lacks_shows_in_what_is_left(tmp_path: Path) -> None:
@@ -56,7 +55,7 @@ def test_a_form_that_the_library_lacks_shows_in_what_is_left(tmp_path: Path) -> 
         tmp_path, "encoder_gain", size=3.0, free=3, forced=0, without=("encoder_gain",)
     )
     assert found.verdict in {"unknown", "partial"}
-    assert found.judgement.form.chance < CHANCE
+    assert found.assessment.form.chance < CHANCE
 
 
 @pytest.mark.parametrize("seed", [3, 5])
@@ -67,11 +66,11 @@ def test_what_two_others_do_together_is_given_with_reserve(seed: int, tmp_path: 
         tmp_path, "quadratic_drag", seed=seed, size=3.0, free=3, forced=0, without=own
     )
     assert found.effects == () or all(effect.approximate for effect in found.effects)
-    assert min(found.judgement.probabilities) < SURE
+    assert min(found.assessment.probabilities) < SURE
 
 
 @pytest.fixture(scope="module")
-def waving() -> tuple[State, Found]:
+def waving() -> tuple[State, ScoredModel]:
     """Decays with drag, made by scipy, whose readings have a wave that no effect has."""
     time = np.arange(1500) * 0.02
     runs = []
@@ -81,14 +80,14 @@ def waving() -> tuple[State, Found]:
         theta += 6e-3 * np.sin(time * (1 + start))
         good = np.ones(time.size, bool)
         runs.append(Run(name, f"{name}.csv", "free", time, theta, good))
-    evidence = evidence_of(Experiment(Path("there"), tuple(runs)))
-    base, core = baseline(evidence)
-    state = State(evidence, base, Thresholds(), 3, ())
-    return state, state.found(search(state, core, lambda _: None))
+    data = split_records(Experiment(Path("there"), tuple(runs)))
+    base, core = fit_baseline(data)
+    state = State(data, base, Thresholds(), 3, ())
+    return state, state.scored(search(state, core, lambda _: None))
 
 
-def runs_of(state: State, trial: Trial) -> RunByRun:
-    return run_by_run(state.evidence.fitted, trial.fit, trial.remainder, trial.level)
+def runs_of(state: State, fitted: FittedModel) -> RunByRun:
+    return parameters_by_run(state.data.fitted, fitted.fit, fitted.noise, fitted.level)
 
 
 @pytest.mark.parametrize(
@@ -101,36 +100,38 @@ def runs_of(state: State, trial: Trial) -> RunByRun:
     ],
 )
 def test_what_is_partial(
-    change: dict[str, float], verdict: str, waving: tuple[State, Found]
+    change: dict[str, float], verdict: str, waving: tuple[State, ScoredModel]
 ) -> None:
     state, best = waving
-    assert best.trial.names == ("quadratic_drag",)
+    assert best.fitted.names == ("quadratic_drag",)
     state.thresholds = Thresholds(**change)  # type: ignore[arg-type]
-    judged = judge(state, best, runs_of(state, best.trial), 1.0)
+    judged = decide_verdict(state, best, runs_of(state, best.fitted), 1.0)
     assert judged.closed > 0.5
     assert judged.verdict == verdict
     assert judged.approximate is (verdict == "partial" or min(judged.probabilities) < SURE)
 
 
-def test_the_effect_that_closes_most_comes_first(waving: tuple[State, Found]) -> None:
+def test_the_effect_that_closes_most_comes_first(waving: tuple[State, ScoredModel]) -> None:
     state, best = waving
-    scores = state.scores(best.trial)
+    scores = state.scores(best.fitted)
     place = next(k for k in scores.best() if scores.scores[k].candidate.name == "encoder_gain")
-    both = state.refit(best.trial, [place])
+    both = state.refit(best.fitted, [place])
     assert both is not None
     for chosen in (both.chosen, both.chosen[::-1]):
-        trial = dataclasses.replace(both, chosen=chosen)
-        judged = judge(state, state.found(trial), runs_of(state, trial), 1.0)
-        assert [s.candidate.name for s in judged.standings] == ["quadratic_drag", "encoder_gain"]
-        assert judged.standings[0].gain > judged.standings[1].gain
+        fitted = dataclasses.replace(both, chosen=chosen)
+        judged = decide_verdict(state, state.scored(fitted), runs_of(state, fitted), 1.0)
+        assert [s.candidate.name for s in judged.identified] == ["quadratic_drag", "encoder_gain"]
+        assert judged.identified[0].gain > judged.identified[1].gain
 
 
 def test_what_has_the_name_as_a_special_case_takes_no_share() -> None:
-    named = {c.name: c for c, *_ in candidates((), driven=False)}
+    named = {c.name: c for c, *_ in list_candidates((), driven=False)}
 
-    def rival(name: str, behind: float, *, contains: bool, alike: bool | None = None) -> Rival:
+    def alternative(
+        name: str, behind: float, *, contains: bool, alike: bool | None = None
+    ) -> Alternative:
         far = behind / 500.0
-        return Rival(
+        return Alternative(
             named[name],
             500.0 - behind,
             behind,
@@ -141,26 +142,26 @@ def test_what_has_the_name_as_a_special_case_takes_no_share() -> None:
             alike=behind < Thresholds().alike if alike is None else alike,
         )
 
-    def standing(*rivals: Rival) -> Standing:
-        return Standing(named["quadratic_drag"], 500.0, 1.0, rivals)
+    def each(*alternatives: Alternative) -> Identifiability:
+        return Identifiability(named["quadratic_drag"], 500.0, 1.0, alternatives)
 
-    assert standing().share == 1.0
+    assert each().share == 1.0
     # What has the name as a special case takes nothing from it.
-    power = standing(rival("power_law_drag", 0.0, contains=True))
+    power = each(alternative("power_law_drag", 0.0, contains=True))
     assert power.share == 1.0
     assert power.equivalent == ["quadratic_drag"]
-    cubic = standing(rival("cubic_damping", 0.0, contains=False))
+    cubic = each(alternative("cubic_damping", 0.0, contains=False))
     assert cubic.share == 0.5
     assert cubic.equivalent == ["quadratic_drag", "cubic_damping"]
-    both = standing(*cubic.rivals, *power.rivals)
+    both = each(*cubic.alternatives, *power.alternatives)
     assert both.equivalent == ["quadratic_drag", "cubic_damping", "power_law_drag"]
     # exp(-6 / 2) to 1.
-    behind = standing(rival("cubic_damping", 6.0, contains=False))
+    behind = each(alternative("cubic_damping", 6.0, contains=False))
     assert behind.share == pytest.approx(1 / (1 + math.exp(-3)))
     # One run alone may say all against it, and it is a name all the same.
-    one = standing(rival("cubic_damping", 30.0, contains=False, alike=True))
+    one = each(alternative("cubic_damping", 30.0, contains=False, alike=True))
     assert one.equivalent == ["quadratic_drag", "cubic_damping"]
-    assert standing(rival("cubic_damping", 30.0, contains=False)).equivalent == ["quadratic_drag"]
+    assert each(alternative("cubic_damping", 30.0, contains=False)).equivalent == ["quadratic_drag"]
 
 
 @pytest.mark.parametrize("seed", [34, 43])

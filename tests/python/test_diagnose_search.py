@@ -12,56 +12,55 @@ import pytest
 
 from driven_decays import motion
 from pendmap import read_experiment, virtual_rig
-from pendmap.comparison.data import Evidence, evidence_of
-from pendmap.diagnosis.alternatives import standing_of
-from pendmap.diagnosis.baseline import baseline
+from pendmap.comparison.data import DataSplit, split_records
+from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import CORE, Candidate
-from pendmap.diagnosis.fitted_model import with_candidates
-from pendmap.diagnosis.held import predictive
-from pendmap.diagnosis.prune import pruned
-from pendmap.diagnosis.search import search
+from pendmap.diagnosis.fitted_model import fit_with_candidates
+from pendmap.diagnosis.hold_out import hold_out_losses
+from pendmap.diagnosis.search import prune_effects, search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
+from pendmap.diagnosis.verdict import compare_alternatives
 from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fit import fit_runs
 from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.fitted_model import FittedModel
 
 
-def recorded(folder: Path, *effects: str, **given: float) -> Evidence:
+def recorded(folder: Path, *effects: str, **given: float) -> DataSplit:
     asked = {"seed": 3, "free": 3, "forced": 0} | given
     request = virtual_rig.Request("hidden", effects=effects, **asked)  # type: ignore[arg-type]
     where = virtual_rig.places(folder / "lab", replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
-    return evidence_of(read_experiment(where.experiment))
+    return split_records(read_experiment(where.experiment))
 
 
-def decay(drag: float) -> Evidence:
+def decay(drag: float) -> DataSplit:
     """A free decay made by scipy, with noise of 2 mrad."""
     time = np.arange(1500) * 0.02
     theta = motion(time, (2.2, 0.0), w0=6.2, c_over_m=0.05, friction=0.05, drag=drag)
     theta = theta + np.random.default_rng(1).normal(0, 2e-3, time.shape)
     run = Run("a", "a.csv", "free", time, theta, np.ones(time.size, bool))
-    return evidence_of(Experiment(Path("there"), (run,)))
+    return split_records(Experiment(Path("there"), (run,)))
 
 
 @pytest.fixture(scope="module")
-def dragged() -> tuple[State, Trial | None]:
+def dragged() -> tuple[State, FittedModel | None]:
     """A state of a decay with drag, and its physical core."""
-    evidence = decay(drag=0.02)
-    base, core = baseline(evidence)
-    return State(evidence, base, Thresholds(), 3, ()), core
+    data = decay(drag=0.02)
+    base, core = fit_baseline(data)
+    return State(data, base, Thresholds(), 3, ()), core
 
 
 @pytest.fixture(scope="module")
-def best(dragged: tuple[State, Trial | None]) -> Trial:
+def best(dragged: tuple[State, FittedModel | None]) -> FittedModel:
     return search(*dragged, lambda _: None)
 
 
 def test_the_core_is_fitted_beside_the_given_model(
-    dragged: tuple[State, Trial | None],
+    dragged: tuple[State, FittedModel | None],
 ) -> None:
     state, core = dragged
     assert core is not None
@@ -70,12 +69,12 @@ def test_the_core_is_fitted_beside_the_given_model(
     q = core.fit.estimates["quadratic_drag.q"]
     assert abs(q.value - 0.02) < 4 * q.stderr
     assert core.chi2 < state.base.chi2 - 100
-    _, none = baseline(state.records, without=CORE)
+    _, none = fit_baseline(state.records, without=CORE)
     assert none is None
 
 
 def test_a_search_ends_with_what_is_there_and_drops_the_rest_of_the_core(
-    dragged: tuple[State, Trial | None], best: Trial
+    dragged: tuple[State, FittedModel | None], best: FittedModel
 ) -> None:
     state, core = dragged
     assert best.names == ("quadratic_drag",)
@@ -83,123 +82,137 @@ def test_a_search_ends_with_what_is_there_and_drops_the_rest_of_the_core(
     assert core is not None
     assert state.chance(best, core) > state.thresholds.chance
     # From the core the pruning alone leads there.
-    assert pruned(state, core).names == ("quadratic_drag",)
+    assert prune_effects(state, core).names == ("quadratic_drag",)
 
 
 def test_the_same_model_is_fitted_once(
-    dragged: tuple[State, Trial | None], best: Trial, monkeypatch: pytest.MonkeyPatch
+    dragged: tuple[State, FittedModel | None], best: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state, _ = dragged
     (drag,) = best.chosen
     scores = state.scores(state.base)
     place = next(k for k in scores.best() if scores.scores[k].candidate.name == "cubic_damping")
-    first = state.refit(state.base, [place]), state.rest(best, drag), state.sets(best)
+    first = (
+        state.refit(state.base, [place]),
+        state.leave_out(best, drag),
+        state.hold_out_losses(best),
+    )
     assert first[0] is not None
     assert first[1] is not None
-    for name in ("refitted", "without", "tried", "predictive", "scores_of"):
+    for name in (
+        "refit_with",
+        "drop_effect",
+        "evaluate_hold_out",
+        "hold_out_losses",
+        "score_candidates",
+    ):
         monkeypatch.setattr(f"pendmap.diagnosis.state.{name}", pytest.fail)
-    again = state.refit(state.base, [place]), state.rest(best, drag), state.sets(best)
+    again = (
+        state.refit(state.base, [place]),
+        state.leave_out(best, drag),
+        state.hold_out_losses(best),
+    )
     assert all(one is other for one, other in zip(first, again, strict=True))
     assert state.scores(state.base) is scores
 
 
 def test_a_fit_that_is_lost_is_no_candidate(
-    dragged: tuple[State, Trial | None], monkeypatch: pytest.MonkeyPatch
+    dragged: tuple[State, FittedModel | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state, _ = dragged
 
-    def lost(*_given: object, **_named: object) -> Trial:
+    def lost(*_given: object, **_named: object) -> FittedModel:
         raise FitDiverged("lost")
 
-    monkeypatch.setattr("pendmap.diagnosis.refit.with_candidates", lost)
+    monkeypatch.setattr("pendmap.diagnosis.refit.fit_with_candidates", lost)
     other = State(state.records, state.base, state.thresholds, 3, ())
     assert other.refit(state.base, [0]) is None
     assert search(other, None, lambda _: None).chosen == ()
 
 
 def test_no_fault_of_a_fit_is_taken_for_a_lost_motion(
-    dragged: tuple[State, Trial | None], monkeypatch: pytest.MonkeyPatch
+    dragged: tuple[State, FittedModel | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state, _ = dragged
 
-    def wrong(*_given: object, **_named: object) -> Trial:
+    def wrong(*_given: object, **_named: object) -> FittedModel:
         raise InputError("free must be among the parameters")
 
-    monkeypatch.setattr("pendmap.diagnosis.refit.with_candidates", wrong)
+    monkeypatch.setattr("pendmap.diagnosis.refit.fit_with_candidates", wrong)
     with pytest.raises(InputError, match="free must be"):
         State(state.records, state.base, state.thresholds, 3, ()).refit(state.base, [0])
 
 
 def test_no_effect_is_accepted_that_noise_alone_may_be() -> None:
-    evidence = decay(drag=0.0)
-    base, core = baseline(evidence)
-    state = State(evidence, base, Thresholds(), 3, ())
+    data = decay(drag=0.0)
+    base, core = fit_baseline(data)
+    state = State(data, base, Thresholds(), 3, ())
     assert search(state, core, lambda _: None).chosen == ()
     # With a chance of anything the best candidate is as good as any.
     lax = Thresholds(chance=2.0, alike=0.0, closes=0.0, loss=math.inf)
-    state = State(evidence, base, lax, 1, CORE)
+    state = State(data, base, lax, 1, CORE)
     assert search(state, None, lambda _: None).chosen != ()
 
 
 def test_a_model_that_loses_on_what_was_held_back_does_not_hold(
-    dragged: tuple[State, Trial | None], best: Trial
+    dragged: tuple[State, FittedModel | None], best: FittedModel
 ) -> None:
     state, _ = dragged
-    assert state.holds(state.base, best)
-    assert not state.holds(best, state.base)
-    held = state.held(best)
+    assert state.keeps_hold_out(state.base, best)
+    assert not state.keeps_hold_out(best, state.base)
+    held = state.hold_out(best)
     assert held is not None
     # Stretches within the run, its first and its last third.
-    assert len(predictive(state.evidence, best, held, state.level)) == 3
+    assert len(hold_out_losses(state.data, best, held, state.level)) == 3
 
 
 def test_without_the_effect_its_rivals_are_behind_by_what_they_miss(
-    dragged: tuple[State, Trial | None], best: Trial
+    dragged: tuple[State, FittedModel | None], best: FittedModel
 ) -> None:
     state, _ = dragged
     (drag,) = best.chosen
-    standing = standing_of(state, best, drag)
-    rest = state.rest(best, drag)
-    assert standing.gain == pytest.approx((rest.chi2 - best.chi2) / best.level)
-    assert 0.9 < standing.closed <= 1.1
-    behind = {r.candidate.name: r for r in standing.rivals}
+    each = compare_alternatives(state, best, drag)
+    rest = state.leave_out(best, drag)
+    assert each.gain == pytest.approx((rest.chi2 - best.chi2) / best.level)
+    assert 0.9 < each.closed <= 1.1
+    behind = {r.candidate.name: r for r in each.alternatives}
     assert behind["power_law_drag"].contains
     cubic = behind["cubic_damping"]
-    assert cubic.gain + cubic.behind == pytest.approx(standing.gain)
+    assert cubic.gain + cubic.behind == pytest.approx(each.gain)
     assert cubic.alike is (cubic.behind < state.thresholds.alike)
 
 
 def test_a_model_without_an_effect_is_never_worse_than_one_with_fewer(
-    dragged: tuple[State, Trial | None], best: Trial, monkeypatch: pytest.MonkeyPatch
+    dragged: tuple[State, FittedModel | None], best: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     known, _ = dragged
     (drag,) = best.chosen
     gain = Candidate("encoder_gain")
-    both = with_candidates(known.evidence, best, [gain], {gain.free[0]: 0.0}, level=known.level)
-    right = known.rest(both, gain)
+    both = fit_with_candidates(known.data, best, [gain], {gain.free[0]: 0.0}, level=known.level)
+    right = known.leave_out(both, gain)
     # The fit without the gain is lost; the drag is fitted to the given model again.
-    monkeypatch.setattr("pendmap.diagnosis.state.without", lambda *_: None)
+    monkeypatch.setattr("pendmap.diagnosis.state.drop_effect", lambda *_: None)
     state = State(known.records, known.base, known.thresholds, 3, ())
-    state.evidence = known.evidence
-    rest = state.rest(both, gain)
+    state.data = known.data
+    rest = state.leave_out(both, gain)
     assert rest.names == ("quadratic_drag",)
     assert rest.chi2 == pytest.approx(right.chi2, rel=1e-3)
     # Where that is lost too, the given model is the best one without the gain.
-    monkeypatch.setattr("pendmap.diagnosis.state.enlarged", lambda *_: None)
+    monkeypatch.setattr("pendmap.diagnosis.state.add_effects", lambda *_: None)
     state = State(known.records, known.base, known.thresholds, 3, ())
-    assert state.rest(both, gain) is known.base
-    assert state.rest(best, drag) is known.base
+    assert state.leave_out(both, gain) is known.base
+    assert state.leave_out(best, drag) is known.base
 
 
 def test_a_fit_that_promises_far_less_than_its_target_is_given_up(tmp_path: Path) -> None:
-    evidence = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
-    base, _ = baseline(evidence)
+    data = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
+    base, _ = fit_baseline(data)
     model = dataclasses.replace(base.fit.model, c_over_m=1.05 * base.fit.model.c_over_m)
     start = {"c_over_m": model.c_over_m}
 
     def fit(target: float) -> tuple[bool, bool, int, float]:
         found = fit_runs(
-            evidence.fitted,
+            data.fitted,
             model,
             base.free,
             start=start,
@@ -222,15 +235,15 @@ def test_a_fit_that_promises_far_less_than_its_target_is_given_up(tmp_path: Path
 def test_a_pendulum_that_rests_holds_up_no_fit(tmp_path: Path) -> None:
     # A forced run comes to rest where warming just holds it: in its last windows the sum of
     # squares is least at a kink, and no fit was ever at its end.
-    evidence = recorded(
+    data = recorded(
         tmp_path, "quadratic_drag", seed=4, free=5, forced=4, noise=0.1, counts=4096, rate=124.0
     )
-    _, core = baseline(evidence)
+    _, core = fit_baseline(data)
     assert core is not None
     still = [
         float(np.ptp(run.theta[first:last]))
         for index, first, last, *_ in core.fit.windows
-        if (run := evidence.fitted[index]).forced
+        if (run := data.fitted[index]).forced
     ]
     assert min(still) < 0.05
     assert core.fit.converged

@@ -126,13 +126,13 @@ def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(
         counts=2048,
         **FREE,
     )
-    assert found.judgement.ratio <= found.judgement.ratio_allowed
-    assert found.judgement.ratio_held > 1.3
+    assert found.assessment.ratio <= found.assessment.ratio_allowed
+    assert found.assessment.ratio_held > 1.3
     assert found.verdict in {"partial", "unknown"}
-    assert found.judgement.form.chances["held_out"] < CHANCE
+    assert found.assessment.form.chances["held_out"] < CHANCE
     assert all(effect.approximate for effect in found.effects)
-    gains = [standing.gain for standing in found.judgement.standings]
-    pairs = zip(found.judgement.probabilities, probabilities(1.0, gains), strict=True)
+    gains = [each.gain for each in found.assessment.identified]
+    pairs = zip(found.assessment.probabilities, probabilities(1.0, gains), strict=True)
     assert all(sure < otherwise for sure, otherwise in pairs)
 
 

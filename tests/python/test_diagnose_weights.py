@@ -13,16 +13,16 @@ import pytest
 from scipy.fft import idct
 
 from driven_decays import motion
-from leftovers import RUNS, SAMPLES, coloured, trial
-from pendmap.comparison.data import Evidence, evidence_of
-from pendmap.diagnosis.model_error import model_errors, weighted
+from leftovers import RUNS, SAMPLES, coloured, fitted_to
+from pendmap.comparison.data import DataSplit, split_records
+from pendmap.diagnosis.fitted_model import model_errors, weight_records
 from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.fitted_model import FittedModel
 
     Floats = NDArray[np.float64]
 
@@ -31,13 +31,13 @@ SIGMA = np.where(np.arange(N) < N // 2, 1.0, 2.0)
 SIGNS = np.where(np.arange(N) % 2, 1.0, -1.0)
 
 
-def evidence(*runs: FitRun, doubt: float = 0.0) -> Evidence:
+def data(*runs: FitRun, doubt: float = 0.0) -> DataSplit:
     """Return runs, each of them a record of its own; the first is held back too."""
     time = np.arange(N) * 0.01
     angle = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.05, friction=0.03)
     good = np.ones(N, bool)
     records = tuple(Run(f"{k}", f"{k}.csv", "free", time, angle, good) for k in range(len(runs)))
-    found = evidence_of(Experiment(Path("there"), records))
+    found = split_records(Experiment(Path("there"), records))
     readings = tuple(dataclasses.replace(r, doubt=doubt) for r in found.readings)
     return dataclasses.replace(
         found,
@@ -53,7 +53,7 @@ def run(sigma: Floats | float, **given: object) -> FitRun:
     return FitRun(np.arange(N) * 0.01, np.zeros(N), sigma, **given)  # type: ignore[arg-type]
 
 
-def leaving(*residuals: Floats) -> Trial:
+def leaving(*residuals: Floats) -> FittedModel:
     return SimpleNamespace(fit=SimpleNamespace(residuals=residuals))  # type: ignore[return-value]
 
 
@@ -61,7 +61,7 @@ def test_the_error_of_a_model_is_the_root_mean_square_of_what_it_leaves() -> Non
     # Half of them sqrt(5) at sigma = 1, half sqrt(8) at 2: the mean square is 6.5.
     left = SIGNS * np.where(SIGMA == 1, math.sqrt(5), math.sqrt(8))
     # White noise as strong as it is said to be leaves no error.
-    errors = model_errors(evidence(run(SIGMA), run(SIGMA)), leaving(left, SIGNS * SIGMA))
+    errors = model_errors(data(run(SIGMA), run(SIGMA)), leaving(left, SIGNS * SIGMA))
     assert errors == pytest.approx((math.sqrt(6.5), 0.0), abs=1e-9)
 
 
@@ -72,7 +72,7 @@ def test_what_is_not_trusted_and_what_counts_hide_are_no_error() -> None:
     for square, error in ((2.0, 0.0), (6.0, math.sqrt(6))):
         left = SIGNS * math.sqrt(square)
         left[7] = 1e3
-        found = model_errors(evidence(counted), leaving(left))
+        found = model_errors(data(counted), leaving(left))
         assert found == pytest.approx((error,), abs=1e-9)
 
 
@@ -80,13 +80,13 @@ def test_what_is_not_trusted_and_what_counts_hide_are_no_error() -> None:
 def test_noise_that_is_hardly_known_may_leave_more(doubt: float, error: float) -> None:
     # 1 + 4 sqrt(2 / 800 + 4 doubt^2) is 1.2 or 1.8; 1.5 is left.
     left = SIGNS * math.sqrt(1.5)
-    found = model_errors(evidence(run(1.0), doubt=doubt), leaving(left))
+    found = model_errors(data(run(1.0), doubt=doubt), leaving(left))
     assert found == pytest.approx((error,), abs=1e-9)
 
 
 def test_readings_of_a_run_that_a_model_misses_count_alike() -> None:
-    records = evidence(run(SIGMA), run(3.0, count=math.sqrt(12)), run(1.0))
-    found = weighted(records, (2.0, 4.0, 0.0))
+    records = data(run(SIGMA), run(3.0, count=math.sqrt(12)), run(1.0))
+    found = weight_records(records, (2.0, 4.0, 0.0))
     one, two, three = found.fitted
     assert one.sigma == pytest.approx(np.full(N, 2.0))
     # The counts are in it and are no intervals any more.
@@ -98,14 +98,14 @@ def test_readings_of_a_run_that_a_model_misses_count_alike() -> None:
     # A whole run held back has its noise, and what the others have beyond theirs: 4 - 2.5, 16 - 10
     # and nothing.
     apart = dataclasses.replace(records, held=(run(1.0),), held_of=(9,))
-    (held,) = weighted(apart, (2.0, 4.0, 0.0)).held
+    (held,) = weight_records(apart, (2.0, 4.0, 0.0)).held
     assert np.square(held.sigma) == pytest.approx(1 + (1.5 + 6.0) / 3)
 
 
 def test_each_reading_of_white_noise_is_independent() -> None:
     rng = np.random.default_rng(4)
-    found = [trial(coloured(rng, 0.0)) for _ in range(20)]
-    assert np.mean([one.remainder.independent for one in found]) == pytest.approx(
+    found = [fitted_to(coloured(rng, 0.0)) for _ in range(20)]
+    assert np.mean([one.noise.independent for one in found]) == pytest.approx(
         RUNS * SAMPLES, rel=0.03
     )
     assert np.mean([one.level for one in found]) == pytest.approx(1.0, abs=0.05)
@@ -116,7 +116,7 @@ def test_residuals_that_oscillate_are_a_few_readings(count: int) -> None:
     # Cosines of the transform itself, equally strong: 3 (count P)^2 / (count P^2) readings.
     amplitudes = np.zeros((1, SAMPLES))
     amplitudes[0, 40 : 40 + count] = math.sqrt(SAMPLES / count)
-    found = trial(idct(amplitudes, type=2, norm="ortho"))
+    found = fitted_to(idct(amplitudes, type=2, norm="ortho"))
     assert found.chi2 == pytest.approx(SAMPLES)
-    assert found.remainder.independent == pytest.approx(3 * count)
+    assert found.noise.independent == pytest.approx(3 * count)
     assert found.level == pytest.approx(SAMPLES / (3 * count))

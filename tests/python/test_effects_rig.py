@@ -13,10 +13,10 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import virtual_rig
-from pendmap.comparison.data import Evidence, evidence_of
-from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.candidates import Candidate, placed
-from pendmap.diagnosis.fitted_model import fitted
+from pendmap.comparison.data import DataSplit, split_records
+from pendmap.diagnosis.baseline import fit_baseline
+from pendmap.diagnosis.candidates import Candidate, add_candidates
+from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.model.effects import definition, is_shape
 from pendmap.records import read_experiment
 
@@ -170,23 +170,23 @@ def test_a_contact_that_barely_yields_is_a_spring() -> None:
     assert run.theta.values == pytest.approx(expected, abs=1e-4 * start)
 
 
-def clean(folder: Path, effect: str) -> tuple[Evidence, dict[str, float]]:
+def clean(folder: Path, effect: str) -> tuple[DataSplit, dict[str, float]]:
     """Evidence without noise, as if read to a microradian, and the truth."""
     request = virtual_rig.Request(
         "hidden", seed=5, effects=(effect,), free=2, forced=2, noise=0.0, counts=0
     )
     where = virtual_rig.places(folder / "clean", replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
-    found = evidence_of(read_experiment(where.experiment))
+    found = split_records(read_experiment(where.experiment))
     exact = tuple(dataclasses.replace(run, sigma=1e-6) for run in found.fitted)
     held = tuple(dataclasses.replace(run, sigma=1e-6) for run in found.held)
     (truth,) = tomllib.loads(where.truth.read_text(encoding="utf-8"))["effect"]
     return dataclasses.replace(found, fitted=exact, held=held), truth["parameters"]
 
 
-def whole(evidence: Evidence) -> Windows:
+def whole(data: DataSplit) -> Windows:
     """Each run a window, begun at rest."""
-    runs = enumerate(evidence.fitted)
+    runs = enumerate(data.fitted)
     return tuple((k, 0, len(run.time), float(run.angle[0]), 0.0) for k, run in runs)
 
 
@@ -201,8 +201,8 @@ OTHERS = [
 
 @pytest.mark.parametrize("name", [*EFFECTS, *OTHERS])
 def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path) -> None:
-    evidence, truth = clean(tmp_path, name)
-    base, _ = baseline(evidence)
+    data, truth = clean(tmp_path, name)
+    base, _ = fit_baseline(data)
     size, *_ = truth
     w0 = base.fit.model.w0
     entries = [e for e in definition(name)["parameters"] if is_shape(e)]
@@ -211,7 +211,7 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
     start = base.start | {f"{name}.{size}": 0.5 * truth[size]}
     if unit.phase is not None:
         start[f"{name}.{unit.phase}"] = truth[unit.phase]
-    model, free = placed(base.fit.model, [unit]), [*base.free, *unit.free]
+    model, free = add_candidates(base.fit.model, [unit]), [*base.free, *unit.free]
     # What has units is found beside the size, from elsewhere.
     elsewhere = {
         "eddy_brake": {"vc": 0.8},
@@ -223,8 +223,8 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
         free += unit.adapted
         start |= {f"{name}.{n}": part * truth[n] for n, part in elsewhere.items()}
     # The mode is at rest where a run begins, not where a window within it does.
-    windows = whole(evidence) if name == "pivot_compliance" else None
-    found = fitted(evidence, model, free, (unit,), start=start, windows=windows).fit
+    windows = whole(data) if name == "pivot_compliance" else None
+    found = fit_model(data, model, free, (unit,), start=start, windows=windows).fit
     # Of a lag the second power of tau is left. Each window begins with a contact that has not
     # yielded and a sensor in the middle of its play.
     # A knock of the rig takes no time.
@@ -242,22 +242,24 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
 
 
 def test_the_mode_of_a_pivot_is_found_within_its_errors(tmp_path: Path) -> None:
-    evidence, truth = clean(tmp_path, "pivot_compliance")
+    data, truth = clean(tmp_path, "pivot_compliance")
     draws, sigma = np.random.default_rng(1), 2e-5
     runs = tuple(
         dataclasses.replace(
             run, theta=run.theta + draws.normal(0, sigma, len(run.time)), sigma=sigma
         )
-        for run in evidence.fitted
+        for run in data.fitted
     )
-    noisy = dataclasses.replace(evidence, fitted=runs)
-    base, _ = baseline(noisy)
+    noisy = dataclasses.replace(data, fitted=runs)
+    base, _ = fit_baseline(noisy)
     wx = truth["wx"] / base.fit.model.w0
     unit = Candidate("pivot_compliance", {"wx": wx, "z": truth["z"]})
     near = {"mu": 0.5, "wx": 0.95, "z": 0.5}
     start = {f"pivot_compliance.{n}": part * truth[n] for n, part in near.items()}
-    model, free = placed(base.fit.model, [unit]), [*base.free, *unit.free, *unit.adapted]
-    found = fitted(noisy, model, free, (unit,), start=base.start | start, windows=whole(noisy)).fit
+    model, free = add_candidates(base.fit.model, [unit]), [*base.free, *unit.free, *unit.adapted]
+    found = fit_model(
+        noisy, model, free, (unit,), start=base.start | start, windows=whole(noisy)
+    ).fit
     assert found.rms == pytest.approx(sigma, rel=0.03)
     for n, value in truth.items():
         estimate = found.estimates[f"pivot_compliance.{n}"]

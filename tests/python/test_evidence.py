@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from pendmap.comparison.data import evidence_of
+from pendmap.comparison.data import split_records
 from pendmap.errors import InputError
 from pendmap.records import Experiment, Run
 
@@ -46,36 +46,36 @@ def test_what_is_held_back_where_nothing_is_marked(
 ) -> None:
     runs = [run(f"free{k}", "free") for k in range(free)]
     runs += [run(f"forced{k}", "forced") for k in range(forced)]
-    evidence = evidence_of(Experiment(Path("there"), tuple(runs)))
-    assert sorted(each.name for each in evidence.held) == sorted(held)
-    assert evidence.inside is inside
+    data = split_records(Experiment(Path("there"), tuple(runs)))
+    assert sorted(each.name for each in data.held) == sorted(held)
+    assert data.inside is inside
     whole = set() if inside else set(held)
-    assert {each.name for each in evidence.fitted} == {each.name for each in runs} - whole
+    assert {each.name for each in data.fitted} == {each.name for each in runs} - whole
 
 
 def test_what_is_marked_is_held_back_and_nothing_else() -> None:
     runs = [run("a", "free"), run("b", "forced"), run("c", "forced", hold_out=True)]
-    evidence = evidence_of(Experiment(Path("there"), tuple(runs)))
-    assert [each.name for each in evidence.held] == ["c"]
-    assert [each.name for each in evidence.fitted] == ["a", "b"]
+    data = split_records(Experiment(Path("there"), tuple(runs)))
+    assert [each.name for each in data.held] == ["c"]
+    assert [each.name for each in data.fitted] == ["a", "b"]
 
 
 def test_a_run_too_short_to_show_its_noise_has_that_of_the_others() -> None:
     lengths = {"a": 1500, "b": 1500, "c": 1500, "few": 19, "some": 60}
     runs = tuple(run(name, "free", samples=count) for name, count in lengths.items())
-    *known, few, some = evidence_of(Experiment(Path("there"), runs)).readings
+    *known, few, some = split_records(Experiment(Path("there"), runs)).readings
     usual = np.median([reading.sigma for reading in known])
     assert usual == pytest.approx(1e-3, rel=0.1)
     assert few.sigma == some.sigma == usual
     assert 0 < few.doubt < 0.1
     # Alone it has what it shows, and says how little that is.
-    (alone,) = evidence_of(Experiment(Path("there"), (run("a", "free", samples=250),))).readings
+    (alone,) = split_records(Experiment(Path("there"), (run("a", "free", samples=250),))).readings
     assert alone.doubt > 0.02
 
 
 def test_without_noise_a_reading_is_worth_no_more_than_a_sensor_can_tell() -> None:
     runs = tuple(run(name, "free", noise=0.0) for name in "abc")
-    readings = evidence_of(Experiment(Path("there"), runs)).readings
+    readings = split_records(Experiment(Path("there"), runs)).readings
     assert all(reading.sigma >= 1e-7 for reading in readings)
 
 
@@ -83,4 +83,4 @@ def test_too_few_samples_to_hold_any_back_are_refused() -> None:
     with pytest.raises(
         InputError, match="one run must have 201 samples or more: there are too few"
     ):
-        evidence_of(Experiment(Path("there"), (run("a", "free", samples=150),)))
+        split_records(Experiment(Path("there"), (run("a", "free", samples=150),)))

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from driven_decays import motion
-from pendmap.comparison.data import in_blocks
+from pendmap.comparison.data import average_blocks
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.runs import FitRun
 from pendmap.model import Rig
@@ -17,7 +17,7 @@ ANGLE = motion(TIME, (1.5, 0.0), w0=8.0, c_over_m=0.05, friction=0.05)
 
 
 def test_a_block_reads_the_angle_at_its_own_time() -> None:
-    found = in_blocks(FitRun(TIME, ANGLE, 1e-5))
+    found = average_blocks(FitRun(TIME, ANGLE, 1e-5))
     assert TIME.size / 20 < found.time.size < TIME.size / 10
     # Means alone are off by T^2 th''/24, a hundred times as much.
     off = np.abs(found.theta - CubicSpline(TIME, ANGLE)(found.time))[3:-3]
@@ -34,7 +34,7 @@ def test_errors_and_what_does_not_count_are_those_of_the_readings() -> None:
     trusted[5000:5200] = False
     readings = ANGLE + sigma * rng.standard_normal(TIME.size)
     readings[~trusted] += 1.0
-    found = in_blocks(FitRun(TIME, readings, sigma, trusted=trusted))
+    found = average_blocks(FitRun(TIME, readings, sigma, trusted=trusted))
     assert found.trusted is not None
     assert not found.trusted.all()
     exact = np.interp(found.time, TIME, ANGLE)
@@ -51,7 +51,7 @@ def test_a_fit_finds_the_same_with_the_same_errors() -> None:
     run = FitRun(TIME, readings, 1e-3)
     start = Rig(w0=8.01, c_over_m=0.04, Tr=0.04)
     one = fit_runs([run], start, profiled=())
-    other = fit_runs([in_blocks(run)], start, profiled=())
+    other = fit_runs([average_blocks(run)], start, profiled=())
     for name, estimate in one.estimates.items():
         assert other[name] == pytest.approx(estimate.value, abs=0.2 * estimate.stderr)
         assert other.estimates[name].stderr == pytest.approx(estimate.stderr, rel=0.02)
@@ -60,4 +60,4 @@ def test_a_fit_finds_the_same_with_the_same_errors() -> None:
 @pytest.mark.parametrize("every", [20, 100])
 def test_readings_that_are_not_dense_stay(every: int) -> None:
     run = FitRun(TIME[::every], ANGLE[::every], 1e-3)
-    assert in_blocks(run) is run
+    assert average_blocks(run) is run

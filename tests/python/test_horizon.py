@@ -11,8 +11,8 @@ import pytest
 from hidden import once
 from pendmap import Rig
 from pendmap.comparison import compare
-from pendmap.comparison.forecast import forecasts_of
-from pendmap.comparison.replay import Motion, replayed, strength_of
+from pendmap.comparison.forecast import compare_forecasts
+from pendmap.comparison.replay import Motion, effect_strength, run_forward
 from pendmap.diagnosis import diagnosed_model
 from pendmap.identification.runs import FitRun
 
@@ -46,7 +46,7 @@ def test_the_new_model_sees_farther(found: Discrepancy) -> None:
 def test_periods_and_peaks_are_those_of_a_simulation(found: Discrepancy) -> None:
     """The command ``compare`` has them from the located turns of a simulation."""
     model = dataclasses.replace(diagnosed_model(found), notes={})
-    simulated = {one.run.name: one.errors for one in compare(model, found.evidence.experiment).runs}
+    simulated = {one.run.name: one.errors for one in compare(model, found.data.experiment).runs}
     assert found.cycles[0].held_out
     assert {one.name for one in found.cycles} == set(simulated)
     for one in found.cycles:
@@ -64,16 +64,16 @@ def test_a_replay_falls_freely_where_nothing_else_acts() -> None:
     """A pendulum that starts upright, at rest, goes as ``th - pi = a cosh(w0 t)`` at first."""
     time = np.linspace(0.0, 0.5, 51)
     run = FitRun(time, np.zeros(51), 1e-9)
-    ((readings, curve),) = replayed(Motion(Rig(w0=6.0), {}), [run], [(np.pi - 1e-5, 0.0)])
+    ((readings, curve),) = run_forward(Motion(Rig(w0=6.0), {}), [run], [(np.pi - 1e-5, 0.0)])
     expected = np.pi - 1e-5 * np.cosh(6.0 * time)
     np.testing.assert_allclose(readings, expected, atol=1e-9)
     np.testing.assert_allclose(curve[0], expected, atol=1e-9)
 
 
 def test_the_strength_of_a_drag_is_its_torque(found: Discrepancy) -> None:
-    strength = strength_of(found.best.trial.fit, found.evidence.fitted, "quadratic_drag")
+    strength = effect_strength(found.best.fitted.fit, found.data.fitted, "quadratic_drag")
     q = found.effects[0].parameters["q"]
-    speeds = np.concatenate([curve[1] for curve in found.best.trial.fit.curves])
+    speeds = np.concatenate([curve[1] for curve in found.best.fitted.fit.curves])
     speeds = speeds[np.isfinite(speeds)]
     assert strength.torque == pytest.approx(q * np.sqrt(np.mean(speeds**4)), rel=0.25)
     assert strength.greatest_torque <= 1.001 * q * np.max(speeds**2)
@@ -82,9 +82,9 @@ def test_the_strength_of_a_drag_is_its_torque(found: Discrepancy) -> None:
 
 def test_forecasts_do_not_depend_on_where_clocks_begin(found: Discrepancy) -> None:
     for begin in np.random.default_rng(1).uniform(0.0, 1000.0, 3):
-        held = tuple(_later(run, float(begin)) for run in found.evidence.held)
-        evidence = dataclasses.replace(found.evidence, held=held)
-        moved = forecasts_of(evidence, found.base.fits, found.best.fits, {})
+        held = tuple(_later(run, float(begin)) for run in found.data.held)
+        data = dataclasses.replace(found.data, held=held)
+        moved = compare_forecasts(data, found.base.fits, found.best.fits, {})
         for forecast, usual in zip(moved, found.forecasts, strict=True):
             np.testing.assert_allclose(forecast.after, usual.after, rtol=0.1)
 

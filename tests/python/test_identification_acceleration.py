@@ -12,7 +12,7 @@ import pendmap
 from accelerations import GRAVITY, TRUTH, experiment, readings
 from decays import decay, record
 from pendmap import InputError, figures
-from pendmap.comparison.data import evidence_of
+from pendmap.comparison.data import split_records
 from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify, identify_experiment
 from pendmap.identification.report import as_json, as_text
@@ -153,7 +153,7 @@ def test_diagnose_asks_for_an_angle(tmp_path: Path) -> None:
     time, _, force = readings()
     there = pendmap.read_experiment(experiment(tmp_path, TANGENTIAL % 0.1, time, force))
     with pytest.raises(InputError, match="its angle is made of an acceleration"):
-        evidence_of(there)
+        split_records(there)
 
 
 def test_an_angle_and_an_accelerometer_are_fitted_together(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def run_of(time: np.ndarray, theta: np.ndarray, count: float | None, sigma: floa
     return FitRun(time, theta, sigma, count=count)
 
 
-def tried(run: FitRun, fit: TrajectoryFit, w0: float) -> TrajectoryFit:
+def evaluate_hold_out(run: FitRun, fit: TrajectoryFit, w0: float) -> TrajectoryFit:
     """The model of a fit with another natural frequency, nothing adapted to the record."""
     start = {name: fit[name] for name in fit.names} | {"w0": w0}
     return fit_runs(
@@ -57,7 +57,7 @@ def test_the_sum_is_the_likelihood_of_the_counts() -> None:
         ends = [(found.residuals[0] + side * count) / (0.2 * count) for side in (-0.5, 0.5)]
         return float(-2 * np.sum(np.log(norm.cdf(ends[1]) - norm.cdf(ends[0]))))
 
-    other = tried(run, fit, fit["w0"] * 1.0003)
+    other = evaluate_hold_out(run, fit, fit["w0"] * 1.0003)
     rise = deviance(other) - deviance(fit)
     assert rise > 10
     assert other.chi2 - fit.chi2 == pytest.approx(rise, rel=1e-6)

@@ -147,4 +147,4 @@ def test_gravity_of_the_rig_goes_into_every_model(tmp_path: Path) -> None:
     experiment = pendmap.read_experiment(tmp_path)
     for method in ("trajectory", "combined_repaired"):
         assert identify_experiment(experiment, methods=[method]).model.gravity == 1.62
-    assert diagnose(experiment, max_effects=0).best.trial.fit.model.gravity == 1.62
+    assert diagnose(experiment, max_effects=0).best.fitted.fit.model.gravity == 1.62

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import pendmap
 from decays import decay, record
 from pendmap import InputError, figures
-from pendmap.comparison.data import evidence_of
+from pendmap.comparison.data import split_records
 from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.methods.joint import fit_together
@@ -59,7 +59,7 @@ def read(folder: Path, time: Floats, rate: Floats, name: str = "Gyroscope z (rad
     return pendmap.read_experiment(written(folder / "run.csv", time, rate, name)).runs[0]
 
 
-def fitted(*runs: Run) -> Identification:
+def fit_model(*runs: Run) -> Identification:
     best = identify_experiment(Experiment(Path(), runs), methods=["trajectory"]).best
     assert best.method == "trajectory", best.warnings
     return best
@@ -76,7 +76,7 @@ def agrees(best: Identification, truth: dict[str, float], sigmas: float = 3.5) -
 @pytest.mark.parametrize("release", [0.3, 1.0, 2.2, 2.9])
 def test_the_truth_is_found_at_any_amplitude(tmp_path: Path, release: float) -> None:
     """Until rest and beyond, where noise integrated would pass for motion."""
-    best = fitted(read(tmp_path, *rates(release=release, seconds=40)))
+    best = fit_model(read(tmp_path, *rates(release=release, seconds=40)))
     agrees(best, TRUTH | {"bias": 0.01})
     assert best.misfit == pytest.approx(1, abs=0.1)
     assert "offset" not in best.estimates
@@ -87,7 +87,7 @@ def test_a_large_bias(tmp_path: Path, bias: float) -> None:
     run = read(tmp_path, *rates(release=1.0, bias=bias))
     assert run.gyroscope is not None
     assert run.gyroscope.bias == pytest.approx(bias, abs=2e-3)
-    agrees(fitted(run), TRUTH | {"bias": bias})
+    agrees(fit_model(run), TRUTH | {"bias": bias})
 
 
 def test_a_gain_is_fitted_on_demand(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_intervals_hold_the_truth(tmp_path: Path) -> None:
     held = 0
     for seed in range(40):
         run = read(tmp_path, *rates(release=0.6, seconds=12, per_second=50, seed=seed))
-        best = fitted(run)
+        best = fit_model(run)
         for name, true in TRUTH.items():
             bounds = best.estimates[name].ci95
             assert bounds is not None, (seed, name, best.warnings)
@@ -121,14 +121,14 @@ def test_intervals_hold_the_truth(tmp_path: Path) -> None:
 def test_errors_are_what_the_information_allows(tmp_path: Path) -> None:
     """An angle of noise sigma / w0 says as much of a small swing."""
     time, rate = rates(release=0.5)
-    best = fitted(read(tmp_path, time, rate))
+    best = fit_model(read(tmp_path, time, rate))
     _, angle = record(
         decay(release=0.5), seconds=30.0, noise_deg=math.degrees(5e-3 / TRUTH["w0"]), seed=1
     )
     table = np.stack([time, angle], axis=1)
     beside = tmp_path / "angle.csv"
     np.savetxt(beside, table, delimiter=",", header="t_s,theta_rad", comments="")
-    other = fitted(pendmap.read_experiment(beside).runs[0])
+    other = fit_model(pendmap.read_experiment(beside).runs[0])
     for name in TRUTH:
         one, two = best.estimates[name].stderr, other.estimates[name].stderr
         assert one is not None
@@ -143,7 +143,7 @@ def test_degrees_a_second(tmp_path: Path) -> None:
         run = read(tmp_path, time, rate * 180 / math.pi, name)
         assert run.velocity is not None
         np.testing.assert_allclose(run.velocity, rate, atol=1e-6)
-        agrees(fitted(run), TRUTH | {"bias": 0.01})
+        agrees(fit_model(run), TRUTH | {"bias": 0.01})
 
 
 def test_milliseconds(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_milliseconds(tmp_path: Path) -> None:
     text = "\n".join(f"{1e3 * t:.3f},{v:.8g}" for t, v in zip(time, rate, strict=True))
     path = tmp_path / "run.csv"
     path.write_text(f"time,gyro_z (rad/s)\n{text}\n", encoding="utf-8")
-    agrees(fitted(pendmap.read_experiment(path).runs[0]), TRUTH | {"bias": 0.01})
+    agrees(fit_model(pendmap.read_experiment(path).runs[0]), TRUTH | {"bias": 0.01})
 
 
 def test_a_range_that_ends_and_false_readings(tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_a_range_that_ends_and_false_readings(tmp_path: Path) -> None:
     assert "8.727 rad/s" in said["clipped"]
     assert "rad/s" in said["outliers"]
     assert not run.trusted[[700, 1500]].any()
-    agrees(fitted(run), TRUTH | {"bias": 0.01})
+    agrees(fit_model(run), TRUTH | {"bias": 0.01})
 
 
 def test_rest_is_not_taken_for_releases(tmp_path: Path) -> None:
@@ -179,7 +179,7 @@ def test_rest_is_not_taken_for_releases(tmp_path: Path) -> None:
     assert "rest-tail" in said
     assert "several-releases" not in said
     assert run.segments[-1].from_s == pytest.approx(last, abs=2.0)
-    agrees(fitted(run), {"w0": 6.2, "c_over_m": 0.05, "Tr": 0.5, "bias": 0.01})
+    agrees(fit_model(run), {"w0": 6.2, "c_over_m": 0.05, "Tr": 0.5, "bias": 0.01})
 
 
 def forced(time: Floats) -> Floats:
@@ -215,7 +215,7 @@ def test_coarse_steps_of_the_rate(tmp_path: Path) -> None:
     time, rate = rates(noise=2e-3)
     run = read(tmp_path, time, 0.02 * np.round(rate / 0.02))
     assert pendmap.noise_floor(run).sigma == pytest.approx(0.02 / math.sqrt(12), rel=0.1)
-    best = fitted(run)
+    best = fit_model(run)
     for name, true in TRUTH.items():
         assert best[name] == pytest.approx(true, rel=0.02)
 
@@ -242,7 +242,7 @@ def test_an_angle_beside_it_is_what_counts(tmp_path: Path) -> None:
     np.savetxt(path, table, delimiter=",", header="t_s,theta_rad,gyro_z (rad/s)", comments="")
     run = pendmap.read_experiment(path).runs[0]
     assert run.gyroscope is None
-    best = fitted(run)
+    best = fit_model(run)
     agrees(best, TRUTH | {"offset": 0.01})
     assert "bias" not in best.estimates
 
@@ -254,7 +254,7 @@ def test_an_angle_and_a_gyroscope_are_fitted_together(tmp_path: Path) -> None:
     table = np.stack([time, angle], axis=1)
     np.savetxt(path, table, delimiter=",", header="t_s,theta_rad", comments="")
     other = pendmap.read_experiment(path).runs[0]
-    agrees(fitted(one, other), TRUTH | {"offset": 0.01, "bias[0]": 0.01})
+    agrees(fit_model(one, other), TRUTH | {"offset": 0.01, "bias[0]": 0.01})
 
 
 def test_sheet_model_and_comparison(tmp_path: Path) -> None:
@@ -276,5 +276,5 @@ def test_sheet_model_and_comparison(tmp_path: Path) -> None:
 def test_diagnose_asks_for_an_angle(tmp_path: Path) -> None:
     there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates()))
     with pytest.raises(InputError, match="its angle is a velocity integrated") as fault:
-        evidence_of(there)
+        split_records(there)
     assert "\n" not in str(fault.value)

@@ -16,11 +16,11 @@ import pytest
 from hidden import once
 from pendmap import virtual_rig
 from pendmap.diagnosis import Discrepancy, diagnose
-from pendmap.diagnosis.fitted_model import fitted
+from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.diagnosis.next_experiment.information import Columns, Information, Prospects
-from pendmap.diagnosis.next_experiment.limits import needed
-from pendmap.diagnosis.next_experiment.power import one_left, wrong_name
-from pendmap.diagnosis.next_experiment.proposals import menu_of
+from pendmap.diagnosis.next_experiment.limits import required_gain
+from pendmap.diagnosis.next_experiment.power import chance_resolved, chance_wrong_name
+from pendmap.diagnosis.next_experiment.proposals import list_proposals
 from pendmap.diagnosis.summary import as_json
 from pendmap.errors import InputError
 from pendmap.identification.methods.joint import as_fit_run
@@ -81,10 +81,10 @@ def test_what_is_recommended_leaves_one_name() -> None:
     after = diagnose(dataclasses.replace(records, runs=runs))
     assert [effect.name for effect in after.effects] == ["viscous_drift"]
     assert after.verdict == "named"
-    rivals = after.judgement.standings[0].rivals
-    power = min(r.behind for r in rivals if r.candidate.name in alike and not r.contains)
+    alternatives = after.assessment.identified[0].alternatives
+    power = min(r.behind for r in alternatives if r.candidate.name in alike and not r.contains)
     # Its scatter, and that of the size from which it was predicted.
-    doubt = 2 / math.sqrt(best.value) + 2 / math.sqrt(before.judgement.standings[0].gain)
+    doubt = 2 / math.sqrt(best.value) + 2 / math.sqrt(before.assessment.identified[0].gain)
     assert power == pytest.approx(best.value, rel=3 * doubt)
 
 
@@ -95,13 +95,13 @@ def test_an_interval_becomes_as_narrow_as_predicted() -> None:
     assert outlook is not None
     assert best is not None
     assert outlook.about == ("quadratic_drag.q",)
-    q = before.best.trial.fit.estimates["quadratic_drag.q"]
+    q = before.best.fitted.fit.estimates["quadratic_drag.q"]
     assert q.stderr is not None
     level = before.level
     assert outlook.now == pytest.approx(1.96 * q.stderr * math.sqrt(level) / q.value, rel=0.01)
     runs = (*records.runs, *done(request, best.proposal))
     after = diagnose(dataclasses.replace(records, runs=runs))
-    r = after.best.trial.fit.estimates["quadratic_drag.q"]
+    r = after.best.fitted.fit.estimates["quadratic_drag.q"]
     assert r.stderr is not None
     reached = 1.96 * r.stderr * math.sqrt(after.level) / r.value
     assert reached == pytest.approx(best.value, rel=0.15)
@@ -112,20 +112,20 @@ def test_an_interval_becomes_as_narrow_as_predicted() -> None:
 def test_a_proposal_says_what_its_record_says(what: str) -> None:
     """The information predicted, from thinned samples, is that of the record once it is there."""
     request, _, found = hidden(8, free=2, noise=0.2, counts=8192)
-    known = {"max_velocity": 8 * found.base.trial.fit.model.w0}
-    experiment = dataclasses.replace(found.evidence.experiment, known=known)
-    evidence = dataclasses.replace(found.evidence, experiment=experiment)
-    menu = menu_of(evidence, found.base.trial.fit.model.w0)
+    known = {"max_velocity": 8 * found.base.fitted.fit.model.w0}
+    experiment = dataclasses.replace(found.data.experiment, known=known)
+    data = dataclasses.replace(found.data, experiment=experiment)
+    menu = list_proposals(data, found.base.fitted.fit.model.w0)
     proposal = next(p for p in menu if len(p.runs) == 1 and what in p.what)
-    ahead = Prospects(evidence, found.base, [proposal], [], {})
+    ahead = Prospects(data, found.base, [proposal], [], {})
     predicted = ahead.after(proposal).matrix - ahead.old.matrix
     (run,) = done(request, proposal)
     reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
     alone = dataclasses.replace(
-        evidence, fitted=(as_fit_run(run, reading),), readings=(reading,), fitted_of=(0,)
+        data, fitted=(as_fit_run(run, reading),), readings=(reading,), fitted_of=(0,)
     )
-    trial = found.base.trial
-    fit = fitted(alone, trial.fit.model, trial.free, start=trial.start).fit
+    fitted = found.base.fitted
+    fit = fit_model(alone, fitted.fit.model, fitted.free, start=fitted.start).fit
     recorded_ = Columns.of(fit, alone.fitted, []).information(0, len(run.time), hold=True)
     errors = [np.sqrt(np.diag(np.linalg.inv(m))) for m in (predicted, recorded_.matrix)]
     # What no angle that large tells of the last swings is another matter.
@@ -173,7 +173,7 @@ def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
     """Against sums of squares of normal draws about the expected gain."""
     rng = np.random.default_rng(1)
     mean = np.zeros(count)
-    mean[0] = math.sqrt(needed(22.0, count))
+    mean[0] = math.sqrt(required_gain(22.0, count))
     gains = np.sum((mean + rng.standard_normal((200_000, count))) ** 2, axis=1)
     assert np.mean(gains > 22.0) == pytest.approx(0.95, abs=0.002)
 
@@ -207,8 +207,8 @@ def test_chances_of_names() -> None:
     """Twice the difference of log-likelihoods has the mean s G and the variance 4 s G."""
     rng = np.random.default_rng(3)
     draws = 16 + 2 * 4 * rng.standard_normal(400_000)
-    assert wrong_name(16) == pytest.approx(np.mean(draws < 0), rel=0.03)
-    assert one_left(16) == pytest.approx(np.mean(draws > 10), rel=0.01)
+    assert chance_wrong_name(16) == pytest.approx(np.mean(draws < 0), rel=0.03)
+    assert chance_resolved(16) == pytest.approx(np.mean(draws > 10), rel=0.01)
 
 
 def test_the_rig_does_runs_that_are_planned() -> None:
@@ -242,9 +242,9 @@ def test_what_is_not_enough_is_said_to_be_so() -> None:
 
 @pytest.mark.parametrize("widest", [0.3, 1.0, 3.0])
 def test_no_wider_swing_is_proposed_than_the_rig_has(widest: float) -> None:
-    evidence = once("quadratic_drag").evidence
-    known = {**evidence.experiment.known, "max_angle": widest}
-    rig = dataclasses.replace(evidence.experiment, known=known)
-    menu = menu_of(dataclasses.replace(evidence, experiment=rig), 6.0)
+    data = once("quadratic_drag").data
+    known = {**data.experiment.known, "max_angle": widest}
+    rig = dataclasses.replace(data.experiment, known=known)
+    menu = list_proposals(dataclasses.replace(data, experiment=rig), 6.0)
     angles = {abs(start.theta) for proposal in menu for start in proposal.starts}
     assert max(angles) == min(widest, 2.8)

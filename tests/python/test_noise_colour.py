@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hidden import diagnosed
-from leftovers import COUNT, INTERVAL, SAMPLES, W0, coloured, counted, remainder, swing
+from leftovers import COUNT, INTERVAL, SAMPLES, W0, coloured, counted, noise_of, swing
 from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
@@ -31,17 +31,17 @@ def test_slow_residuals_have_the_chance_that_noise_gives_them(swell: float) -> N
     chances = []
     for _ in range(100):
         noise = rng.standard_normal((4, SAMPLES)) * np.array([swell, 1.0, 1.0, 1.0])[:, None]
-        chances.append(remainder(noise).chance)
+        chances.append(noise_of(noise).chance)
     assert np.mean(np.array(chances) < 0.1) < 0.18  # more than two standard errors above a tenth
     assert np.mean(np.array(chances) < 0.5) > 0.2
     assert min(chances) > CHANCE
     error = 0.25 * np.sqrt(SAMPLES) * swing()[0]
-    assert remainder(noise + error, fitted=False).chance < CHANCE
+    assert noise_of(noise + error, fitted=False).chance < CHANCE
 
 
 def test_white_noise_stays_white() -> None:
     rng = np.random.default_rng(7)
-    found = [remainder(coloured(rng, 0.0)) for _ in range(100)]
+    found = [noise_of(coloured(rng, 0.0)) for _ in range(100)]
     assert sum(abs(one.colour) > 0.02 for one in found) <= 2
     levels = np.array([one.level for one in found])
     # Each is the mean of some 2,000 squares.
@@ -61,9 +61,9 @@ def test_coloured_noise_leaves_no_more_than_noise(correlation: float, noise: flo
     for _ in range(40):
         drawn = coloured(rng, correlation)
         if noise is None:
-            found = remainder(drawn)
+            found = noise_of(drawn)
         else:
-            found = remainder(counted(rng, noise * drawn), COUNT**2 / 12)
+            found = noise_of(counted(rng, noise * drawn), COUNT**2 / 12)
         chances.append(found.chance)
         levels.append(found.level)
     truth = density(correlation)
@@ -82,7 +82,7 @@ def test_what_a_model_lacks_shows_in_coloured_noise(correlation: float) -> None:
     slow = np.sin(0.5 * W0 * INTERVAL * np.arange(SAMPLES))
     error = np.sqrt(300 * density(correlation, 0.5 * W0 * INTERVAL) / np.sum(slow**2)) * slow
     for _ in range(5):
-        found = remainder(coloured(rng, correlation) + error)
+        found = noise_of(coloured(rng, correlation) + error)
         assert found.z > 1 or correlation > 0.5
         assert found.chance_of(300 * density(correlation), 1) < 1e-6
 
@@ -94,7 +94,7 @@ def test_a_gain_has_the_chance_that_noise_gives_it() -> None:
         chances = []
         for _ in range(120):
             noise = coloured(rng, correlation)
-            chances.append(remainder(noise).chance_of(float(noise[0] @ swing()[0]) ** 2, 1))
+            chances.append(noise_of(noise).chance_of(float(noise[0] @ swing()[0]) ** 2, 1))
         assert 0.4 < np.mean(chances) < 0.6
         assert 0.03 < np.mean(np.array(chances) < 0.1) < 0.18
         assert min(chances) > 1e-4

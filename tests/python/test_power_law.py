@@ -12,11 +12,11 @@ import pytest
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import virtual_rig
-from pendmap.comparison.data import evidence_of
-from pendmap.diagnosis.baseline import baseline
-from pendmap.diagnosis.candidates import candidates
+from pendmap.comparison.data import split_records
+from pendmap.diagnosis.baseline import fit_baseline
+from pendmap.diagnosis.candidates import list_candidates
 from pendmap.diagnosis.diagnose import diagnosed_model
-from pendmap.diagnosis.fitted_model import with_candidates
+from pendmap.diagnosis.fitted_model import fit_with_candidates
 from pendmap.identification.fit import FitRun, fit_runs, score
 from pendmap.identification.sensitivity import sensitivities, window_slopes
 from pendmap.model import Formula, Rig, load_model, save_model
@@ -26,7 +26,7 @@ from pendmap.records import read_experiment
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.fitted_model import FittedModel
 
 Q, N = "power_law_drag.q", "power_law_drag.n"
 BASE = ("w0", "c_over_m", "Tr")
@@ -127,18 +127,20 @@ def test_a_formula_with_a_power_is_fitted_alike(run: FitRun) -> None:
         assert a.stderr == pytest.approx(b.stderr, rel=0.02)
 
 
-def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[Trial]]:
+def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[FittedModel]]:
     """Hide a power law; return its truth, and the fits from neighbouring powers of the scan."""
     request = virtual_rig.Request(
         "hidden", seed=seed, effects=("power_law_drag",), size=6.0, free=3, noise=0.05, rate=50.0
     )
     where = virtual_rig.places(folder / str(seed), replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
-    evidence = evidence_of(read_experiment(where.experiment))
-    base, _ = baseline(evidence)
-    (shapes,) = (each for each in candidates((), driven=False) if each[0].name == "power_law_drag")
+    data = split_records(read_experiment(where.experiment))
+    base, _ = fit_baseline(data)
+    (shapes,) = (
+        each for each in list_candidates((), driven=False) if each[0].name == "power_law_drag"
+    )
     trials = [
-        with_candidates(evidence, base, [shape], {Q: 1e-5}, level=1.0) for shape in shapes[1:3]
+        fit_with_candidates(data, base, [shape], {Q: 1e-5}, level=1.0) for shape in shapes[1:3]
     ]
     truth = tomllib.loads(where.truth.read_text(encoding="utf-8"))
     (drag,) = (e for e in truth["effect"] if e["name"] == "power_law_drag")
@@ -149,7 +151,7 @@ def test_errors_are_as_great_as_they_are_said_to_be(tmp_path: Path) -> None:
     scaled = []
     for seed in range(1, 17):
         truth, trials = hidden(tmp_path, seed)
-        one, other = (trial.fit for trial in trials)
+        one, other = (fitted.fit for fitted in trials)
         # Fits of candidates end 0.05 above the least sum of squares at most.
         assert abs(one[N] - other[N]) < 2 * math.sqrt(0.05) * one.estimates[N].stderr
         size, power = one.estimates[Q], one.estimates[N]

@@ -80,7 +80,7 @@ def test_three_pendulums_hang_side_by_side(found: Discrepancy, back: ReadBack) -
     """The models' deviations are drawn larger by the factor that the file names."""
     larger = float(back.one("/__properties/pendmap", "deviations_drawn_larger"))
     assert larger >= 1
-    run = found.evidence.fitted[0]
+    run = found.data.fitted[0]
     record = scalars(back, "/run_1/angle/record")
     np.testing.assert_allclose(back.seconds("/run_1/angle/record"), run.time, atol=2e-9)
     np.testing.assert_allclose(record, run.theta)

@@ -12,7 +12,7 @@ import pytest
 import pendmap
 from decays import decay, record
 from pendmap.comparison import compare
-from pendmap.comparison.data import evidence_of
+from pendmap.comparison.data import split_records
 from pendmap.comparison.free import as_json as compared
 from pendmap.comparison.free import as_text as compared_text
 from pendmap.identification import identified_model, identify_experiment
@@ -107,8 +107,8 @@ def test_every_command_says_the_releases(tmp_path: Path, pendmap_command: Comman
     assert "several-releases" in {finding["what"] for finding in looked["findings"]}
     assert [run["name"] for run in looked["runs"]] == ["decay 1/2", "decay 2/2"]
     assert "2 releases" in pendmap_command("look", path).stdout
-    evidence = evidence_of(there)
-    assert [run.name for run in evidence.fitted] == ["decay 1/2", "decay 2/2"]
+    data = split_records(there)
+    assert [run.name for run in data.fitted] == ["decay 1/2", "decay 2/2"]
 
 
 def test_what_a_run_is_said_to_be_is_inherited(tmp_path: Path) -> None:

@@ -23,9 +23,7 @@ from pendmap.figures.report import FIGURES
 from pendmap.report.document import (
     Document,
     Formula,
-    Items,
     Name,
-    Paragraph,
     Picture,
     Section,
     Strong,
@@ -84,9 +82,9 @@ def of_verdict(verdict: str) -> Discrepancy:
     if verdict == "named":
         return named
     # What only the words of the report depend on.
-    judgement = dataclasses.replace(named.judgement, verdict="partial", left=12.0)
+    assessment = dataclasses.replace(named.assessment, verdict="partial", left=12.0)
     nearly = tuple(dataclasses.replace(effect, approximate=True) for effect in named.effects)
-    return dataclasses.replace(named, judgement=judgement, effects=nearly)
+    return dataclasses.replace(named, assessment=assessment, effects=nearly)
 
 
 @pytest.mark.parametrize("verdict", ["none", "named", "partial", "ambiguous", "unknown"])
@@ -149,7 +147,7 @@ def test_its_numbers_are_those_of_the_json() -> None:
         assert any(r[0] == f"`{row['name']}`" and f"{row['score']:.1f}" in r for r in rows)
     for name, limit in fields["detection_limits"].items():
         assert told[f"`{name}`"][2].startswith(number(limit, 2))
-    for run, each in zip(found.evidence.fitted, fields["runs"]["quadratic_drag.q"], strict=True):
+    for run, each in zip(found.data.fitted, fields["runs"]["quadratic_drag.q"], strict=True):
         assert any(r[0] == f"`{run.name}`" and r[2] == number(each["stderr"], 2) for r in rows)
 
 
@@ -223,9 +221,9 @@ def test_whatever_a_user_wrote_is_shown_as_it_is() -> None:
             Section(
                 NASTY,
                 (
-                    Paragraph(f"1. {NASTY}"),
-                    Paragraph(f"- {NASTY}"),
-                    Items((NASTY, (Name(NASTY), " and ", Name("`")), "+ more")),
+                    f"1. {NASTY}",
+                    f"- {NASTY}",
+                    [NASTY, (Name(NASTY), " and ", Name("`")), "+ more"],
                     Formula("th'' = -a |v| <b>"),
                     Table(("one", "two|three"), ((Name(NASTY), NASTY), ("", "4"))),
                     Picture("absent", "Nothing."),

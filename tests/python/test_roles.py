@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pendmap
 from pendmap import InputError
 from pendmap.diagnosis import candidates as search
-from pendmap.diagnosis.candidates import Candidate, candidates
+from pendmap.diagnosis.candidates import Candidate, list_candidates
 from pendmap.model import Effect, effects
 from pendmap.units import Units
 
@@ -83,7 +83,7 @@ def renamed(entry: dict[str, Any]) -> dict[str, Any]:
     return other
 
 
-def seen(name: str) -> list[Any]:
+def predict_limits(name: str) -> list[Any]:
     """What a search makes of an effect, its parameters by their places."""
     names = [p["name"] for p in effects.definition(name)["parameters"]]
     place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
@@ -93,7 +93,7 @@ def seen(name: str) -> list[Any]:
         lists = [[place[n] for n in part] for part in (one.free, one.adapted, one.places)]
         return [shape, *lists, place[one.size]]
 
-    (shaped,) = (c for c in candidates((), driven=True) if c[0].name == name)
+    (shaped,) = (c for c in list_candidates((), driven=True) if c[0].name == name)
     blank = Effect.blank(name, BARE)
     return [[of(one) for one in shaped], blank.values, [place[n] for n in blank.sizes]]
 
@@ -101,11 +101,11 @@ def seen(name: str) -> list[Any]:
 def test_other_names_of_parameters_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     library = effects.library()
     names = [name for name in library if search.own_name(name) is None]
-    expected = {name: seen(name) for name in names}
+    expected = {name: predict_limits(name) for name in names}
     others = {n: renamed(entry) if n in names else entry for n, entry in library.items()}
     for module in (effects, search):
         monkeypatch.setattr(module, "library", lambda: others)
-    assert {name: seen(name) for name in names} == expected
+    assert {name: predict_limits(name) for name in names} == expected
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_a_search_looks_where_is_typical(
     said = dict(zip("bc", zip((first, second), roles, strict=True), strict=True))
     shape = {n: {"power": 0, "role": r, "typical": typical} for n, (typical, r) in said.items()}
     formula = pendmap.Formula("own_effect", "-k*exp(-(b*theta)^2)*v/(1+c^2)", {"k": 1} | shape)
-    ((*found,),) = (c for c in candidates((), driven=False, own=[formula]) if c[0].formula)
+    ((*found,),) = (c for c in list_candidates((), driven=False, own=[formula]) if c[0].formula)
     assert found
     for one in found:
         for name, ((low, high), role) in said.items():

@@ -1,34 +1,23 @@
 """A model against records that it was not fitted to: decays, forced runs, forecasts, peaks.
 
-``free`` and ``forced`` compare a model file with an experiment.
-
-``data`` divides records into what is fitted and what is held back; ``replay`` runs a model from a
-state; ``forecast`` has its error over the horizon and ``cycles`` that of periods and peaks.
+``free`` and ``forced`` compare a model file with an experiment. ``data`` divides records into those
+fitted and those held back; ``replay`` runs a fitted model from a state; ``forecast`` has its errors
+against the horizon, and those of periods and peaks.
 """
 
-from pendmap.comparison.cycles import Cycles, cycles_of
-from pendmap.comparison.data import Evidence, evidence_of
+from pendmap.comparison.data import DataSplit
 from pendmap.comparison.forced import Ensemble, ForcedComparison
-from pendmap.comparison.forecast import Forecast, Gap, forecasts_of, gap_of
+from pendmap.comparison.forecast import Cycles, Forecast, Gap
 from pendmap.comparison.free import Comparison, RunComparison, compare
-from pendmap.comparison.replay import Fits, Motion, replayed, strength_of
 
 __all__ = [
     "Comparison",
     "Cycles",
+    "DataSplit",
     "Ensemble",
-    "Evidence",
-    "Fits",
     "ForcedComparison",
     "Forecast",
     "Gap",
-    "Motion",
     "RunComparison",
     "compare",
-    "cycles_of",
-    "evidence_of",
-    "forecasts_of",
-    "gap_of",
-    "replayed",
-    "strength_of",
 ]

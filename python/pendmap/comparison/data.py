@@ -1,4 +1,4 @@
-"""The records of a diagnosis: those that are fitted, and those that are held back."""
+"""Records divided into those that models are fitted to and those that are held back."""
 
 from __future__ import annotations
 
@@ -23,68 +23,62 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
-"""Parts of a run that are held back where no whole run is: a fifth, at large and small swings."""
+"""Parts of a run held back where no whole run is: a fifth, at large and at small swings."""
 
 FEWEST_FORCED: Final = 2
+"""Forced runs of which one is held back whole."""
+
 FEWEST_FREE: Final = 3
-"""Runs of a kind of which one is held back whole."""
+"""Free runs of which one is held back whole."""
 
 FEWEST: Final = 20
-"""Samples that a stretch held back has at least; two are needed for its initial state."""
+"""Fewest samples of a stretch held back; two of them determine its initial state."""
 
 LEAST: Final = round(FEWEST / (HELD[0][1] - HELD[0][0])) + 1
-"""Samples of a run of which stretches can be held back."""
+"""Fewest samples of a run of which stretches can be held back."""
 
 KNOWN: Final = 0.1
 """Relative standard error of the noise above which a record is too short to show it."""
 
 FINEST: Final = 1e-7
-"""The least noise, rad: a count of 2^26 in a turn, finer than any sensor. Of records without noise
-the way that polynomials follow the motion would be taken for it."""
+"""Least noise, rad, finer than any sensor; it covers the error of local polynomials."""
+
+BLOCKS: Final = 50
+"""Fewest blocks in a swing or turn, so that the spectrum separates noise and motion."""
+
+FEWEST_BLOCKS: Final = 1000
+"""Fewest blocks of a record; with fewer readings the integrator's own steps take the time."""
+
+LEAST_OF_BLOCK: Final = 3
+"""Fewest readings of a block."""
+
+NEIGHBOURS: Final = 2
+"""Blocks on either side through which a parabola is fitted."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Evidence:
-    """Records to fit and records held back.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        Where they come from.
-    runs : tuple of Run
-        All that have samples for fitting.
-    readings : tuple of Reading
-        What the readings of each are worth.
-    fitted, held : tuple of FitRun
-        What models are fitted to, and what they are tried on; readings far denser than the motion
-        are means over blocks, :func:`pendmap.comparison.data.in_blocks`.
-    fitted_of, held_of : tuple of int
-        Which of ``runs`` each belongs to.
-    inside : bool
-        Whether stretches within the fitted runs are held back, which the fitted motion passes
-        through; else what is held back has initial states of its own.
-    """
+class DataSplit:
+    """Records to fit and records held back."""
 
     experiment: Experiment
-    runs: tuple[Run, ...]
-    readings: tuple[Reading, ...]
-    fitted: tuple[FitRun, ...]
-    held: tuple[FitRun, ...]
-    fitted_of: tuple[int, ...]
-    held_of: tuple[int, ...]
+    runs: tuple[Run, ...]  # All runs with samples for fitting
+    readings: tuple[Reading, ...]  # Noise of the readings of each run
+    fitted: tuple[FitRun, ...]  # What models are fitted to; dense readings are block means
+    held: tuple[FitRun, ...]  # What is held back
+    fitted_of: tuple[int, ...]  # Place in ``runs`` of each fitted record
+    held_of: tuple[int, ...]  # Place in ``runs`` of each record held back
+    # Whether stretches within fitted runs are held back, which the fitted motion passes through;
+    # else what is held back has initial states of its own.
     inside: bool
 
     @property
     def forced(self) -> bool:
-        """Whether a run that is fitted has a harmonic drive."""
+        """Whether a fitted run has a harmonic drive."""
         return any(run.drive is not None for run in self.fitted)
 
     @property
     def floors(self) -> tuple[float, ...]:
-        """Of each fitted run the share of rounding, ``count^2 / 12``, in the noise's variance.
-
-        Rounding errs anew with each sample, whatever the colour of what is rounded.
-        """
+        """Share of rounding, ``count^2 / 12``, which is white, in the noise of each fitted run."""
         readings = (self.readings[k] for k in self.fitted_of)
         pairs = zip(readings, self.fitted, strict=True)
         return tuple(
@@ -94,28 +88,29 @@ class Evidence:
 
     @property
     def doubt(self) -> float:
-        """Relative standard error of the noise of all fitted runs together.
-
-        Each run's own is independent of the others'; weights go by samples.
-        """
+        """Relative standard error of the noise of all fitted runs, weighted by samples."""
         doubts = np.array([self.readings[k].doubt for k in self.fitted_of])
         sizes = np.array([float(run.time.size) for run in self.fitted])
         return float(np.sqrt(np.sum((sizes * doubts) ** 2)) / np.sum(sizes))
 
 
-def evidence_of(experiment: Experiment) -> Evidence:
-    """Divide an experiment into what is fitted and what is held back.
+def counted(run: FitRun) -> NDArray[np.bool_]:
+    """Return which samples of a run count."""
+    return np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
 
-    Runs marked ``hold_out`` are held back; where there are none, the middle one of two forced runs
-    or more, on which what the drive lacks is tried, and of three free ones or more. Of fewer, two
-    stretches of each free decay, which the fitted motion passes through without being drawn to
-    them; where no run is free, stretches of the forced one, with initial states of their own:
-    windows there are too short to pass through.
 
-    Raises
-    ------
-    InputError
-        If no run has samples, nothing moves, a forced run has no drive, or all are held back.
+def sigmas(run: FitRun) -> Floats:
+    """Return the standard error of each reading of a run, rad."""
+    return np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)
+
+
+def split_records(experiment: Experiment) -> DataSplit:
+    """Divide an experiment into records to fit and records held back; raises InputError.
+
+    Held back are runs marked ``hold_out``; without any, the middle one of at least two forced runs
+    and of at least three free runs. With fewer forced runs, two stretches of each free decay, which
+    the fitted motion passes through; without a free run, stretches of the forced one with initial
+    states of their own, since its windows are too short to pass through.
     """
     runs = tuple(run for run in experiment.runs if not run.peaks_only)
     if not runs:
@@ -141,33 +136,24 @@ def evidence_of(experiment: Experiment) -> Evidence:
         )
     readings = _readings(runs)
     every = [
-        in_blocks(as_fit_run(run, reading)) for run, reading in zip(runs, readings, strict=True)
+        average_blocks(as_fit_run(run, reading))
+        for run, reading in zip(runs, readings, strict=True)
     ]
     marked = [k for k, run in enumerate(runs) if run.hold_out] or _middle_runs(every)
-    if marked:
-        others = [k for k in range(len(runs)) if k not in marked]
-        if not others:
-            raise InputError(
-                f"{experiment.path}: at least one run must be fitted, all are held out"
-            )
-        fitted, held = [every[k] for k in others], [every[k] for k in marked]
-        return Evidence(
-            experiment,
-            runs,
-            readings,
-            tuple(fitted),
-            tuple(held),
-            tuple(others),
-            tuple(marked),
-            inside=False,
-        )
-    return _stretched(experiment, runs, readings, every)
+    if not marked:
+        return _hold_stretches(experiment, runs, readings, every)
+    others = [k for k in range(len(runs)) if k not in marked]
+    if not others:
+        raise InputError(f"{experiment.path}: at least one run must be fitted, all are held out")
+    fitted, held = (tuple(every[k] for k in places) for places in (others, marked))
+    of = tuple(others), tuple(marked)
+    return DataSplit(experiment, runs, readings, fitted, held, *of, inside=False)
 
 
 def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
-    """Return what the readings of each run are worth.
+    """Return the noise of each run's readings; a run too short to show it has that of the others.
 
-    A run too short to show its noise has that of the others: they are of one sensor.
+    All runs are read by one sensor.
     """
 
     def own(run: Run, sigma: float | None = None) -> Reading:
@@ -188,7 +174,7 @@ def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
 
 
 def _middle_runs(every: Sequence[FitRun]) -> list[int]:
-    """Return the runs to hold back where none is marked; none of too few."""
+    """Return the runs held back where none is marked; none of too few."""
     forced = [k for k, run in enumerate(every) if run.forced]
     free = [k for k, run in enumerate(every) if not run.forced]
     if len(forced) < FEWEST_FORCED:
@@ -199,29 +185,32 @@ def _middle_runs(every: Sequence[FitRun]) -> list[int]:
     return held
 
 
-def _stretched(
+def _hold_stretches(
     experiment: Experiment,
     runs: tuple[Run, ...],
     readings: tuple[Reading, ...],
     every: Sequence[FitRun],
-) -> Evidence:
+) -> DataSplit:
+    """Hold back two stretches of each free run, or of each run where none is free."""
     inside = not all(run.forced for run in every)
     fitted, held, held_of = [], [], []
     for k, run in enumerate(every):
         if inside and run.forced:
             fitted.append(run)
             continue
-        good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted.copy()
+        good, sigma = counted(run), sigmas(run)
         # Parts of the samples that count, not of the time at rest after them.
-        counted = np.flatnonzero(good)
+        samples = np.flatnonzero(good)
         back = np.zeros(good.shape, bool)
-        for first, last in held_parts(counted.size):
-            a, b = int(counted[first]), int(counted[last])
+        for first, last in held_parts(samples.size):
+            a, b = int(samples[first]), int(samples[last])
             if b - a < FEWEST:
                 continue
             back[a:b] = good[a:b]
             if not inside:
-                held.append(_part(run, good, a, b))
+                time, theta, own = run.time[a:b], run.theta[a:b], sigma[a:b]
+                part = dataclasses.replace(run, time=time, theta=theta, sigma=own)
+                held.append(dataclasses.replace(part, trusted=good[a:b]))
                 held_of.append(k)
         fitted.append(dataclasses.replace(run, trusted=good & ~back))
         if inside and back.any():
@@ -232,16 +221,8 @@ def _stretched(
             f"{experiment.path}: one run must have {LEAST} samples or more: there are too few, "
             "none of them can be held back"
         )
-    return Evidence(
-        experiment,
-        runs,
-        readings,
-        tuple(fitted),
-        tuple(held),
-        tuple(range(len(runs))),
-        tuple(held_of),
-        inside=inside,
-    )
+    of = tuple(range(len(runs))), tuple(held_of)
+    return DataSplit(experiment, runs, readings, tuple(fitted), tuple(held), *of, inside=inside)
 
 
 def held_parts(samples: int) -> list[tuple[int, int]]:
@@ -249,64 +230,38 @@ def held_parts(samples: int) -> list[tuple[int, int]]:
     return [(int(low * (samples - 1)), int(high * (samples - 1))) for low, high in HELD]
 
 
-def _part(run: FitRun, good: NDArray[np.bool_], a: int, b: int) -> FitRun:
-    sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)
-    return dataclasses.replace(
-        run, time=run.time[a:b], theta=run.theta[a:b], sigma=sigma[a:b], trusted=good[a:b]
-    )
+def average_blocks(run: FitRun) -> FitRun:
+    """Return a run with dense readings averaged over blocks, else the run itself.
 
-
-BLOCKS: Final = 50
-"""Least number of blocks in a swing or a turn: noise stands apart from the motion in their
-spectrum, and a window has enough of them."""
-
-FEWEST_BLOCKS: Final = 1000
-"""Blocks that a record has at least: below, the integrator's own steps are what takes time."""
-
-LEAST_OF_BLOCK: Final = 3
-"""Readings of a block at least: pairs save little."""
-
-NEIGHBOURS: Final = 2
-"""Blocks on either side through which a parabola is laid."""
-
-
-def in_blocks(run: FitRun) -> FitRun:
-    """Return a run with its readings put together, or as it is where they are not dense.
-
-    The mean of readings over a block is a reading at the mean of their times, with weights ``w``
-    one over their squared errors: ``sum(w x)/sum(w)`` has the error ``sum(w)^(-1/2)``. It exceeds
-    the angle there by the curvature, ``var(t) a/2`` with the acceleration ``a`` of the parabola
-    through five blocks, which is taken off; the rest, of the order of ``T^4/60`` times the fourth
-    derivative in a block of length ``T``, is ``1e-6`` of a swing. A run whose readings are
-    intervals stays as it is: their mean is none.
+    With weights ``w``, one over the squared errors, ``sum(w x)/sum(w)`` at the mean time has the
+    error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the acceleration ``a`` of the parabola
+    through five blocks, is subtracted; the error of order ``T^4/60`` times the fourth derivative,
+    in a block of length ``T``, is ``1e-6`` of a swing. Readings that are intervals have no mean.
     """
     if run.count is not None:
         return run
-    weights = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape) ** -2.0
-    if run.trusted is not None:
-        weights = np.where(run.trusted, weights, 0.0)
+    weights = np.where(counted(run), sigmas(run) ** -2.0, 0.0)
     for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
-        found = _divided(run.time, run.theta, weights, size)
+        found = _block_means(run.time, run.theta, weights, size)
         if _dense(*found[:3]):
             break
     else:
         return run
     time, theta, weight, variance = found
-    counted = weight > 0
-    # What does not count may be anything, and bends no parabola of its neighbours.
-    known = np.where(counted, theta, np.interp(time, time[counted], theta[counted]))
+    good = weight > 0
+    # Blocks that do not count must not bend the parabolas of their neighbours.
+    known = np.where(good, theta, np.interp(time, time[good], theta[good]))
     theta = theta - 0.5 * variance * _curvature(time, known)
-    # One that does not count has any error.
-    sigma = np.where(counted, weight, np.median(weight[counted])) ** -0.5
-    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=counted)
+    sigma = np.where(good, weight, np.median(weight[good])) ** -0.5
+    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
 
 
-def _divided(
+def _block_means(
     time: Floats, theta: Floats, weights: Floats, size: int
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return mean time, mean reading, weight and variance of the times of each block.
+    """Return mean time, mean reading, weight and variance of the times of each full block.
 
-    A block without a reading that counts has the plain means. What is left at the end joins none.
+    A block without a reading that counts has the unweighted means.
     """
     count = time.size // size
     t, x, w = (values[: count * size].reshape(count, size) for values in (time, theta, weights))
@@ -319,14 +274,13 @@ def _divided(
 
 
 def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
-    """Whether blocks are short against the quickest swing, or turn, of what counts."""
-    counted = weight > 0
-    time, theta = time[counted], theta[counted]
+    """Whether blocks are short against the fastest swing or turn of what counts."""
+    time, theta = time[weight > 0], theta[weight > 0]
     if time.size < FEWEST_BLOCKS:
         return False
     steps = np.diff(time)
     velocity = np.diff(theta) / steps
-    # Of a swing the one is its frequency, of a rotation the other.
+    # The frequency of a swing, or that of a rotation.
     rate = max(float(np.std(velocity) / np.std(theta)), float(np.quantile(np.abs(velocity), 0.99)))
     return float(np.median(steps)) * rate < math.tau / BLOCKS
 

@@ -1,9 +1,12 @@
-"""How the error of a forecast grows with its horizon, on data that were held back.
+"""Errors of a baseline and of a better model: residuals, forecasts, periods and peaks.
 
-From many starts on held-out data a model is run forward without any further reading. All it is
-given is its state at the start, adapted to the readings of the swing before. The error at a horizon
-is the root mean square, over all starts, of readings less forecast; with the right model it is the
-noise to begin with, and then grows with what the noise left unknown of the state.
+Forecasts: from many starts on held-out data a model runs forward without further readings. Its
+state at the start is fitted to the readings of the swing before. The error at a horizon is the root
+mean square of readings less forecast over all starts; with the right model it begins at the noise
+and grows with the error of the initial state.
+
+Periods and peaks: as in the paper's figure 7 a model runs forward from the first measured peak, at
+rest; nothing is fitted. Fitted damping may be negative there.
 """
 
 from __future__ import annotations
@@ -15,105 +18,99 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison.further import Reasons, attempted
-from pendmap.comparison.replay import Motion, drives, replayed, settled
+from pendmap.comparison.data import counted, sigmas
+from pendmap.comparison.further import Reasons, compute_part
+from pendmap.comparison.replay import Motion, drive_of, fit_states, run_forward
+from pendmap.identification.peaks import find_peaks
+from pendmap.identification.runs import FitRun
+from pendmap.identification.table1 import errors_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Fits
     from pendmap.identification.fit import TrajectoryFit
-    from pendmap.identification.runs import FitRun
+    from pendmap.identification.peaks import Peaks
+    from pendmap.identification.table1 import PeakErrors
 
     Floats = NDArray[np.float64]
+    Mask = NDArray[np.bool_]
 
 REACH: Final = 2 / 3
-"""Part of a held-out stretch that a forecast covers; it may start anywhere in the rest."""
+"""Length of a forecast over that of its stretch; it may start anywhere in the rest."""
 
 STARTS: Final = 12
-"""Starts in one stretch at most, half a swing apart at least."""
+"""Most starts in a stretch, at least half a swing apart."""
 
 BINS: Final = 40
-"""Horizons that errors are shown at, a tenth of a swing apart at least."""
+"""Most bins of the horizon, each at least a tenth of a swing."""
 
 FEWEST: Final = 8
-"""Readings that a state is adapted to, at least."""
+"""Fewest readings to which an initial state is fitted."""
 
 BEGIN: Final = 0.15
-"""Part of a swing over which a parabola gives a first guess of the state."""
+"""Part of a swing over which a parabola gives the first guess of a state."""
+
+BEFORE: Final = "before"
+AFTER: Final = "after"
+"""Names of the baseline and of the better model."""
+
+PER_SWING: Final = 200
+"""Instants of a swing between which cubics interpolate a peak, to 1e-7 of the swing."""
+
+FEWEST_PEAKS: Final = 3
+"""Peaks of one full cycle."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Forecast:
-    """The error of forecasts against their horizon.
+    """Error of forecasts against their horizon."""
 
-    Parameters
-    ----------
-    kind : str
-        ``free`` or ``forced``: of which runs. Forced motions may be chaotic; then every model's
-        error grows exponentially.
-    horizon : ndarray of float, shape (n,)
-        Times ahead, s; the middle of a bin each.
-    before, after : ndarray of float, shape (n,)
-        Root mean square error of the baseline and of the model found, rad; turns do not count.
-    noise_floor : float
-        Of the readings, rad.
-    starts : int
-        How many forecasts this is the mean of.
-    """
-
-    kind: str
-    horizon: Floats
-    before: Floats
-    after: Floats
-    noise_floor: float
-    starts: int
+    kind: str  # Runs: ``free`` or ``forced``; errors of chaotic forced motion grow exponentially
+    horizon: Floats  # Middle of each bin of the horizon, s, shape (n,)
+    before: Floats  # Root mean square error of the baseline modulo a turn, rad, shape (n,)
+    after: Floats  # That of the model found
+    noise_floor: float  # Root mean square noise of the readings, rad
+    starts: int  # Number of forecasts
 
 
 @dataclasses.dataclass(frozen=True)
 class _Stretch:
-    """Readings held back in a row, in the run that they are of: ``first`` to ``last`` of it."""
+    """Consecutive readings held back, ``first`` to ``last`` of a run."""
 
     run: FitRun
-    place: int
-    held: NDArray[np.bool_]
-    good: NDArray[np.bool_]
+    place: int  # Of the record in what is held back
+    held: Mask
+    good: Mask  # Readings that count, held back or not
     first: int
     last: int
 
 
-def forecasts_of(
-    evidence: Evidence, base: Fits, best: Fits, reasons: Reasons
+def compare_forecasts(
+    data: DataSplit, base: Fits, best: Fits, reasons: Reasons
 ) -> tuple[Forecast, ...]:
-    """Return the error of forecasts, of free runs and of forced ones."""
+    """Return the error of forecasts, of free and of forced runs."""
     swing = math.tau / base.fitted.model.w0
-    every = [s for place in range(len(evidence.held)) for s in _stretches(evidence, place, swing)]
-    kinds = (("free", False), ("forced", True))
+    every = [s for place in range(len(data.held)) for s in _stretches(data, place, swing)]
     found = []
-    for kind, forced in kinds:
-        own = [s for s in every if s.run.forced == forced]
-        found.append(
-            attempted(
-                reasons,
-                f"forecast.{kind}",
-                functools.partial(_forecast, kind, own, base, best, swing),
-                None,
-            )
-        )
+    for kind in ("free", "forced"):
+        own = [s for s in every if s.run.forced == (kind == "forced")]
+        compute = functools.partial(_forecast, kind, own, base, best, swing)
+        found.append(compute_part(reasons, f"forecast.{kind}", compute, None))
     return tuple(forecast for forecast in found if forecast is not None)
 
 
-def _stretches(evidence: Evidence, place: int, swing: float) -> list[_Stretch]:
-    """Return the stretches of a record that was held back, in the run that they are of."""
-    held, of = evidence.held[place], evidence.held_of[place]
-    run = evidence.fitted[evidence.fitted_of.index(of)] if of in evidence.fitted_of else held
+def _stretches(data: DataSplit, place: int, swing: float) -> list[_Stretch]:
+    """Return the stretches of a record held back, as parts of their run."""
+    held, of = data.held[place], data.held_of[place]
+    run = data.fitted[data.fitted_of.index(of)] if of in data.fitted_of else held
     back = np.zeros(run.time.shape, bool)
     at = np.searchsorted(run.time, held.time)
-    back[at] = True if held.trusted is None else held.trusted
-    good = back | (True if run.trusted is None else run.trusted)
+    back[at] = counted(held)
+    good = back | counted(run)
     samples = np.flatnonzero(back)
     if samples.size < FEWEST:
         return []
@@ -125,7 +122,7 @@ def _stretches(evidence: Evidence, place: int, swing: float) -> list[_Stretch]:
 
 
 def _earliest(stretch: _Stretch, swing: float) -> float:
-    """Return the first time at which a stretch has a swing of readings behind it."""
+    """Return the first time with a swing of readings before it."""
     time = stretch.run.time
     return max(float(time[stretch.first]), float(time[np.argmax(stretch.good)]) + swing)
 
@@ -133,6 +130,7 @@ def _earliest(stretch: _Stretch, swing: float) -> float:
 def _forecast(
     kind: str, stretches: list[_Stretch], base: Fits, best: Fits, swing: float
 ) -> Forecast | None:
+    """Return the errors of both models over all starts; None without a start."""
     rooms = [float(s.run.time[s.last]) - _earliest(s, swing) for s in stretches]
     rooms = [room for room in rooms if room > 0]
     if not rooms:
@@ -148,21 +146,16 @@ def _forecast(
         counts = _ahead(stretch, at, reach)
         bins = np.minimum((ahead[counts] / reach * count).astype(int), count - 1)
         which.append((counts, bins))
-        sigma = np.broadcast_to(np.asarray(stretch.run.sigma, float), ahead.shape)
-        floors.append(float(np.mean(sigma[counts] ** 2)) if counts.any() else math.nan)
+        noise = sigmas(stretch.run)[counts]
+        floors.append(float(np.mean(noise**2)) if counts.any() else math.nan)
     before, after = (_errors(model, starts, which, reach, swing, count) for model in (base, best))
-    return Forecast(
-        kind,
-        (np.arange(count) + 0.5) * reach / count,
-        before,
-        after,
-        math.sqrt(float(np.nanmean(floors))),
-        len(starts),
-    )
+    middles = (np.arange(count) + 0.5) * reach / count
+    floor = math.sqrt(float(np.nanmean(floors)))
+    return Forecast(kind, middles, before, after, floor, len(starts))
 
 
 def _starts(stretch: _Stretch, reach: float, swing: float) -> list[float]:
-    """Return times from which a stretch is forecast, with enough readings behind each."""
+    """Return the start times of forecasts in a stretch with enough readings before each."""
     first = _earliest(stretch, swing)
     room = float(stretch.run.time[stretch.last]) - reach - first
     if room < 0:
@@ -172,51 +165,49 @@ def _starts(stretch: _Stretch, reach: float, swing: float) -> list[float]:
     return [float(at) for at in times if np.count_nonzero(_behind(stretch, at, swing)) >= FEWEST]
 
 
-def _behind(stretch: _Stretch, at: float, swing: float) -> NDArray[np.bool_]:
+def _behind(stretch: _Stretch, at: float, swing: float) -> Mask:
     time = stretch.run.time
     return np.asarray(stretch.good & (time - at > -swing) & (time - at <= 0))
 
 
-def _ahead(stretch: _Stretch, at: float, reach: float) -> NDArray[np.bool_]:
+def _ahead(stretch: _Stretch, at: float, reach: float) -> Mask:
     ahead = stretch.run.time - at
     return np.asarray(stretch.held & (ahead > 0) & (ahead <= reach))
 
 
-def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are sorted)
+def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are binned)
     model: Fits,
     starts: list[tuple[_Stretch, float]],
-    which: list[tuple[NDArray[np.bool_], NDArray[np.int64]]],
+    which: list[tuple[Mask, NDArray[np.int64]]],
     reach: float,
     swing: float,
     count: int,
 ) -> Floats:
-    """Return the root mean square error in each bin."""
+    """Return the root mean square error in each bin, rad."""
     before, whole = [], []
     for stretch, at in starts:
-        run = dataclasses.replace(stretch.run, drive=drives(model.held, stretch.run, stretch.place))
+        drive = drive_of(model.held, stretch.run, stretch.place)
+        run = dataclasses.replace(stretch.run, drive=drive)
         behind = _behind(stretch, at, swing)
-        before.append(_of(run, behind))
-        whole.append(_of(run, behind | _ahead(stretch, at, reach)))
+        before.append(_samples(run, behind))
+        whole.append(_samples(run, behind | _ahead(stretch, at, reach)))
     motion = Motion.of(model.fitted)
-    states = settled(motion, before, [_guess(run, swing) for run in before])
-    forecasts = replayed(motion, whole, states)
+    states = fit_states(motion, before, [_guess(run, swing) for run in before])
+    forecasts = run_forward(motion, whole, states)
     squares, samples = np.zeros(count), np.zeros(count)
     for (stretch, _), (counts, bins), (readings, _) in zip(starts, which, forecasts, strict=True):
         error = stretch.run.theta[counts] - readings[readings.size - bins.size :]
-        # Which turn a pendulum is in that went over the top says nothing more.
-        error = np.angle(np.exp(1j * error))
+        error = np.angle(np.exp(1j * error))  # turns over the top do not count
         squares += np.bincount(bins, error**2, count)
         samples += np.bincount(bins, minlength=count)
     with np.errstate(invalid="ignore"):
         return np.sqrt(squares / np.where(samples > 0, samples, math.nan))
 
 
-def _of(run: FitRun, kept: NDArray[np.bool_]) -> FitRun:
-    """Return some of a run's samples."""
-    sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)
-    return dataclasses.replace(
-        run, time=run.time[kept], theta=run.theta[kept], sigma=sigma[kept], trusted=None
-    )
+def _samples(run: FitRun, kept: Mask) -> FitRun:
+    """Return a run with some of its samples."""
+    sigma, time, theta = sigmas(run)[kept], run.time[kept], run.theta[kept]
+    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=None)
 
 
 def _guess(run: FitRun, swing: float) -> tuple[float, float]:
@@ -229,7 +220,7 @@ def _guess(run: FitRun, swing: float) -> tuple[float, float]:
 
 @dataclasses.dataclass(frozen=True)
 class RunGap:
-    """Residuals of one run, rms in rad."""
+    """Root mean square residuals of one run, rad."""
 
     name: str
     held_out: bool
@@ -240,80 +231,123 @@ class RunGap:
 
 @dataclasses.dataclass(frozen=True)
 class Gap:
-    """Root mean squares of the residuals, rad.
+    """Root mean square residuals, rad."""
 
-    Parameters
-    ----------
-    noise_floor, held_out_noise_floor : float
-        Of the noise alone, as it is seen without a model: of the runs that were fitted, and of what
-        was held back.
-    before, after : float
-        Of the baseline and of the model found, on the runs that both were fitted to.
-    held_out_before, held_out_after : float
-        On what was held back from both, with fresh initial states.
-    by_run : tuple of RunGap
-        Each run, or part of one, by itself.
-    """
-
-    noise_floor: float
-    held_out_noise_floor: float
-    before: float
-    after: float
-    held_out_before: float
-    held_out_after: float
-    by_run: tuple[RunGap, ...]
+    noise_floor: float  # Of the noise alone, without a model, in the fitted runs
+    held_out_noise_floor: float  # The noise of what is held back
+    before: float  # Of the baseline in the fitted runs
+    after: float  # Of the model found in the fitted runs
+    held_out_before: float  # Of the baseline on what is held back, with fitted initial states
+    held_out_after: float  # Of the model found on what is held back
+    by_run: tuple[RunGap, ...]  # Each run, or part of one
 
 
-def gap_of(evidence: Evidence, base: Fits, best: Fits) -> Gap:
-    """Return the gap that a baseline leaves and that a model leaves."""
-    before, held_before = base
-    after, held_after = best
-    rows = _rows(evidence.fitted, before, after, held_out=False)
-    held = _rows(evidence.held, held_before, held_after, held_out=True)
-    return Gap(
-        _together(evidence.fitted, rows),
-        _together(evidence.held, held),
-        _rms(evidence.fitted, before),
-        _rms(evidence.fitted, after),
-        _rms(evidence.held, held_before),
-        _rms(evidence.held, held_after),
-        (*rows, *held),
-    )
-
-
-def _rows(
-    runs: Sequence[FitRun], before: TrajectoryFit, after: TrajectoryFit, *, held_out: bool
-) -> list[RunGap]:
-    return [
-        RunGap(
-            run.name,
-            held_out,
-            _floor(run),
-            _rms([run], before, k),
-            _rms([run], after, k),
-        )
-        for k, run in enumerate(runs)
-    ]
+def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
+    """Return the root mean square residuals of a baseline and of a model."""
+    rows: list[RunGap] = []
+    floors, rms = [], []
+    for held_out in (False, True):
+        runs = data.held if held_out else data.fitted
+        before, after = ((f.held if held_out else f.fitted) for f in (base, best))
+        own = [
+            RunGap(run.name, held_out, _floor(run), _rms([run], before, k), _rms([run], after, k))
+            for k, run in enumerate(runs)
+        ]
+        sizes = [int(counted(run).sum()) for run in runs]
+        squares = [size * row.noise_floor**2 for size, row in zip(sizes, own, strict=True)]
+        floors.append(math.sqrt(sum(squares) / sum(sizes)))
+        rms += [_rms(runs, before), _rms(runs, after)]
+        rows += own
+    return Gap(floors[0], floors[1], rms[0], rms[1], rms[2], rms[3], tuple(rows))
 
 
 def _floor(run: FitRun) -> float:
-    sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)
-    return float(np.sqrt(np.mean(np.square(sigma if run.trusted is None else sigma[run.trusted]))))
-
-
-def _together(runs: Sequence[FitRun], rows: Sequence[RunGap]) -> float:
-    sizes = [run.time.size if run.trusted is None else int(run.trusted.sum()) for run in runs]
-    squares = [size * row.noise_floor**2 for size, row in zip(sizes, rows, strict=True)]
-    return math.sqrt(sum(squares) / sum(sizes))
+    """Return the root mean square noise of a run's readings that count, rad."""
+    return float(np.sqrt(np.mean(np.square(sigmas(run)[counted(run)]))))
 
 
 def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:
+    """Return the root mean square residual of runs, the first of them at a place of a fit."""
     squares, count = 0.0, 0
     for k, run in enumerate(runs, start=first):
         residual = fit.residuals[k]
-        good = np.isfinite(residual)
-        if run.trusted is not None:
-            good &= run.trusted
+        good = np.isfinite(residual) & counted(run)
         squares += float(np.sum(residual[good] ** 2))
         count += int(np.count_nonzero(good))
     return math.sqrt(squares / count) if count else math.nan
+
+
+@dataclasses.dataclass(frozen=True)
+class Cycles:
+    """Periods and peaks of one free run against those of two models."""
+
+    name: str  # Of the run
+    held_out: bool  # Whether the whole run is held back
+    peaks: Peaks  # Measured
+    errors: dict[str, PeakErrors]  # Of the models ``before`` and ``after``, if they can be run
+
+
+def compare_cycles(data: DataSplit, base: Fits, best: Fits, reasons: Reasons) -> tuple[Cycles, ...]:
+    """Return the errors of every free run with a full cycle, those held back first."""
+    found = []
+    for k, (run, reading) in enumerate(zip(data.runs, data.readings, strict=True)):
+        # An angle made of an acceleration is too rough.
+        if run.kind != "free" or run.accelerometer is not None:
+            continue
+        peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
+        if len(peaks.turned) < FEWEST_PEAKS:
+            continue
+        errors = {}
+        for name, model in ((BEFORE, base), (AFTER, best)):
+            compute = functools.partial(
+                _simulated_peaks, model.fitted, peaks, reading.sigma, run.lab_time_s
+            )
+            simulated = compute_part(reasons, f"cycles.{run.name}.{name}", compute, None)
+            if simulated is not None:
+                errors[name] = errors_of(name, peaks, *simulated)
+        if errors:
+            found.append(Cycles(run.name, k not in data.fitted_of, peaks, errors))
+    return tuple(sorted(found, key=lambda one: not one.held_out))
+
+
+def _simulated_peaks(
+    fit: TrajectoryFit, peaks: Peaks, sigma: float, lab_time_s: float
+) -> tuple[Floats, Floats]:
+    """Return times and readings of a model's peaks from the first measured one on."""
+    turned = peaks.turned
+    first, amplitude = float(turned.time[0]), float(turned.amplitude[0])
+    until = 1.2 * (float(turned.time[-1]) - first) + 5.0
+    swing = math.tau / fit.model.w0
+    time = first + np.linspace(0.0, until, math.ceil(PER_SWING * until / swing) + 1)
+    run = FitRun(time, np.zeros(time.shape), sigma, lab_time_s=lab_time_s)
+    # Errors of the sensor, which depend slowly on the angle, separate angle and reading.
+    start = amplitude
+    for _ in range(2):
+        ((readings, curve),) = run_forward(Motion.of(fit), [run], [(start, 0.0)])
+        start += amplitude - float(readings[0])
+    return _turning_points(time, readings, curve)
+
+
+def _turning_points(time: Floats, readings: Floats, curve: Floats) -> tuple[Floats, Floats]:
+    """Return times and readings at the turning points of a curve, with its start and its stop."""
+    theta, velocity = curve
+    before, after = velocity[1:-1], velocity[2:]
+    turns = np.flatnonzero((before * after < 0) | ((before != 0) & (after == 0))) + 1
+    step, bottom = np.diff(time)[turns], theta[turns]
+    # Zeros of the derivative of Hermite's cubic through both ends.
+    rise = theta[turns + 1] - bottom
+    v, w = step * velocity[turns], step * velocity[turns + 1]
+    a, b = 3 * (v + w - 2 * rise), 2 * (3 * rise - 2 * v - w)
+    half = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * v, 0.0)), b))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        roots = np.stack([v / half, half / a])
+    # The velocity changes its sign once between the ends: one root lies there.
+    inside = (roots >= 0) & (roots <= 1)
+    x = np.where(inside[0], roots[0], np.where(inside[1], roots[1], 1.0))
+    angle = bottom + x * (v + x * (b / 2 + x * a / 3))
+    errors = readings - theta
+    zero = errors[turns] + x * (errors[turns + 1] - errors[turns])
+    return (
+        np.concatenate([time[:1], time[turns] + x * step]),
+        np.concatenate([readings[:1], angle + zero]),
+    )

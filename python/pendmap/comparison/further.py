@@ -1,8 +1,7 @@
-"""What a diagnosis computes once its verdict stands, each part by itself.
+"""Parts of a diagnosis that its verdict does not rest on: each may fail by itself.
 
-The verdict does not rest on these parts, and a model that was fitted may be lost where they run it:
-in another record, from another start, with another size of an effect. A part that cannot be
-computed is left out, and its reason is kept.
+A fitted model may diverge where such a part runs it: in another record, from another state, with
+another size of an effect. The part is then left out, and the reason is kept.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ Reasons = dict[str, str]
 Part = TypeVar("Part")
 
 LOST: Final = (ArithmeticError, np.linalg.LinAlgError)
-"""How it shows that numbers are lost: in a motion, in a quotient, in a matrix made of both."""
+"""Errors that a diverging motion raises, directly or through a quotient or matrix of it."""
 
 
-def attempted(reasons: Reasons, field: str, compute: Callable[[], Part], otherwise: Part) -> Part:
-    """Return a part of a diagnosis, or ``otherwise`` with the reason kept."""
+def compute_part(reasons: Reasons, field: str, compute: Callable[[], Part], default: Part) -> Part:
+    """Return a part of a diagnosis; where it fails, the default, with the reason kept."""
     try:
         return compute()
     except LOST as error:
         reasons[field] = str(error)
-        return otherwise
+        return default

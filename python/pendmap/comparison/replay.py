@@ -1,4 +1,4 @@
-"""A fitted model run forward from a state, without any further data."""
+"""A fitted model run forward from given states, without further data."""
 
 from __future__ import annotations
 
@@ -21,17 +21,26 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
 
     Floats = NDArray[np.float64]
+    States = Sequence[tuple[float, float]]
 
 OWN: Final = ("w0", "c_over_m", "Tr", "torque")
-"""Parameters that stand beside the model: damping may have been fitted negative, and a model has
-none."""
+"""Parameters kept beside the model: fitted damping may be negative, which no model allows."""
 
-SEARCHED: Final = 12
-"""Steps in which a state is found."""
+STATE_STEPS: Final = 12
+"""Most steps of the least-squares search for initial states."""
+
+INSTANTS: Final = 150
+"""Instants of the records at which the torque of an effect is evaluated."""
+
+STEP: Final = 1e-3
+"""Length of the run from each instant, in small swings: the motion hardly changes in it."""
+
+EXACT: Final = 1e-9
+"""Standard error of readings, rad, from which the integrator takes its tolerance."""
 
 
 class Fits(NamedTuple):
-    """A model fitted to records, and with its parameters held on the records held back."""
+    """A model fitted to records, and with fixed parameters on the records held back."""
 
     fitted: TrajectoryFit
     held: TrajectoryFit
@@ -39,26 +48,18 @@ class Fits(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """What makes a pendulum move as it was fitted.
+    """The equation of motion of a fitted pendulum."""
 
-    Parameters
-    ----------
-    model : Rig
-        With its effects.
-    own : mapping of str to float
-        What counts instead of the model's own parameters.
-    """
-
-    model: Rig
-    own: Mapping[str, float]
+    model: Rig  # With its effects
+    own: Mapping[str, float]  # Values that replace the model's own parameters
 
     @classmethod
     def of(cls, fit: TrajectoryFit) -> Motion:
-        """Return that of a model that was fitted."""
+        """Return the motion of a fitted model."""
         return cls(fit.model, {name: fit[name] for name in OWN if name in fit.estimates})
 
     def without(self, effect: str) -> Motion:
-        """Return the same pendulum without one of its effects."""
+        """Return the motion of the pendulum without one of its effects."""
         own = own_name(effect)
         if own is not None:
             return dataclasses.replace(self, own={**self.own, own: 0.0})
@@ -66,62 +67,43 @@ class Motion:
         return dataclasses.replace(self, model=dataclasses.replace(self.model, effects=kept))
 
 
-def replayed(
-    motion: Motion, runs: Sequence[FitRun], states: Sequence[tuple[float, float]]
+def run_forward(
+    motion: Motion, runs: Sequence[FitRun], states: States
 ) -> list[tuple[Floats, Floats]]:
-    """Return what the sensor would read of a model, and how the model moves.
+    """Return readings (n,), rad, and angle and velocity (2, n), rad and rad/s, of each run.
 
-    Parameters
-    ----------
-    motion : Motion
-        The model.
-    runs : sequence of FitRun
-        Times, drives and laboratory time; readings are not looked at.
-    states : sequence of (float, float)
-        Angle (rad) and velocity (rad/s) of each at its first time.
-
-    Returns
-    -------
-    list of (ndarray of shape (n,), ndarray of shape (2, n))
-        For each run readings (rad), and angle and velocity (rad, rad/s).
-
-    Raises
-    ------
-    FitDiverged
-        If a motion leaves the range of numbers.
+    Runs give times, drives and laboratory time, states the angle and velocity at their first times;
+    raises FitDiverged.
     """
     blank = [dataclasses.replace(run, theta=np.zeros(run.time.shape), trusted=None) for run in runs]
-    fit = _from(motion, blank, states, steps=0)
+    fit = _fit_motion(motion, blank, states, steps=0)
     pairs = zip(fit.residuals, fit.curves, strict=True)
     return [(-residual, curve) for residual, curve in pairs]
 
 
-def settled(
-    motion: Motion, runs: Sequence[FitRun], states: Sequence[tuple[float, float]]
-) -> list[tuple[float, float]]:
-    """Return the states at the runs' first times from which a model comes nearest to readings.
-
-    Raises
-    ------
-    FitDiverged
-        If a motion leaves the range of numbers.
-    """
-    fit = _from(motion, runs, states, steps=SEARCHED)
+def fit_states(motion: Motion, runs: Sequence[FitRun], states: States) -> list[tuple[float, float]]:
+    """Return the initial states with which a model fits readings best; raises FitDiverged."""
+    fit = _fit_motion(motion, runs, states, steps=STATE_STEPS)
     return [(theta, velocity) for *_, theta, velocity in fit.windows]
 
 
-def drives(held: TrajectoryFit, run: FitRun, place: int) -> Mapping[str, float | None] | None:
-    """Return the drive of a run held back, its phase as the model has it where no one knows it."""
+def drive_of(held: TrajectoryFit, run: FitRun, place: int) -> Mapping[str, float | None] | None:
+    """Return the drive of a run held back; an unknown phase is that of the fit."""
     if run.drive is None or run.drive.get("phi") is not None:
         return run.drive
-    known = held.estimates
-    phase = next((known[n].value for n in (f"phi[{place}]", "phi") if n in known), 0.0)
-    return {**run.drive, "phi": phase}
+    return {**run.drive, "phi": _fitted_phase(held, place)}
 
 
-def _from(
-    motion: Motion, runs: Sequence[FitRun], states: Sequence[tuple[float, float]], *, steps: int
+def _fitted_phase(fit: TrajectoryFit, place: int) -> float:
+    """Return the drive phase, rad, that a fit has for a run; 0 where it has none."""
+    names = (f"phi[{place}]", "phi")
+    return next((fit.estimates[n].value for n in names if n in fit.estimates), 0.0)
+
+
+def _fit_motion(
+    motion: Motion, runs: Sequence[FitRun], states: States, *, steps: int
 ) -> TrajectoryFit:
+    """Fit initial states, in one window a run, with all parameters fixed."""
     whole = [dataclasses.replace(run, longest_s=math.inf) for run in runs]
     windows = [
         (k, 0, run.time.size, *state)
@@ -134,88 +116,50 @@ def _from(
     )  # fmt: skip
 
 
-INSTANTS: Final = 150
-"""Instants of the records at which an effect is tried."""
-
-STEP: Final = 1e-3
-"""Part of a small swing in which it acts: the motion is the same for so long."""
-
-EXACT: Final = 1e-9
-"""Error of the readings, rad, that the integrator takes for its own allowance."""
-
-
 @dataclasses.dataclass(frozen=True)
 class Strength:
-    """An effect over the motion of the fitted records.
+    """Strength of an effect over the motion of the fitted records."""
 
-    Parameters
-    ----------
-    torque, greatest_torque : float
-        Root mean square and greatest size of its torque over the moment of inertia, rad/s^2.
-    reading, greatest_reading : float
-        The same of what it adds to the sensor's reading, rad.
-    """
-
-    torque: float
-    greatest_torque: float
-    reading: float
-    greatest_reading: float
+    torque: float  # Root mean square of its torque over the moment of inertia, rad/s^2
+    greatest_torque: float  # Greatest size of that torque, rad/s^2
+    reading: float  # Root mean square of what it adds to the reading, rad
+    greatest_reading: float  # Greatest size of that addition, rad
 
 
-def strength_of(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -> Strength:
-    """Return how strong an effect of a model is, from the motion with it and without it.
-
-    Raises
-    ------
-    FitDiverged
-        If a motion leaves the range of numbers.
-    """
+def effect_strength(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -> Strength:
+    """Return the strength of an effect from the motion with and without it; raises FitDiverged."""
     step = STEP * 2 * np.pi / fit.model.w0
     runs, states = [], []
     count = -(-INSTANTS // len(fitted))
     for k, run in enumerate(fitted):
         theta, velocity = fit.curves[k]
         known = np.flatnonzero(np.isfinite(theta))
-        # Without a phase a drive is none; what is not known was fitted.
-        drive = run.drive and {**run.drive, "phi": _phase(fit, run, k)}
+        phase = (run.drive or {}).get("phi")
+        phase = _fitted_phase(fit, k) if phase is None else phase
+        drive = run.drive and {**run.drive, "phi": phase}
         for at in known[np.linspace(0, known.size - 1, min(count, known.size)).astype(int)]:
-            time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # no record has fewer
+            time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # the fewest times of a record
             runs.append(
                 dataclasses.replace(
                     run, time=time, theta=np.zeros(3), sigma=EXACT, trusted=None, drive=drive
                 )
             )
             states.append((float(theta[at]), float(velocity[at])))
-    motion = Motion.of(fit)
-    torque, reading = acting(motion, effect, runs, states, step)
-    return Strength(*(s for x in (torque, reading) for s in (_rms(x), float(np.abs(x).max()))))
+    values = effect_action(Motion.of(fit), effect, runs, states, step)
+    torque, reading = ((float(np.sqrt(np.mean(x**2))), float(np.abs(x).max())) for x in values)
+    return Strength(*torque, *reading)
 
 
-def acting(
-    motion: Motion,
-    effect: str,
-    runs: Sequence[FitRun],
-    states: Sequence[tuple[float, float]],
-    step: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return an effect's torque, rad/s^2, and what it adds to the reading, rad, at runs' starts.
+def effect_action(
+    motion: Motion, effect: str, runs: Sequence[FitRun], states: States, step: float
+) -> tuple[Floats, Floats]:
+    """Return an effect's torque, rad/s^2, and addition to the reading, rad, where runs start.
 
-    Each run is as short as ``step``, s.
+    Each run lasts ``step``, s.
     """
-    with_it = replayed(motion, runs, states)
-    without = replayed(motion.without(effect), runs, states)
+    with_it = run_forward(motion, runs, states)
+    without = run_forward(motion.without(effect), runs, states)
     pairs = list(zip(with_it, without, strict=True))
     torque = np.array([(a[1, 2] - b[1, 2]) / step for (_, a), (_, b) in pairs])
     reading = np.array([a[0] - b[0] for (a, _), (b, _) in pairs])
     return torque, reading
-
-
-def _phase(fit: TrajectoryFit, run: FitRun, place: int) -> float:
-    known = (run.drive or {}).get("phi")
-    fitted = fit.estimates
-    names = (f"phi[{place}]", "phi")
-    return next((fitted[n].value for n in names if n in fitted), 0.0) if known is None else known
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -1,4 +1,4 @@
-"""The model to begin with: viscous damping and Coulomb friction, or the one that is given."""
+"""The baseline model, viscous damping and Coulomb friction or a given one, and its first fit."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.comparison.data import counted
 from pendmap.diagnosis.candidates import CORE, Candidate
-from pendmap.diagnosis.fitted_model import GENTLE, Trial, fitted, settled, with_candidates
-from pendmap.diagnosis.physical import within_physics
-from pendmap.diagnosis.refit import best_of
-from pendmap.diagnosis.refit import without as leave_out
+from pendmap.diagnosis.fitted_model import (
+    GENTLE,
+    FittedModel,
+    converge,
+    fit_model,
+    fit_with_candidates,
+    impose_physics,
+)
+from pendmap.diagnosis.refit import best_of, drop_effect
 from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.start import starting_values
@@ -22,105 +28,104 @@ from pendmap.model.rig import own_name
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.data import DataSplit
     from pendmap.identification.runs import FitRun
 
 SOUND: Final = 1.5
-"""Sum of squares for each degree of freedom up to which a fit is taken for what it is."""
+"""Sum of squares per degree of freedom up to which a model follows a run."""
 
 PARTS: Final = (1, 3, 10)
-"""Windows that a run is divided into, in turn, until the model follows it."""
+"""Numbers of windows into which a run is divided, in turn, until a model follows it."""
 
 POOR: Final = 0.1
-"""Residuals above this part of a record's own scatter are no fit: the search went astray."""
+"""Residual, over the standard deviation of the angle, above which a fit went astray."""
 
 
-def baseline(
-    evidence: Evidence, model: Rig | None = None, without: Collection[str] = ()
-) -> tuple[Trial, Trial | None]:
-    """Fit the model to begin with, and the physical core.
+def fit_baseline(
+    data: DataSplit, model: Rig | None = None, without: Collection[str] = ()
+) -> tuple[FittedModel, FittedModel | None]:
+    """Fit the given model, and the physical core (None if the given model has it).
 
     The given model is ``th'' + c_over_m th' + w0**2 (1 + a(t)) sin th = -Tr sign(th')`` by default.
-    The core adds ``q th' abs(th')`` and the sensor's zero; it is none where the given model has
-    them. Each is fitted from the other's motion too. Damping may come out negative: a bound stalls
-    the fit, and what is missing in the model may drive it there.
-
-    Of a given model the natural frequency, viscous damping and sizes of effects are fitted, Coulomb
-    friction and a constant torque only if it has them. Effects of ``without`` are not in the core.
+    Of another one the natural frequency, viscous damping and sizes of effects are fitted, Coulomb
+    friction and a constant torque only if it has them. The core adds ``q th' abs(th')`` and the
+    sensor's zero, but no effects of ``without``. Each is fitted from the other's motion too.
+    Damping may be negative, since a bound stalls the fit.
     """
     if model is not None:
         own = _unfolded(model)
         free = ["w0", "c_over_m", *(n for n in ("Tr", "torque") if getattr(own, n) != 0)]
         sizes = [f"{effect.name}.{size}" for effect in own.effects for size in effect.sizes]
-        base = fitted(evidence, own, [*free, *sizes])
+        base = fit_model(data, own, [*free, *sizes])
     else:
         free = ["w0", "c_over_m", "Tr"]
-        first = _start(evidence)
-        base = _through_all(evidence, first, free) or fitted(evidence, first, free)
-    added = [c for c in map(Candidate, CORE) if c.name not in {*taken_by(base), *without}]
+        first = _start(data)
+        base = _through_all(data, first, free) or fit_model(data, first, free)
+    added = [c for c in map(Candidate, CORE) if c.name not in {*base.taken, *without}]
     if not added:
         return base, None
-    core = best_of(*(_core(evidence, base, added, short=short) for short in (False, True)))
-    if model is None and (core is None or _poor(evidence, core)):
-        base = _rescued(evidence, first, base)
-        core = best_of(core, _core(evidence, base, added, short=False))
+    core = best_of(*(_core(data, base, added, short=short) for short in (False, True)))
+    if model is None and (core is None or not follows(data, core)):
+        base = _rescued(data, first, base)
+        core = best_of(core, _core(data, base, added, short=False))
     if core is None:
         return base, None
-    core = settled(evidence, core, core.level)
-    rest: Trial | None = core
+    core = converge(data, core, core.level)
+    reduced: FittedModel | None = core
     for candidate in added:
-        rest = rest and leave_out(evidence, rest, candidate, core.level)
-    return best_of(base, rest) or base, within_physics(evidence, core)
+        reduced = reduced and drop_effect(data, reduced, candidate, core.level)
+    return best_of(base, reduced) or base, impose_physics(data, core)
 
 
-def follows(evidence: Evidence, trial: Trial) -> bool:
-    """Whether a model follows the motion, whatever it leaves."""
-    return not _poor(evidence, trial)
+def follows(data: DataSplit, fitted: FittedModel) -> bool:
+    """Whether a model follows the motion, whatever its residuals lack."""
+    scatter = np.mean([float(np.std(run.theta)) for run in data.fitted])
+    return fitted.fit.rms <= POOR * float(scatter)
 
 
 def _core(
-    evidence: Evidence, base: Trial, added: Sequence[Candidate], *, short: bool
-) -> Trial | None:
+    data: DataSplit, base: FittedModel, added: Sequence[Candidate], *, short: bool
+) -> FittedModel | None:
     start = {candidate.free[0]: 0.0 for candidate in added}
     try:
-        return with_candidates(evidence, base, added, start, level=base.level, short=short)
+        return fit_with_candidates(data, base, added, start, level=base.level, short=short)
     except FitDiverged:
-        return None  # the motion is lost
+        return None
 
 
-def _rescued(evidence: Evidence, first: Rig, found: Trial) -> Trial:
-    """Return the given model fitted with gentler windows, in parts, or from other starts."""
+def _rescued(data: DataSplit, first: Rig, found: FittedModel) -> FittedModel:
+    """Return the given model fitted with slowly growing windows, in parts, or from other starts."""
     free = list(found.free)
     if not found.fit.converged:
-        gently = fitted(evidence, first, free, growth=GENTLE)
-        divided = None if gently.fit.converged else _in_parts(evidence, first, free)
+        gently = fit_model(data, first, free, growth=GENTLE)
+        divided = None if gently.fit.converged else _in_parts(data, first, free)
         found = best_of(found, gently, divided) or found
-    if found.fit.converged and not _poor(evidence, found):
+    if found.fit.converged and follows(data, found):
         return found
-    for begin in _other_starts(evidence):
-        found = best_of(found, fitted(evidence, begin, free)) or found
-        if not _poor(evidence, found):
+    for begin in _other_starts(data):
+        found = best_of(found, fit_model(data, begin, free)) or found
+        if follows(data, found):
             break
     return found
 
 
-def _in_parts(evidence: Evidence, start: Rig, free: list[str]) -> Trial | None:
-    """Return the fit with runs divided that a model does not follow as a whole even by themselves.
+def _in_parts(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
+    """Return the fit with those runs divided that a model does not follow as a whole.
 
-    So released near the top, where a swing that is nearly right becomes a turn: in a fit of all
-    runs one that is lost draws the others along. None where there is no such run.
+    A run released near the top easily diverges, and takes the fit of the other runs with it. None
+    where there is no such run.
     """
-    runs = [run if run.forced else _followed(run, start, free) for run in evidence.fitted]
-    if all(new is old for new, old in zip(runs, evidence.fitted, strict=True)):
+    runs = [run if run.forced else _divide(run, start, free) for run in data.fitted]
+    if all(new is old for new, old in zip(runs, data.fitted, strict=True)):
         return None
     try:
-        return fitted(dataclasses.replace(evidence, fitted=tuple(runs)), start, free)
+        return fit_model(dataclasses.replace(data, fitted=tuple(runs)), start, free)
     except FitDiverged:
         return None
 
 
-def _followed(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
-    """Return a run with windows as long as a model of its own can follow it."""
+def _divide(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
+    """Return a run with windows as long as its own model can follow it."""
     for part in PARTS:
         longest = float(np.ptp(run.time)) / part
         divided = run if part == 1 else dataclasses.replace(run, longest_s=longest)
@@ -133,33 +138,28 @@ def _followed(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
     return run
 
 
-def _through_all(evidence: Evidence, start: Rig, free: list[str]) -> Trial | None:
-    """Return the fit from where one to all samples leads, where stretches are held back.
+def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
+    """Return the fit started from a fit to all samples, where stretches are held back, else None.
 
-    A search through gaps goes astray more easily. The fit itself does not see what is held back.
+    A fit through gaps goes astray more easily. The returned fit does not use what is held back.
     """
-    if not evidence.inside:
+    if not data.inside:
         return None
-    whole = list(evidence.fitted)
-    for run, k in zip(evidence.held, evidence.held_of, strict=True):
-        place = evidence.fitted_of.index(k)
+    whole = list(data.fitted)
+    for run, k in zip(data.held, data.held_of, strict=True):
+        place = data.fitted_of.index(k)
         own = whole[place]
         if own.trusted is not None and run.trusted is not None:
             whole[place] = dataclasses.replace(own, trusted=own.trusted | run.trusted)
     try:
-        begin = fitted(dataclasses.replace(evidence, fitted=tuple(whole)), start, free)
-        return fitted(evidence, begin.fit.model, free, start=begin.start, windows=begin.fit.windows)
+        begin = fit_model(dataclasses.replace(data, fitted=tuple(whole)), start, free)
+        return fit_model(data, begin.fit.model, free, start=begin.start, windows=begin.fit.windows)
     except FitDiverged:
         return None
 
 
-def taken_by(trial: Trial) -> set[str]:
-    """Return effects that a trial's model has, and parameters of its own that are free."""
-    return {e.name for e in trial.fit.model.effects} | {n.partition("[")[0] for n in trial.free}
-
-
 def _unfolded(model: Rig) -> Rig:
-    """Return a model whose effects that have a parameter of their own stand in that."""
+    """Return a model with effects that equal one of its own parameters replaced by these."""
     own, effects = {}, []
     for effect in model.effects:
         name = own_name(effect.name)
@@ -170,46 +170,40 @@ def _unfolded(model: Rig) -> Rig:
     return dataclasses.replace(model, **own, effects=tuple(effects), p=0.0, notes={})
 
 
-def _start(evidence: Evidence) -> Rig:
-    """Return a start from the free runs, the longest first; the natural frequency may be known."""
-    known = evidence.experiment.w0
-    free = [(run, k) for run, k in zip(evidence.fitted, evidence.fitted_of, strict=True)]
+def _start(data: DataSplit) -> Rig:
+    """Return a start from the longest free run that shows one; raises InputError without any."""
+    known = data.experiment.w0
+    free = [(run, k) for run, k in zip(data.fitted, data.fitted_of, strict=True)]
     free = [(run, k) for run, k in free if not run.forced]
     for run, k in sorted(free, key=lambda pair: -float(np.ptp(pair[0].time))):
-        good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
-        rough = rough_start(run.time[good], run.theta[good], evidence.readings[k].sigma)
+        good = counted(run)
+        rough = rough_start(run.time[good], run.theta[good], data.readings[k].sigma)
         if rough is not None:
             return Rig(
                 w0=known or rough["w0"],
                 c_over_m=rough["c_over_m"],
                 Tr=rough.get("Tr", 0.0),
-                gravity=evidence.experiment.gravity,
+                gravity=data.experiment.gravity,
             )
     if known is None:
         raise InputError(
-            f"{evidence.experiment.path}: one free run must show a natural frequency, in two "
+            f"{data.experiment.path}: one free run must show a natural frequency, in two "
             "half swings or more, or w0 must be given under [rig]; none shows it"
         )
-    return Rig(w0=known, c_over_m=0.01 * known, gravity=evidence.experiment.gravity)
+    return Rig(w0=known, c_over_m=0.01 * known, gravity=data.experiment.gravity)
 
 
-def _other_starts(evidence: Evidence) -> list[Rig]:
+def _other_starts(data: DataSplit) -> list[Rig]:
+    """Return further starts, one from each free run that swings."""
     found = []
-    for run, k in zip(evidence.fitted, evidence.fitted_of, strict=True):
+    for run, k in zip(data.fitted, data.fitted_of, strict=True):
         if run.forced:
             continue
-        good = np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
+        good = counted(run)
         try:
-            begin = starting_values(
-                run.time[good], run.theta[good], sigma=evidence.readings[k].sigma
-            )
+            begin = starting_values(run.time[good], run.theta[good], sigma=data.readings[k].sigma)
         except InputError:
-            continue  # it does not swing
-        gravity = evidence.experiment.gravity
+            continue
+        gravity = data.experiment.gravity
         found.append(Rig(w0=begin.w0, c_over_m=begin.c_over_m, Tr=begin.Tr, gravity=gravity))
     return found
-
-
-def _poor(evidence: Evidence, trial: Trial) -> bool:
-    scatter = np.mean([float(np.std(run.theta)) for run in evidence.fitted])
-    return trial.fit.rms > POOR * float(scatter)

@@ -1,4 +1,4 @@
-"""``diagnose``: from records to the effect that the model lacks."""
+"""The diagnosis: from records to the effects that a model lacks."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.comparison.data import evidence_of
-from pendmap.comparison.forecast import gap_of
-from pendmap.comparison.further import Reasons, attempted
-from pendmap.diagnosis.baseline import baseline
+from pendmap.comparison.data import split_records
+from pendmap.comparison.forecast import compute_gap
+from pendmap.comparison.further import Reasons, compute_part
+from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import checked_own
-from pendmap.diagnosis.functions import call_once, divided, function_scores
-from pendmap.diagnosis.named import named_effects
-from pendmap.diagnosis.physical import within_physics
+from pendmap.diagnosis.fitted_model import impose_physics
+from pendmap.diagnosis.functions import check_functions, score_functions, separate_functions
+from pendmap.diagnosis.named import name_effects
 from pendmap.diagnosis.result import MOST_EFFECTS, Discrepancy
 from pendmap.diagnosis.scores import Scores
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.diagnosis.verdict import judge
+from pendmap.diagnosis.verdict import decide_verdict
 from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
 from pendmap.model.rig import own_name
 from pendmap.records.summary import unit_wrong
-from pendmap.residuals.by_run import run_by_run
-from pendmap.residuals.torque import Torque, residual_torque, standing_out
+from pendmap.residuals.by_run import parameters_by_run
+from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -48,99 +48,101 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     thresholds: Thresholds | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Discrepancy:
-    """Find where a model and an experiment disagree, and which effects it lacks.
+    """Find where a model and an experiment disagree, and which effects the model lacks.
 
-    The baseline is fitted by multiple shooting, all effects of the library are scored at its fit,
-    the best refitted, up to ``max_effects`` accepted on the fall of the BIC and on runs that were
-    held back. What is left then decides the verdict.
+    The baseline is fitted by multiple shooting. All effects of the library are scored at its fit,
+    and the best are fitted. Up to ``max_effects`` are accepted on the fall of the BIC and on runs
+    that were held back. The residuals of the best model then decide the verdict.
 
     Parameters
     ----------
     experiment : Experiment
-        As of :func:`pendmap.read_experiment`.
+        From :func:`pendmap.read_experiment`.
     model : Rig, optional
-        The model to begin with; by default viscous damping and Coulomb friction.
+        The baseline; by default viscous damping and Coulomb friction.
     max_effects : int
-        How many effects are added at most; the sensor's zero does not count.
+        Most effects that are added; the sensor's zero does not count.
     without : collection of str
         Effects that are no candidates.
     effects : collection of Formula and TorqueFunction
-        Candidates of your own, beside the library's: formulas as the library's own effects, Python
-        functions of any kind to first order.
+        Further candidates: formulas are treated like the library's effects, Python functions to
+        first order.
     thresholds : Thresholds, optional
-        The numbers that decide; by default those of :class:`Thresholds`.
+        The numbers that decide.
     progress : callable, optional
-        Called with the steps done and those to do.
+        Called with the number of steps done and the number of all steps.
 
     Returns
     -------
     Discrepancy
-        Verdict, effects, gap and all that they rest on.
+        Verdict, effects, gap and the statistics they are based on.
 
     Raises
     ------
     InputError
-        If there is no run with samples, no start can be found, an effect of your own cannot be a
-        candidate, or no model follows the records.
+        If no run has samples, no start is found, an effect cannot be a candidate, or no model
+        follows the records.
     """
-    functions, others = divided(effects)
+    functions, others = separate_functions(effects)
     own = checked_own(others)
     report = progress or (lambda _done, _total: None)
     steps = max_effects + 3
-    evidence = evidence_of(experiment)
-    call_once(evidence.runs, functions)
-    with _followed(experiment):
-        base, core = baseline(evidence, model, without)
-    # Windows are as long as the model could follow the runs.
-    evidence = dataclasses.replace(evidence, fitted=base.runs)
+    data = split_records(experiment)
+    check_functions(data.runs, functions)
+    with _refuse_divergence(experiment):
+        base, core = fit_baseline(data, model, without)
+    # Windows are as long as the baseline followed the runs.
+    data = dataclasses.replace(data, fitted=base.runs)
     report(1, steps)
-    state = State(evidence, base, thresholds or Thresholds(), max_effects, without, own=own)
-    with _followed(experiment):
-        nearest = state.found(search(state, core, lambda done: report(1 + done, steps)))
-        begin = state.found(within_physics(state.evidence, state.base) or state.base)
-    if not unit_wrong(experiment, *evidence.runs):
-        refuse_astray(experiment.path, evidence.fitted, nearest.trial.fit)
+    state = State(data, base, thresholds or Thresholds(), max_effects, without, own=own)
+    with _refuse_divergence(experiment):
+        nearest = state.scored(search(state, core, lambda done: report(1 + done, steps)))
+        begin = state.scored(impose_physics(state.data, state.base) or state.base)
+    if not unit_wrong(experiment, *data.runs):
+        refuse_astray(experiment.path, data.fitted, nearest.fitted.fit)
     report(steps - 1, steps)
-    with _followed(experiment):
-        last, fitted = nearest.trial, state.evidence.fitted
-        runs = run_by_run(fitted, last.fit, last.remainder, last.level)
-        after = residual_torque(fitted, last.fit, last.remainder)
-    judgement = judge(state, nearest, runs, after.chance)
-    claimed = judgement.verdict in {"named", "partial", "ambiguous"}
+    with _refuse_divergence(experiment):
+        last, fitted = nearest.fitted, state.data.fitted
+        runs = parameters_by_run(fitted, last.fit, last.noise, last.level)
+        after = residual_torque(fitted, last.fit, last.noise)
+    assessment = decide_verdict(state, nearest, runs, after.chance)
+    claimed = assessment.verdict in {"named", "partial", "ambiguous"}
     best = nearest if claimed else begin
     reasons: Reasons = {}
     before = after
-    if nearest.trial.chosen:
-        before = attempted(
+    if nearest.fitted.chosen:
+        before = compute_part(
             reasons,
             "where",
-            lambda: residual_torque(fitted, begin.trial.fit, begin.trial.remainder),
-            Torque.unknown(begin.trial.remainder),
+            lambda: residual_torque(fitted, begin.fitted.fit, begin.fitted.noise),
+            Torque.unknown(begin.fitted.noise),
         )
-    scores = state.scores(begin.trial)
+    scores = state.scores(begin.fitted)
     return Discrepancy(
-        evidence,
+        data,
         begin,
         best,
         nearest,
-        judgement,
-        named_effects(state, best, judgement, runs, reasons) if claimed else (),
-        gap_of(evidence, begin.fits, best.fits),
+        assessment,
+        name_effects(state, best, assessment, runs, reasons) if claimed else (),
+        compute_gap(data, begin.fits, best.fits),
         before,
         after if claimed else before,
-        standing_out(before),
+        outstanding_bins(before),
         runs,
         scores,
         tuple(state.attempts),
-        attempted(reasons, "detection_limits", lambda: state.scores(best.trial), Scores.of_none()),
-        nearest.trial.level,
+        compute_part(
+            reasons, "detection_limits", lambda: state.scores(best.fitted), Scores.of_none()
+        ),
+        nearest.fitted.level,
         tuple(without),
         max_effects,
         own,
-        attempted(
+        compute_part(
             reasons,
             "functions",
-            lambda: function_scores(evidence, begin.trial, best.trial, functions),
+            lambda: score_functions(data, begin.fitted, best.fitted, functions),
             (),
         ),
         reasons,
@@ -148,8 +150,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
 
 
 @contextlib.contextmanager
-def _followed(experiment: Experiment) -> Iterator[None]:
-    """Say of which records a motion is lost that the verdict rests on."""
+def _refuse_divergence(experiment: Experiment) -> Iterator[None]:
+    """Turn the divergence of a fit that the verdict needs into an error of the records."""
     try:
         yield
     except FitDiverged as error:
@@ -162,26 +164,31 @@ def _followed(experiment: Experiment) -> Iterator[None]:
 def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """Return the model of a diagnosis with the notes of its file.
 
-    Effects have ``ci95``, ``probability`` and ``approximate``; ``[covariance]`` holds all that was
-    fitted, widened as those intervals are, and ``between_runs`` in it the standard deviation of
-    each parameter that differs between runs by more than its error; ``[provenance]`` the records
-    with their SHA-256, the version, the command, the verdict and which coefficients are held at 0.
+    Effects have ``ci95``, ``probability`` and ``approximate``. ``[covariance]`` holds that of all
+    fitted parameters, widened like the intervals, and in ``between_runs`` the standard deviation of
+    each parameter that differs between runs by more than its error. ``[provenance]`` holds the
+    records with their SHA-256, the version, the command, the verdict and coefficients fixed at 0.
 
     Parameters
     ----------
     found : Discrepancy
-        As of :func:`pendmap.diagnosis.diagnose`.
+        From :func:`pendmap.diagnosis.diagnose`.
     command : str
-        How it was called.
+        The command line.
+
+    Returns
+    -------
+    Rig
+        The best model, with its notes.
     """
-    fit = found.best.trial.fit
+    fit = found.best.fitted.fit
     model = fit.model
-    covariance = found.best.trial.widening * fit.covariance
+    covariance = found.best.fitted.widening * fit.covariance
     named = {effect.name: effect.effect for effect in found.effects}
     own = {own_name(name) for name in named} - {None}
     kept = tuple(e for e in model.effects if e.name not in named)
-    runs = [found.evidence.runs[k] for k in dict.fromkeys(found.evidence.fitted_of)]
-    sha256 = found.evidence.experiment.sha256
+    runs = [found.data.runs[k] for k in dict.fromkeys(found.data.fitted_of)]
+    sha256 = found.data.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
     notes: dict[str, Any] = {
         "covariance": {
@@ -194,10 +201,14 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
             },
         },
         "provenance": provenance(files, command, rms=found.gap.after, noise=found.gap.noise_floor)
-        | {"method": "diagnose", "verdict": found.verdict, "held_out": list(_held(found))},
+        | {
+            "method": "diagnose",
+            "verdict": found.verdict,
+            "held_out": list(dict.fromkeys(run.name for run in found.data.held)),
+        },
     }
-    if found.best.trial.zeroed:
-        notes["provenance"]["set_to_zero"] = list(found.best.trial.zeroed)
+    if found.best.fitted.zeroed:
+        notes["provenance"]["set_to_zero"] = list(found.best.fitted.zeroed)
     return dataclasses.replace(
         model,
         **{name: 0.0 for name in own if name is not None},
@@ -210,11 +221,8 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
 
 
 def _called(name: str, named: dict[str, Effect]) -> str:
+    """Return the name of a fitted parameter in the model file."""
     for effect in named.values():
         if own_name(effect.name) == name:
             return f"{effect.name}.{next(iter(effect.parameters))}"
     return name
-
-
-def _held(found: Discrepancy) -> list[str]:
-    return list(dict.fromkeys(run.name for run in found.evidence.held))

@@ -1,23 +1,26 @@
-"""A model fitted to the evidence."""
+"""Models fitted to records within physical limits, and weights that include a model's error."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.diagnosis.candidates import placed
+from pendmap.comparison.data import counted, sigmas
+from pendmap.diagnosis.candidates import add_candidates
+from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
 from pendmap.identification.valley import nearer
-from pendmap.residuals.noise import Remainder, remainder_of
+from pendmap.model.effects import opposes
+from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
@@ -25,85 +28,97 @@ if TYPE_CHECKING:
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
 MOST_STEPS: Final = 40
-"""Steps of a fit at most."""
+"""Most steps of a fit."""
 
 QUICK: Final = 4.0
-"""By so much windows grow from stage to stage ..."""
+"""Growth of windows from stage to stage of a fit."""
 
 GENTLE: Final = 1.5
-"""... and by so much where what comes out decides, or was lost as they grew by more."""
+"""Growth of windows in fits that decide, or that diverged with the quick growth."""
 
 LITTLE: Final = 0.05
-"""Of a sum of squares: far below what decides between candidates."""
+"""Promised fall of the sum of squares, over one reading's, below which a fit ends."""
 
 LEAST_LEVEL: Final = 0.5
-"""Noise counts for at least this part of the variance that its readings are stated to have."""
+"""Least variance of noise over the stated variance of its readings."""
 
 EXACT: Final = 1e-3
-"""Part of an independent reading that the last step of a converged fit promises."""
+"""Promised fall of the sum of squares, over one reading's, below which a fit has converged."""
 
 FEW_STEPS: Final = 12
-"""Steps of a candidate's fit at most: what is right arrives in five, what is wrong creeps."""
+"""Most steps of a candidate's fit; the right candidate needs about five."""
 
 SIZED_STEPS: Final = 5
-"""The same of a size alone, before its shape is fitted with it."""
+"""Most steps of the fit of a size before its shape is fitted."""
 
 NEAR_STEPS: Final = 6
-"""The same where an exponent has been moved, and all else is nearly where it belongs."""
+"""Most steps of a fit after an exponent was moved."""
+
+OPPOSING: Final = ("c_over_m", "Tr")
+"""Coefficients that oppose the motion and are at least 0."""
+
+ERRORS: Final = 3.0
+"""Standard errors by which an estimate may exceed a physical limit."""
+
+STRETCH: Final = 2.0
+"""Factor by which a width may leave its typical range."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Trial:
-    """A model fitted to the evidence."""
+class FittedModel:
+    """A model fitted to records."""
 
-    fit: TrajectoryFit  # To the runs that are not held back
-    free: tuple[str, ...]  # What was fitted, as in fit_runs
-    chosen: tuple[Candidate, ...]  # The effects that were added to the baseline
-    runs: tuple[FitRun, ...]  # What it was fitted to
+    fit: TrajectoryFit  # To the records that are not held back
+    free: tuple[str, ...]  # Fitted parameters, as in fit_runs
+    chosen: tuple[Candidate, ...]  # Effects added to the baseline
+    runs: tuple[FitRun, ...]  # Fitted records
     floors: tuple[float, ...]  # Share of rounding in the variance of each run's noise
-    # Coefficients that were negative and are held at 0; a larger model frees them again.
+    # Coefficients that were negative and are fixed at 0; a larger model frees them again.
     zeroed: tuple[str, ...] = ()
 
     @functools.cached_property
-    def remainder(self) -> Remainder:
-        """What it leaves."""
-        return remainder_of(self.fit, self.runs, len(self.fit.names), self.floors)
+    def noise(self) -> ResidualNoise:
+        """Noise of the residuals, and what exceeds it."""
+        return estimate_noise(self.fit, self.runs, len(self.fit.names), self.floors)
 
     @property
     def widening(self) -> float:
-        """By how much variances exceed the fit's: coloured or strong noise, or what is left."""
-        return max(self.remainder.level, self.chi2 / max(self.fit.degrees, 1), 1.0)
+        """Factor of the fit's variances for correlated or strong noise and errors of the model."""
+        return max(self.noise.level, self.chi2 / max(self.fit.degrees, 1), 1.0)
 
     @functools.cached_property
     def level(self) -> float:
-        """By what sums of squares are divided to count independent readings.
+        """Sum of squares of one independent reading.
 
-        The greater one of the noise's spectral density where the motion is, and of the sum of
-        squares over the number of independent readings among the residuals.
+        The greater of the noise's spectral density where the motion is, and of the sum of squares
+        over the number of independent readings among the residuals.
         """
-        rest = self.remainder
-        return max(rest.level, self.chi2 / max(rest.independent, 1.0), LEAST_LEVEL)
+        noise = self.noise
+        return max(noise.level, self.chi2 / max(noise.independent, 1.0), LEAST_LEVEL)
 
     @property
     def chi2(self) -> float:
-        """The sum of squared residuals over standard errors, or of deviances of counts."""
+        """Sum of squared residuals over standard errors, or of deviances of counts."""
         return self.fit.chi2
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects that were added."""
+        """Names of the added effects."""
         return tuple(candidate.name for candidate in self.chosen)
 
     @property
+    def taken(self) -> set[str]:
+        """Effects of the model, and those of its own parameters that are fitted."""
+        own = {name.partition("[")[0] for name in self.free}
+        return {effect.name for effect in self.fit.model.effects} | own
+
+    @property
     def start(self) -> dict[str, float]:
-        """Where another fit may begin: damping may be negative there, as in no model."""
-        return _values(self.fit)
+        """Fitted values, the start of other fits; damping may be negative here."""
+        return {name: estimate.value for name, estimate in self.fit.estimates.items()}
 
     def start_without(self, names: Sequence[str]) -> dict[str, float]:
-        """Return where a fit starts in which some parameters are 0.
-
-        The others move by what the covariance says, so that the motion stays as near as it can.
-        """
+        """Return the start of a fit with some parameters at 0, the others moved by covariance."""
         start = self.start
         places = [self.fit.names.index(name) for name in names if name in self.fit.names]
         own = self.fit.covariance[np.ix_(places, places)]
@@ -115,24 +130,21 @@ class Trial:
         return {name: value for name, value in start.items() if name not in names}
 
     def shape_of(self, candidate: Candidate) -> dict[str, float]:
-        """Return an effect's shape as it was fitted, without dimensions."""
+        """Return the fitted shape of an effect, nondimensional."""
         model = self.fit.model
         bare = {e.name: e.bare(model.units).parameters for e in model.effects}
         return {name: bare[candidate.name][name] for name in candidate.shape}
 
     @property
     def adapted(self) -> int:
-        """How many numbers were adapted to the records.
-
-        Shapes that were scanned are among them, and what is held at 0.
-        """
+        """Number of adapted parameters, with scanned shapes and coefficients fixed at 0."""
         free = set(self.free)
         scanned = sum(c.count - len(free & {*c.free, *c.adapted}) for c in self.chosen)
         return len(self.fit.names) + len(self.zeroed) + scanned
 
 
-def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
-    evidence: Evidence,
+def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
+    data: DataSplit,
     model: Rig,
     free: Sequence[str],
     chosen: Sequence[Candidate] = (),
@@ -144,14 +156,10 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
     growth: float = QUICK,
     zeroed: Sequence[str] = (),
     target: float = math.inf,
-) -> Trial:
-    """Fit a model to the evidence.
-
-    ``zeroed`` are coefficients held at 0; the last arguments are those of
-    :func:`pendmap.identification.fit.fit_runs`.
-    """
+) -> FittedModel:
+    """Fit a model to records; ``zeroed`` are coefficients fixed at 0, the others as in fit_runs."""
     fit = fit_runs(
-        evidence.fitted,
+        data.fitted,
         model,
         free,
         start=start,
@@ -162,60 +170,59 @@ def fitted(  # noqa: PLR0913 (the evidence, the model, where to begin)
         growth=growth,
         target=target,
     )
-    return Trial(fit, tuple(free), tuple(chosen), evidence.fitted, evidence.floors, tuple(zeroed))
+    return FittedModel(fit, tuple(free), tuple(chosen), data.fitted, data.floors, tuple(zeroed))
 
 
-def settled(evidence: Evidence, trial: Trial, level: float) -> Trial:
-    """Return a fit that has converged; that of a candidate ends after a few steps."""
-    if trial.fit.converged:
-        return trial
-    return fitted(
-        evidence,
-        trial.fit.model,
-        trial.free,
-        trial.chosen,
-        start=trial.start,
-        windows=trial.fit.windows,
+def converge(data: DataSplit, fitted: FittedModel, level: float) -> FittedModel:
+    """Return a fit continued until it has converged."""
+    if fitted.fit.converged:
+        return fitted
+    return fit_model(
+        data,
+        fitted.fit.model,
+        fitted.free,
+        fitted.chosen,
+        start=fitted.start,
+        windows=fitted.fit.windows,
         least_gain=EXACT * level,
-        zeroed=trial.zeroed,
+        zeroed=fitted.zeroed,
     )
 
 
-def with_candidates(  # noqa: PLR0913 (what to fit, and from where)
-    evidence: Evidence,
-    trial: Trial,
+def fit_with_candidates(  # noqa: PLR0913 (what to fit, and from where)
+    data: DataSplit,
+    fitted: FittedModel,
     added: Sequence[Candidate],
     start: Mapping[str, float],
     *,
     level: float,
     short: bool = False,
-) -> Trial:
-    """Fit a trial's model with further effects, from the trial's parameters and windows on.
+) -> FittedModel:
+    """Fit a model with further effects, from the parameters and windows of a fitted one.
 
-    Coefficients that the trial holds at 0 are free again. Steps that promise a small part of
-    ``level``, one independent reading, are not taken. ``short`` starts from short windows, where
-    the trial's lead astray.
+    Coefficients fixed at 0 are free again. Steps that promise less than a small part of ``level``
+    are not taken. ``short`` starts from short windows instead.
     """
-    model = placed(trial.fit.model, added)
-    free = [*trial.free, *trial.zeroed, *(name for c in added for name in c.free)]
+    model = add_candidates(fitted.fit.model, added)
+    free = [*fitted.free, *fitted.zeroed, *(name for c in added for name in c.free)]
     shapes = [name for c in added for name in c.adapted]
-    begin = dict.fromkeys(trial.zeroed, 0.0) | trial.start | dict(start)
-    windows = None if short else trial.fit.windows
+    begin = dict.fromkeys(fitted.zeroed, 0.0) | fitted.start | dict(start)
+    windows = None if short else fitted.fit.windows
     least = LITTLE * level
     if shapes and not short:
-        # A shape means nothing before its effect has a size.
+        # A shape is determined only once its effect has a size.
         steps = FEW_STEPS if any(c.exponents for c in added) else SIZED_STEPS
-        sized = fitted(
-            evidence, model, free, start=begin, windows=windows, steps=steps, least_gain=least
+        sized = fit_model(
+            data, model, free, start=begin, windows=windows, steps=steps, least_gain=least
         )
-        near = _near_exponents(evidence, sized, added, least)
-        # An exponent's start is the model's; it sets the unit of its size.
-        model, begin, windows = near.model, _values(near), near.windows
-    return fitted(
-        evidence,
+        sized = _adjust_exponents(data, sized, added, least)
+        # The exponent of the model sets the unit of its size.
+        model, begin, windows = sized.fit.model, sized.start, sized.fit.windows
+    return fit_model(
+        data,
         model,
         [*free, *shapes],
-        (*trial.chosen, *added),
+        (*fitted.chosen, *added),
         start=begin,
         windows=windows,
         steps=FEW_STEPS,
@@ -223,14 +230,14 @@ def with_candidates(  # noqa: PLR0913 (what to fit, and from where)
     )
 
 
-def _near_exponents(
-    evidence: Evidence, sized: Trial, added: Sequence[Candidate], least: float
-) -> TrajectoryFit:
-    """Return a fit with candidates' sizes, whose exponents are brought near their best."""
+def _adjust_exponents(
+    data: DataSplit, sized: FittedModel, added: Sequence[Candidate], least: float
+) -> FittedModel:
+    """Return a fit of candidates' sizes with exponents near their best values."""
 
     def again(model: Rig, start: Mapping[str, float], before: TrajectoryFit) -> TrajectoryFit:
-        return fitted(
-            evidence,
+        return fit_model(
+            data,
             model,
             sized.free,
             start=start,
@@ -242,9 +249,137 @@ def _near_exponents(
     fit = sized.fit
     for candidate in added:
         for size, exponent in candidate.exponents.items():
-            fit = nearer(fit, evidence.fitted, size, exponent, again)
-    return fit
+            fit = nearer(fit, data.fitted, size, exponent, again)
+    return dataclasses.replace(sized, fit=fit)
 
 
-def _values(fit: TrajectoryFit) -> dict[str, float]:
-    return {name: estimate.value for name, estimate in fit.estimates.items()}
+def impose_physics(
+    data: DataSplit, fitted: FittedModel, target: float = math.inf
+) -> FittedModel | None:
+    """Return a fit whose coefficients are physically possible; None where the effects have none.
+
+    Negative viscous damping and Coulomb friction are fixed at 0, and the others fitted again. An
+    added effect must oppose the motion where its kind does, must not drive it by a drift or an
+    asymmetry greater than the coefficient, must last longer than a swing and no longer than the
+    records, and must have a width near its typical range. A fit far above ``target`` is given up.
+    """
+    while negative := [n for n in OPPOSING if n in fitted.fit.estimates and fitted.fit[n] < 0]:
+        zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
+        try:
+            fitted = fit_model(
+                data,
+                dataclasses.replace(fitted.fit.model, **zeros),
+                [name for name in fitted.free if name not in negative],
+                fitted.chosen,
+                start=fitted.start_without(negative),
+                windows=fitted.fit.windows,
+                zeroed=(*fitted.zeroed, *negative),
+                least_gain=LITTLE * fitted.level,
+                target=target,
+            )
+        except FitDiverged:
+            return None
+    return fitted if all(_possible(data, fitted, c) for c in fitted.chosen) else None
+
+
+def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> bool:
+    """Whether the size and shape of an effect are physically possible."""
+    estimates = fitted.fit.estimates
+    size = estimates.get(candidate.free[0])
+    if size is None:
+        return True
+    error = ERRORS * math.sqrt(fitted.level) * (size.stderr or 0.0)
+    if opposes(candidate.definition) and size.value < -error:
+        return False
+    end = max(run.lab_time_s + float(run.time[-1]) for run in data.fitted)
+    span = end - min(run.lab_time_s + float(run.time[0]) for run in data.fitted)
+    entries = {e["name"]: e for e in candidate.definition["parameters"]}
+    w0 = fitted.fit.model.w0
+    for name in candidate.shape:
+        estimate, entry = estimates.get(f"{candidate.name}.{name}"), entries[name]
+        if estimate is None:
+            continue
+        low, high = -math.inf, math.inf
+        if entry["role"] == "time constant":
+            low, high = math.tau / w0, span
+        elif entry["role"] == "instant":
+            low, high = end - span, end
+        elif entry["role"] == "width":
+            low, high = entry["typical"]
+            unit = w0 ** entry["power_of_w0"]
+            low, high = low / STRETCH * unit, high * STRETCH * unit
+        if not low <= estimate.value <= high:
+            return False
+    return _drains(fitted, candidate, entries[candidate.size], error, end)
+
+
+def _drains(
+    fitted: FittedModel, candidate: Candidate, entry: dict[str, Any], error: float, end: float
+) -> bool:
+    """Whether damping or friction stays positive with a drift or an asymmetry of it."""
+    if candidate.definition["group"] != "damping" or entry["typical"][0] >= 0:
+        return True
+    drifts = candidate.definition["mappable"] == "frozen"
+    # The unit of a rate has one more power of w0 than that of the drifting coefficient.
+    power = entry["power_of_w0"] - drifts
+    base = "Tr" if power == 2 else "c_over_m"  # noqa: PLR2004 (a torque)
+    size, known = fitted.fit[candidate.free[0]], fitted.fit.estimates.get(base)
+    limit = 0.0
+    if known is not None:
+        limit = known.value + ERRORS * math.sqrt(fitted.level) * (known.stderr or 0.0)
+    if drifts:
+        return size * end + error * end + limit >= 0
+    return abs(size) <= limit + error
+
+
+def model_errors(data: DataSplit, fitted: FittedModel) -> tuple[float, ...]:
+    """Return the root mean square residual of a model in each fitted run, rad.
+
+    0 where noise explains it: where the mean of squared residuals over squared standard errors is
+    at most ``1 + 4 sqrt(2 / N + 4 r^2)``, with the relative error ``r`` of the noise.
+    """
+    errors = []
+    for run, residual, of in zip(data.fitted, fitted.fit.residuals, data.fitted_of, strict=True):
+        good = np.isfinite(residual) & counted(run)
+        sigma = sigmas(run)[good]
+        if run.count is not None:
+            sigma = np.hypot(sigma, run.count / math.sqrt(12))
+        squares = residual[good] ** 2
+        doubt = data.readings[of].doubt
+        allowed = 1 + 4 * math.sqrt(2 / max(squares.size, 1) + 4 * doubt**2)
+        beyond = squares.size > 0 and float(np.mean(squares / sigma**2)) > allowed
+        errors.append(math.sqrt(float(np.mean(squares))) if beyond else 0.0)
+    return tuple(errors)
+
+
+def weight_records(data: DataSplit, errors: Sequence[float]) -> DataSplit:
+    """Return records whose standard errors are a model's errors, where these are not 0.
+
+    With the weights of noise alone, an erring model would follow the readings with the least noise
+    and miss the others. Stretches held back have the error of their run; a whole run held back has
+    its own noise and the mean excess of the other runs' squared errors over their noise.
+    """
+    of = dict(zip(data.fitted_of, errors, strict=True))
+    pairs = list(zip(data.fitted, errors, strict=True))
+    excess = float(np.mean([max(error**2 - _variance(run), 0.0) for run, error in pairs]))
+    held = (
+        _with_error(run, of[k] if k in of else _whole_run_error(run, excess))
+        for run, k in zip(data.held, data.held_of, strict=True)
+    )
+    fitted = (_with_error(run, error) for run, error in pairs)
+    return dataclasses.replace(data, fitted=tuple(fitted), held=tuple(held))
+
+
+def _whole_run_error(run: FitRun, excess: float) -> float:
+    return math.sqrt(_variance(run) + excess) if excess > 0 else 0.0
+
+
+def _variance(run: FitRun) -> float:
+    """Return the mean square of the standard errors of a run, with rounding to counts."""
+    return float(np.mean(np.square(run.sigma))) + (run.count or 0.0) ** 2 / 12
+
+
+def _with_error(run: FitRun, error: float) -> FitRun:
+    if error == 0:
+        return run
+    return dataclasses.replace(run, sigma=np.full(run.time.shape, error), count=None)

@@ -1,11 +1,10 @@
-"""Candidates that are Python functions of any kind: scored to first order, never refitted.
+"""Candidates that are Python functions: scored to first order, never fitted.
 
-A function that looks up a table, or asks a trained model, is nothing that the kernel can step
-with. But sampled along a fitted motion its torque ``u`` moves the readings, to first order, by the
-integral that :mod:`pendmap.residuals.torque` has for any torque; with ``x`` that response
-over the standard errors, what the fitted parameters and initial states can follow taken off, and
-``r`` the residuals, the size is ``x' r / x' x`` and the sum of squares falls by
-``(x' r)^2 / x' x``.
+The kernel cannot call a function that looks up a table or a trained model. Sampled along a fitted
+motion, its torque moves the readings, to first order, by the integral of
+:mod:`pendmap.residuals.torque`. With that response ``x``, over the standard errors and orthogonal
+to the fitted parameters and initial states, and the residuals ``r``, the size is ``x' r / x' x``
+and the sum of squares falls by ``(x' r)^2 / x' x``.
 """
 
 from __future__ import annotations
@@ -18,50 +17,55 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError, check_number, short_repr
-from pendmap.residuals.torque import freed, responses, windows_of
+from pendmap.residuals.torque import project_out, responses, window_derivatives
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.comparison.data import Evidence
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.comparison.data import DataSplit
+    from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
 
 UNSEEN: Final = 1e-4
-"""A torque of which the fitted parameters follow all but this part does nothing of its own."""
+"""Norm of a response orthogonal to the fitted parameters, over its whole norm, below which the
+records do not show a torque."""
 
 VISITED: Final = (0.05, 0.95)
-"""Quantiles of readings and their differences between which the motion surely is, for all noise."""
+"""Quantiles of readings and their differences that the motion reaches despite noise."""
 
 
 @dataclasses.dataclass(frozen=True)
 class TorqueFunction:
-    """A torque that is whatever a Python function returns, as a candidate of a diagnosis.
+    """A candidate of a diagnosis whose torque a Python function returns.
 
-    It is fitted to first order only, has no place in a model, a trajectory or a map, and is never
-    named. Where the function is arithmetic, :meth:`pendmap.Formula.of` makes a candidate of it that
-    has all of these.
+    It is fitted to first order only, never named, and cannot be part of a model, a trajectory or a
+    map. For arithmetic functions :meth:`pendmap.Formula.of` makes a candidate without these limits.
 
     Parameters
     ----------
     name : str
-        What it is called.
+        Its name.
     function : callable
         ``function(theta, v, t, phase, parameters)`` of arrays of one length in SI: angle (rad, not
         wrapped), velocity (rad/s), time in the laboratory (s), phase of the harmonic drive (rad,
-        in [-pi, pi]; 0 without); it returns the torque per moment of inertia, rad/s^2, that the
-        size 1 stands for.
+        in [-pi, pi]; 0 without). It returns the torque per moment of inertia, rad/s^2, of size 1.
     parameters : mapping of str to float
-        Handed over as they are.
+        Passed to the function unchanged.
 
     Raises
     ------
     InputError
-        If the name is no text, the function none, or a parameter no number.
+        If the name is no text, the function not callable, or a parameter no number.
+
+    Examples
+    --------
+    >>> from pendmap.diagnosis import TorqueFunction
+    >>> TorqueFunction("kick", lambda theta, v, t, phase, p: p["k"] * v, {"k": 2}).parameters
+    {'k': 2.0}
     """
 
     name: str
@@ -81,13 +85,7 @@ class TorqueFunction:
         object.__setattr__(self, "parameters", kept)
 
     def torque(self, place: Mapping[str, Floats], theta: Floats) -> Floats:
-        """Return its torque along a motion, rad/s^2.
-
-        Raises
-        ------
-        InputError
-            If the function fails, or returns something else than a finite number for each.
-        """
+        """Return its torque along a motion, rad/s^2; InputError unless all values are finite."""
         phase = np.nan_to_num(place["drive_phase"])
         try:
             found = self.function(
@@ -111,36 +109,17 @@ class TorqueFunction:
 
 @dataclasses.dataclass(frozen=True)
 class FunctionScore:
-    """What a function explains, to first order.
+    """Score of a function, to first order."""
 
-    Parameters
-    ----------
-    name : str
-        The function.
-    size, stderr : float
-        By which its torque is to be multiplied, and the standard error of that; NaN where the
-        records do not show it.
-    gain : float
-        By which the sum of squares falls, over the noise's level, at the baseline.
-    left : float
-        The same at the best model: what the function explains beyond the effects found.
-    """
-
-    name: str
-    size: float
-    stderr: float
-    gain: float
-    left: float
+    name: str  # Of the function
+    size: float  # Factor of its torque; NaN where the records do not show it
+    stderr: float  # Standard error of the size
+    gain: float  # Fall of the sum of squares at the baseline, over the noise's level
+    left: float  # Fall of the sum of squares at the best model, beside the effects found
 
 
-def divided(effects: object) -> tuple[list[TorqueFunction], list[Any]]:
-    """Return a user's candidates: functions, and all others.
-
-    Raises
-    ------
-    InputError
-        If they are no list.
-    """
+def separate_functions(effects: object) -> tuple[list[TorqueFunction], list[Any]]:
+    """Return a user's candidates, functions and all others; raises InputError."""
     if not isinstance(effects, list | tuple):
         shown = short_repr(effects)
         raise InputError(f"effects must be a list of Formula and TorqueFunction, got {shown}")
@@ -148,11 +127,11 @@ def divided(effects: object) -> tuple[list[TorqueFunction], list[Any]]:
     return functions, [effect for effect in effects if not isinstance(effect, TorqueFunction)]
 
 
-def call_once(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
-    """Call functions where the pendulum was: what is wrong with them is said before any fit.
+def check_functions(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
+    """Call functions along the records, to report their errors before any fit.
 
-    Angles and velocities that are exactly 0 are left out: a motion passes them between two
-    readings, where a reading in counts stays, and a function may be of no value there.
+    Angles and velocities of exactly 0, which only readings in counts keep, are left out, since a
+    function may be undefined there.
     """
     for run in runs if functions else ():
         time, theta = run.time[run.trusted], run.theta[run.trusted]
@@ -170,39 +149,38 @@ def call_once(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
             function.torque({name: x[which] for name, x in place.items()}, theta[which])
 
 
-def function_scores(
-    evidence: Evidence, base: Trial, best: Trial, functions: Sequence[TorqueFunction]
+def score_functions(
+    data: DataSplit, base: FittedModel, best: FittedModel, functions: Sequence[TorqueFunction]
 ) -> tuple[FunctionScore, ...]:
     """Score functions at a baseline and at a best model."""
     if not functions:
         return ()
-    first = _scored(evidence, base, functions)
-    rest = first if best is base else _scored(evidence, best, functions)
+    first = _scored(data, base, functions)
+    last = first if best is base else _scored(data, best, functions)
     return tuple(
         FunctionScore(function.name, *one, other[2])
-        for function, one, other in zip(functions, first, rest, strict=True)
+        for function, one, other in zip(functions, first, last, strict=True)
     )
 
 
 def _scored(
-    evidence: Evidence, trial: Trial, functions: Sequence[TorqueFunction]
+    data: DataSplit, fitted: FittedModel, functions: Sequence[TorqueFunction]
 ) -> list[tuple[float, float, float]]:
-    """Return size, its standard error and gain of each."""
-    windows, places = windows_of(evidence.fitted, trial.fit)
+    """Return size, standard error and gain of each function."""
+    windows, places = window_derivatives(data.fitted, fitted.fit)
     columns = []
     for window, place in zip(windows, places, strict=True):
         own = slice(window.first, window.first + len(window.residual))
-        theta = trial.fit.curves[window.run][0][own]
+        theta = fitted.fit.curves[window.run][0][own]
         torques = np.stack([function.torque(place, theta) for function in functions], axis=1)
-        columns.append(responses(evidence.fitted[window.run], window, torques))
+        columns.append(responses(data.fitted[window.run], window, torques))
     sizes = np.linalg.norm(np.concatenate(columns), axis=0)
-    further, residual = freed(evidence.fitted, windows, columns)
-    level = trial.remainder.level
+    further, residual = project_out(data.fitted, windows, columns)
+    level = fitted.noise.level
     found = []
     for k, size in enumerate(sizes):
         x = further[:, k]
         information = float(x @ x)
-        # What the fitted parameters follow all but a trace of is not seen.
         if information <= (UNSEEN * float(size)) ** 2:
             found.append((math.nan, math.nan, 0.0))
             continue

@@ -1,4 +1,4 @@
-"""The effects that a diagnosis names: values, intervals, and the model that has them."""
+"""The effects that a diagnosis names, with their values and intervals."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
-from pendmap.comparison.further import Reasons, attempted
-from pendmap.diagnosis.refit import Z95, elsewhere, profiles
+from pendmap.comparison.further import Reasons, compute_part
+from pendmap.diagnosis.refit import Z95, find_equivalents, profile_intervals
 from pendmap.identification.parameters import interval
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
@@ -15,79 +15,58 @@ from pendmap.records.summary import doubted
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.scores import Score
-    from pendmap.diagnosis.state import Found, State
-    from pendmap.diagnosis.verdict import Judgement
+    from pendmap.diagnosis.state import ScoredModel, State
+    from pendmap.diagnosis.verdict import Assessment
     from pendmap.model import Formula
     from pendmap.residuals.by_run import RunByRun
 
 
 @dataclasses.dataclass(frozen=True)
 class NamedEffect:
-    """An effect that a diagnosis names.
+    """An effect that a diagnosis names."""
 
-    Parameters
-    ----------
-    name : str
-        As the library calls it.
-    parameters : mapping of str to float
-        In SI.
-    ci95 : mapping of str to (float, float)
-        Intervals of 95 % of what was fitted; a shape that was scanned has none.
-    probability : float
-        That this name is right, given that the effect is in the library: its share among its
-        rivals, times the probability that one of them is.
-    approximate : bool
-        Whether its form may be only nearly right.
-    formula : Formula, optional
-        Where it is the user's own.
-    elsewhere : mapping of str to float
-        Another place on the other side of the rest, or another frequency or instant, where it would
-        do as well.
-    """
-
-    name: str
-    parameters: dict[str, float]
-    ci95: dict[str, tuple[float, float]]
+    name: str  # In the library
+    parameters: dict[str, float]  # SI
+    ci95: dict[str, tuple[float, float]]  # 95 % intervals of fitted parameters
+    # That the name is right if the effect is in the library: its share among its alternatives,
+    # times the probability that one of them is right.
     probability: float
-    approximate: bool
-    formula: Formula | None = None
+    approximate: bool  # Whether its form may be only nearly right
+    formula: Formula | None = None  # Of the user's own effect
+    # A mirrored place, or another frequency or instant, that fits equally well.
     elsewhere: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def definition(self) -> dict[str, Any]:
-        """What the library, or the user's formula, says about it."""
+        """Entry of the library, or of the user's formula."""
         return self.effect.definition
 
     @property
     def effect(self) -> Effect:
-        """As a model has it."""
-        return Effect(
-            self.name,
-            self.parameters,
-            self.ci95,
-            self.probability,
-            self.approximate,
-            self.formula,
-        )
+        """The effect as part of a model."""
+        sure = self.probability, self.approximate
+        return Effect(self.name, self.parameters, self.ci95, *sure, self.formula)
 
 
-def named_effects(
-    state: State, best: Found, judgement: Judgement, runs: RunByRun, reasons: Reasons
+def name_effects(
+    state: State, best: ScoredModel, assessment: Assessment, runs: RunByRun, reasons: Reasons
 ) -> tuple[NamedEffect, ...]:
     """Return the effects of the best model."""
-    evidence, widening = state.evidence, best.trial.widening
+    data, widening = state.data, best.fitted.widening
     none: dict[str, dict[str, tuple[float, float]]] = {}
-    profiled = attempted(reasons, "effects.ci95", lambda: profiles(evidence, best.trial), none)
-    others = elsewhere(evidence, best.trial, _sought(state, best.trial))
+    profiled = compute_part(
+        reasons, "effects.ci95", lambda: profile_intervals(data, best.fitted), none
+    )
+    others = find_equivalents(data, best.fitted, _sought(state, best.fitted))
     named = []
-    for standing, sure in zip(judgement.standings, judgement.probabilities, strict=True):
-        candidate = standing.candidate
-        if candidate.name not in best.trial.names:
+    for each, sure in zip(assessment.identified, assessment.probabilities, strict=True):
+        candidate = each.candidate
+        if candidate.name not in best.fitted.names:
             continue
-        parameters, errors = values_of(best, candidate)
-        mixed = best.trial.fit.mixed
+        parameters, errors = effect_values(best, candidate)
+        mixed = best.fitted.fit.mixed
         ci95 = {}
         for n, error in errors.items():
             between = runs.between(f"{candidate.name}.{n}")
@@ -101,8 +80,8 @@ def named_effects(
                 candidate.name,
                 parameters,
                 ci95,
-                standing.share * sure,
-                judgement.approximate or doubted(evidence.experiment, *evidence.runs),
+                each.share * sure,
+                assessment.approximate or doubted(data.experiment, *data.runs),
                 candidate.formula,
                 others.get(candidate.name, {}),
             )
@@ -110,23 +89,25 @@ def named_effects(
     return tuple(named)
 
 
-def _sought(state: State, best: Trial) -> dict[str, list[Score]]:
-    """Return, by effect, the frequencies or instants that residuals ask for without it."""
+def _sought(state: State, best: FittedModel) -> dict[str, list[Score]]:
+    """Return, by effect, the frequencies or instants that residuals show without it."""
     found = {}
     for candidate in best.chosen:
         if candidate.sought:
-            scores = state.scores(state.rest(best, candidate)).scores
+            scores = state.scores(state.leave_out(best, candidate)).scores
             found[candidate.name] = [s for s in scores if s.candidate.name == candidate.name]
     return found
 
 
-def values_of(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict[str, float]]:
-    """Return an effect's parameters, sizes positive and phases within half a turn, and errors."""
-    estimates = best.trial.fit.estimates
+def effect_values(
+    best: ScoredModel, candidate: Candidate
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return an effect's parameters and errors, of an effect with a phase with positive size."""
+    estimates = best.fitted.fit.estimates
     own = own_name(candidate.name)
     if own is not None:
         return {candidate.size: estimates[own].value}, {candidate.size: estimates[own].stderr or 0}
-    effect = next(e for e in best.trial.fit.model.effects if e.name == candidate.name)
+    effect = next(e for e in best.fitted.fit.model.effects if e.name == candidate.name)
     errors = {
         name: estimates[key].stderr or math.inf
         for name in effect.parameters
@@ -134,7 +115,6 @@ def values_of(best: Found, candidate: Candidate) -> tuple[dict[str, float], dict
     }
     values = dict(effect.parameters)
     if candidate.phase is not None and values[candidate.size] < 0:
-        # A negative size is a positive one half a turn on.
         values[candidate.size] = -values[candidate.size]
         values[candidate.phase] += math.pi
     if candidate.phase is not None:

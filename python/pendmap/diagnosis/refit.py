@@ -8,89 +8,100 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.diagnosis.fitted_model import (
     LITTLE,
-    Trial,
-    fitted,
-    with_candidates,
+    FittedModel,
+    fit_model,
+    fit_with_candidates,
+    impose_physics,
 )
-from pendmap.diagnosis.physical import within_physics
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import fit_runs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.fitted_model import Trial
     from pendmap.diagnosis.scores import Score, Scores
     from pendmap.diagnosis.thresholds import Thresholds
 
-
 KICK: Final = 1e-3
-"""Part of the score's step from which a candidate's size starts: far from the fit the step of all
-parameters together leads astray, and a phase needs a size above 0."""
+"""Start of a candidate's size over the score's step: the full step leads astray far from the fit,
+and a phase needs a size above 0."""
 
 FAINT: Final = 5.0
-"""Standard errors of a size within which the covariance says where the others go without it."""
+"""Size of an effect, in standard errors, up to which the covariance gives the fit without it."""
+
+MIRROR_STEPS: Final = 6
+"""Most steps of a fit from a mirrored place that must be better."""
+
+EQUIVALENT_STEPS: Final = 25
+"""Most steps of a fit from another shape that must be as good."""
+
+Z95: Final = 1.959963984540054
+"""The 97.5 % point of the standard normal distribution."""
 
 Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
 
 
 def key_of(chosen: Sequence[Candidate]) -> Key:
-    """Return what a set of candidates is known by."""
+    """Return the key of a set of candidates."""
     return frozenset((c.name, tuple(sorted(c.shape.items()))) for c in chosen)
 
 
-def best_of(*trials: Trial | None) -> Trial | None:
-    """Return the fit with the least sum of squares; none where all are lost."""
-    return min((t for t in trials if t is not None), key=lambda t: t.chi2, default=None)
+def best_of(*models: FittedModel | None) -> FittedModel | None:
+    """Return the model with the least sum of squares; None without a model."""
+    return min((m for m in models if m is not None), key=lambda m: m.chi2, default=None)
 
 
-def refitted(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
-    evidence: Evidence,
+def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
+    data: DataSplit,
     thresholds: Thresholds,
-    trial: Trial,
+    fitted: FittedModel,
     scores: Scores,
     places: Sequence[int],
     level: float,
-) -> Trial | None:
-    """Return a model with candidates fitted to the records within physics; none where it is lost.
+) -> FittedModel | None:
+    """Return a model with candidates, fitted within physics; None where the fit diverges.
 
-    The fit starts at the trial's motion with sizes of nearly 0, in the best shapes by their scores,
-    and where it gains far less than promised again at the sizes of the score.
+    The fit starts at the fitted motion with sizes of nearly 0, in the shapes of the best scores,
+    and where it gains far less than the score promised again at the sizes of the score.
     """
     own = [scores.scores[k] for k in places]
     added = [score.candidate for score in own]
     step = {name: value for score in own for name, value in score.start.items()}
     sizes = {candidate.free[0] for candidate in added}
 
-    def fit(added: Sequence[Candidate], step: dict[str, float], *, short: bool) -> Trial | None:
+    def fit(
+        added: Sequence[Candidate],
+        step: dict[str, float],
+        *,
+        kick: bool = False,
+        short: bool = False,
+    ) -> FittedModel | None:
+        start = {name: KICK * v if kick and name in sizes else v for name, v in step.items()}
         try:
-            return with_candidates(evidence, trial, added, step, level=level, short=short)
+            return fit_with_candidates(data, fitted, added, start, level=level, short=short)
         except FitDiverged:
-            return None  # the start leads out of the range of numbers
+            return None
 
-    def kicked(step: dict[str, float]) -> dict[str, float]:
-        return {name: KICK * v if name in sizes else v for name, v in step.items()}
-
-    found = fit(added, kicked(step), short=False)
+    found = fit(added, step, kick=True)
     for k in _other_shapes(scores, places, thresholds):
         other = scores.scores[k]
-        found = best_of(found, fit([other.candidate], kicked(other.start), short=False))
+        found = best_of(found, fit([other.candidate], other.start, kick=True))
     promised = thresholds.short * scores.together(places)
-    if found is None or trial.chi2 - found.chi2 < promised:
-        found = best_of(found, fit(added, step, short=False))
-    if found is None or found.chi2 > trial.chi2:
-        # More parameters fit no worse: the motion was lost on the way.
+    if found is None or fitted.chi2 - found.chi2 < promised:
+        found = best_of(found, fit(added, step))
+    if found is None or found.chi2 > fitted.chi2:
+        # A larger model fits at least as well: the fit lost the motion.
         found = best_of(found, fit(added, step, short=True))
-    if found is None or found.chi2 > trial.chi2:
+    if found is None or found.chi2 > fitted.chi2:
         return None
-    found = within_physics(evidence, better_side(evidence, found), trial.chi2)
-    return found if found is not None and found.chi2 <= trial.chi2 else None
+    found = impose_physics(data, try_mirrored_places(data, found), fitted.chi2)
+    return found if found is not None and found.chi2 <= fitted.chi2 else None
 
 
 def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds) -> list[int]:
-    """Return the next best shapes of a candidate alone; an exponent is found from any start."""
+    """Return the next best shapes of a single candidate; none for exponents, found from any."""
     if len(places) > 1:
         return []
     one = scores.scores[places[0]]
@@ -106,103 +117,103 @@ def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds)
     return sorted(shapes, key=lambda k: -scores.scores[k].gain)[: thresholds.shapes - 1]
 
 
-def without(
-    evidence: Evidence, trial: Trial, dropped: Candidate, level: float, target: float = math.inf
-) -> Trial | None:
-    """Return a trial's model without one of its effects, fitted from the trial's motion.
+def drop_effect(
+    data: DataSplit,
+    fitted: FittedModel,
+    dropped: Candidate,
+    level: float,
+    target: float = math.inf,
+) -> FittedModel | None:
+    """Return a model without one of its effects; None where that is lost or far above ``target``.
 
-    The fit is given up where it promises to end far above the sum of squares ``target``.
+    The fit starts at the fitted motion, the other parameters moved by the covariance if the effect
+    is small.
     """
     gone = {*dropped.free, *dropped.adapted}
-    model = trial.fit.model
+    model = fitted.fit.model
     own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
     effects = tuple(e for e in model.effects if e.name != dropped.name)
-    # The others move by what the covariance says, where that reaches so far.
-    start = trial.start_without([dropped.free[0]]) if _faint(trial, dropped) else trial.start
-    start = dict.fromkeys(trial.zeroed, 0.0) | start
+    faint = _is_faint(fitted, dropped)
+    start = fitted.start_without([dropped.free[0]]) if faint else fitted.start
+    start = dict.fromkeys(fitted.zeroed, 0.0) | start
     try:
-        rest = fitted(
-            evidence,
+        reduced = fit_model(
+            data,
             dataclasses.replace(model, effects=effects, **own),
-            [name for name in (*trial.free, *trial.zeroed) if name not in gone],
-            tuple(c for c in trial.chosen if c.name != dropped.name),
+            [name for name in (*fitted.free, *fitted.zeroed) if name not in gone],
+            tuple(c for c in fitted.chosen if c.name != dropped.name),
             start={name: value for name, value in start.items() if name not in gone},
-            windows=trial.fit.windows,
+            windows=fitted.fit.windows,
             least_gain=LITTLE * level,
             target=target,
         )
     except FitDiverged:
         return None
-    return None if rest.fit.given_up else within_physics(evidence, rest, target)
+    return None if reduced.fit.given_up else impose_physics(data, reduced, target)
 
 
-def enlarged(
-    evidence: Evidence, rest: Trial, trial: Trial, chosen: Sequence[Candidate], level: float
-) -> Trial | None:
-    """Return a model with all chosen effects, from one with some and a trial's values of others."""
-    added = [c for c in chosen if c.name not in rest.names]
-    known = {name: trial.start.get(name, 0.0) for c in added for name in c.free}
-    start = known | {c.free[0]: KICK * known[c.free[0]] for c in added}
-    try:
-        found = with_candidates(evidence, rest, added, start, level=level)
-    except FitDiverged:
-        return None
-    return within_physics(evidence, found)
-
-
-def _faint(trial: Trial, dropped: Candidate) -> bool:
-    """Whether the size of an effect is little beside its standard error."""
+def _is_faint(fitted: FittedModel, dropped: Candidate) -> bool:
+    """Whether the size of an effect is within a few standard errors of 0."""
     size = dropped.free[0]
-    if size not in trial.fit.names or dropped.phase is not None:
+    if size not in fitted.fit.names or dropped.phase is not None:
         return False
-    error = trial.fit.estimates[size].stderr
+    error = fitted.fit.estimates[size].stderr
     if error is None or not 0 < error < math.inf:
         return False
-    return abs(trial.start[size]) <= FAINT * error
+    return abs(fitted.start[size]) <= FAINT * error
 
 
-BACK_STEPS: Final = 6
-"""Steps of a fit from the other side that is to be better: there nearly all is as it was."""
+def add_effects(
+    data: DataSplit,
+    reduced: FittedModel,
+    full: FittedModel,
+    chosen: Sequence[Candidate],
+    level: float,
+) -> FittedModel | None:
+    """Return a model with all chosen effects, from a reduced one and the values of a full one."""
+    added = [c for c in chosen if c.name not in reduced.names]
+    known = {name: full.start.get(name, 0.0) for c in added for name in c.free}
+    start = known | {c.free[0]: KICK * known[c.free[0]] for c in added}
+    try:
+        found = fit_with_candidates(data, reduced, added, start, level=level)
+    except FitDiverged:
+        return None
+    return impose_physics(data, found)
 
-ALIKE_STEPS: Final = 25
-"""Steps of one that is to be as good."""
 
+def try_mirrored_places(data: DataSplit, fitted: FittedModel) -> FittedModel:
+    """Return a fit with places mirrored about the rest position, where that is better.
 
-def better_side(evidence: Evidence, trial: Trial) -> Trial:
-    """Return a fit with places on the other side of the rest, where that is better.
-
-    A pendulum that swings about its rest passes ``th0`` and ``-th0`` alike: a fit that begins on
-    the wrong side does not change over.
+    A swinging pendulum passes ``th0`` and ``-th0`` alike; no fit changes over by itself.
     """
-    for candidate in trial.chosen:
-        for start in _mirrored(trial, candidate):
-            other = _from(evidence, trial, candidate, start, BACK_STEPS)
-            if other is not None and other.chi2 < trial.chi2:
-                trial = other
-    return trial
+    for candidate in fitted.chosen:
+        for start in _mirrored(fitted, candidate):
+            other = _fit_from(data, fitted, candidate, start, MIRROR_STEPS)
+            if other is not None and other.chi2 < fitted.chi2:
+                fitted = other
+    return fitted
 
 
-def elsewhere(
-    evidence: Evidence, trial: Trial, sought: Mapping[str, Sequence[Score]]
+def find_equivalents(
+    data: DataSplit, fitted: FittedModel, sought: Mapping[str, Sequence[Score]]
 ) -> dict[str, dict[str, float]]:
-    """Return shapes where effects would do as well.
+    """Return other shapes with which effects fit equally well, by effect.
 
-    Of a place that on the other side of the rest, of a frequency or an instant the best of those
-    that residuals ask for, as ``sought`` has them by effect.
+    They are mirrored places, and the other frequencies or instants that ``sought`` has by effect.
     """
     found: dict[str, dict[str, float]] = {}
-    for candidate in trial.chosen:
-        starts = _mirrored(trial, candidate)
+    for candidate in fitted.chosen:
+        starts = _mirrored(fitted, candidate)
         for score in sought.get(candidate.name, ()):
-            effect = score.candidate.effect(trial.fit.model.units)
+            effect = score.candidate.effect(fitted.fit.model.units)
             shape = {f"{candidate.name}.{n}": effect.parameters[n] for n in score.candidate.shape}
             starts.append(shape | score.start)
-        fits = [_from(evidence, trial, candidate, start, ALIKE_STEPS) for start in starts]
+        fits = [_fit_from(data, fitted, candidate, start, EQUIVALENT_STEPS) for start in starts]
         for other in sorted((f for f in fits if f is not None), key=lambda f: -f.chi2):
-            if other.chi2 - trial.chi2 >= Z95**2 * trial.widening:
+            if other.chi2 - fitted.chi2 >= Z95**2 * fitted.widening:
                 continue
             for key in starts[0]:
-                here, there = trial.fit.estimates[key], other.fit.estimates[key]
+                here, there = fitted.fit.estimates[key], other.fit.estimates[key]
                 apart, own = abs(there.value - here.value), key.rpartition(".")[2]
                 if own in candidate.places:
                     apart = abs(math.remainder(apart, math.tau)) - abs(here.value)
@@ -215,74 +226,73 @@ def elsewhere(
     return found
 
 
-def _mirrored(trial: Trial, candidate: Candidate) -> list[dict[str, float]]:
-    """Return an effect's places on the other side of the rest, one at a time."""
+def _mirrored(fitted: FittedModel, candidate: Candidate) -> list[dict[str, float]]:
+    """Return an effect's places mirrored about the rest position, one at a time."""
     keys = [f"{candidate.name}.{place}" for place in candidate.places]
-    return [{key: -trial.fit.estimates[key].value} for key in keys]
+    return [{key: -fitted.fit.estimates[key].value} for key in keys]
 
 
-def _from(
-    evidence: Evidence, trial: Trial, candidate: Candidate, start: Mapping[str, float], steps: int
-) -> Trial | None:
-    """Return the fit from another start of an effect; none where the motion is lost."""
+def _fit_from(
+    data: DataSplit,
+    fitted: FittedModel,
+    candidate: Candidate,
+    start: Mapping[str, float],
+    steps: int,
+) -> FittedModel | None:
+    """Return the fit from another start of an effect; None where it diverges."""
     own = {key.rpartition(".")[2]: value for key, value in start.items()}
     effects = tuple(
         dataclasses.replace(e, parameters={**e.parameters, **own})
         if e.name == candidate.name
         else e
-        for e in trial.fit.model.effects
+        for e in fitted.fit.model.effects
     )
     try:
-        return fitted(
-            evidence,
-            dataclasses.replace(trial.fit.model, effects=effects),
-            trial.free,
-            trial.chosen,
-            start=trial.start | dict(start),
-            windows=trial.fit.windows,
+        return fit_model(
+            data,
+            dataclasses.replace(fitted.fit.model, effects=effects),
+            fitted.free,
+            fitted.chosen,
+            start=fitted.start | dict(start),
+            windows=fitted.fit.windows,
             steps=steps,
         )
     except FitDiverged:
         return None
 
 
-# How well the shape of an effect is known, along a bent ridge.
+def profile_intervals(
+    data: DataSplit, fitted: FittedModel
+) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return 95 % intervals of effects with a shape, from the profile of the likelihood.
 
-
-Z95: Final = 1.959963984540054
-"""The 97.5 % point of the standard normal distribution."""
-
-
-def profiles(evidence: Evidence, trial: Trial) -> dict[str, dict[str, tuple[float, float]]]:
-    """Return the intervals, from the profile of the likelihood, of effects with a shape.
-
-    Size and shape are found along a bent ridge: a warming of half the time constant does nearly
-    the same with another size. Elsewhere the covariance says the same for less.
+    Size and shape are strongly and nonlinearly correlated; for other effects the covariance is
+    enough.
     """
     wanted = {
         f"{c.name}.{name}": (c.name, name)
-        for c in trial.chosen
+        for c in fitted.chosen
         if c.adapted and c.phase is None
         for name in (c.size, *c.shape)
     }
-    names = [name for name in wanted if name in trial.fit.names and name not in trial.fit.mixed]
-    if not names or not trial.fit.converged:
+    names = [name for name in wanted if name in fitted.fit.names and name not in fitted.fit.mixed]
+    if not names or not fitted.fit.converged:
         return {}
     found = fit_runs(
-        evidence.fitted,
-        trial.fit.model,
-        trial.free,
-        start=trial.start,
-        windows=trial.fit.windows,
+        data.fitted,
+        fitted.fit.model,
+        fitted.free,
+        start=fitted.start,
+        windows=fitted.fit.windows,
         profiled=names,
     )
-    wider = math.sqrt(trial.widening / found.widening)
+    wider = math.sqrt(fitted.widening / found.widening)
     intervals: dict[str, dict[str, tuple[float, float]]] = {}
     for key in names:
         effect, name = wanted[key]
         value = found[key]
-        half = Z95 * math.sqrt(trial.widening) * (trial.fit.estimates[key].stderr or math.inf)
-        # Where the ridge folds back there may be no end to be found: the covariance has one.
+        half = Z95 * math.sqrt(fitted.widening) * (fitted.fit.estimates[key].stderr or math.inf)
+        # A profile without an end takes that of the covariance.
         low, high = (
             value + wider * (end - value) if math.isfinite(end) else value + side * half
             for end, side in zip(found.ends[key], (-1, 1), strict=True)

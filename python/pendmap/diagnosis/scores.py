@@ -1,13 +1,13 @@
 """Scores of all candidates at a fit, without fitting any: linear algebra on sensitivities.
 
 With the residuals ``r`` and the derivatives ``x`` of the readings by a candidate's size and phase,
-all over the standard errors and with what the fitted parameters and initial states can follow taken
-off, the sum of squares falls by
+all over the standard errors and orthogonal to the fitted parameters and initial states, the sum of
+squares falls by
 
 ``G = r' x (x' x)^-1 x' r``
 
-when the candidate is fitted (Rao's score test). The same matrix says how alike candidates are,
-which pairs belong together, and how weak an effect the records could show.
+when the candidate is fitted (Rao's score test). The same matrix gives the likeness of candidates,
+the scores of pairs, and the smallest effect that the records could show.
 
 References
 ----------
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.candidates import placed
+from pendmap.diagnosis.candidates import add_candidates
 from pendmap.identification.sensitivity import (
     STATE,
     WindowSlopes,
@@ -38,27 +38,26 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.model import Rig
 
     Floats = NDArray[np.float64]
 
 PASS: Final = 16
-"""So many directions the integrator carries at once: effects beyond them cost another pass, and
-each pass evaluates all effects that the model has."""
+"""Directions of derivatives that one pass of the integrator computes."""
 
 CONTAINS: Final = 0.99
-"""Cosine between what two effects do to the readings from which the one can do what the other does;
-with more parameters it has the other one as a special case."""
+"""Cosine between the responses to two effects from which the one with more parameters has the other
+as a special case."""
 
 SAME: Final = 1e-6
-"""A cosine that falls short of 1 by less is that of two names for one thing."""
+"""Deficit of the cosine from 1 below which two candidates are one effect under two names."""
 
 UNSEEN: Final = 1e-4
-"""A candidate of which the fitted parameters follow all but this part (of the root of its
-information) does nothing of its own: rounding and the integrator's error are not far below."""
+"""Norm of a response orthogonal to the fitted parameters, over its whole norm, below which the
+records do not show a candidate; rounding and the integrator's error are not far below."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,10 +65,10 @@ class Score:
     """A candidate's score."""
 
     candidate: Candidate  # Effect and shape
-    gain: float  # ``G``: by which the sum of squares is expected to fall
-    start: dict[str, float]  # Size and phase where it is expected to be least, SI
-    # ``x' x`` of the size: a size ``a`` gains ``a^2`` times this; of an effect with a phase at the
-    # phase where it is least. 0 where the records do not show the effect at all.
+    gain: float  # ``G``, the expected fall of the sum of squares
+    start: dict[str, float]  # Size and phase of the expected minimum, SI
+    # ``x' x`` of the size: a size ``a`` gains ``a^2`` times this, at the phase where it is least; 0
+    # where the records do not show the effect.
     information: float
 
 
@@ -78,11 +77,9 @@ class Scores:
     """Scores of all candidates in all shapes at one fit."""
 
     scores: tuple[Score, ...]  # One for each candidate and shape
-    columns: tuple[list[int], ...]  # The columns of each in what follows
-    # Products of what the candidates do to the readings, each of unit length; a row of zeros for
-    # what the records do not show.
-    gram: Floats
-    pull: Floats  # Its products with the residuals
+    columns: tuple[list[int], ...]  # Columns of each in ``gram`` and ``pull``
+    gram: Floats  # Products of unit responses; rows of zeros where the records show none
+    pull: Floats  # Products of unit responses with the residuals
 
     @classmethod
     def of_none(cls) -> Scores:
@@ -94,7 +91,7 @@ class Scores:
         return self.scores[place].candidate.name
 
     def best(self) -> list[int]:
-        """Return the places of each effect's best shape, the greatest gain first."""
+        """Return the place of each effect's best shape, the greatest gain first."""
         chosen: dict[str, int] = {}
         for k, score in enumerate(self.scores):
             name = score.candidate.name
@@ -103,39 +100,34 @@ class Scores:
         return sorted(chosen.values(), key=lambda k: -self.scores[k].gain)
 
     def together(self, places: Sequence[int]) -> float:
-        """Return the gain expected of several candidates at once."""
+        """Return the expected gain of several candidates together."""
         own = [c for k in places for c in self.columns[k]]
         return _gain(self.gram[np.ix_(own, own)], self.pull[own])
 
     def likeness(self, one: int, other: int) -> float:
-        """Return the cosine of the angle between what two candidates do to the readings.
-
-        The largest canonical correlation: 1 where the one can do all that the other does.
-        """
+        """Return the largest canonical correlation between the responses to two candidates."""
         a, b = self.columns[one], self.columns[other]
         left = _root_inverse(self.gram[np.ix_(a, a)])
         right = _root_inverse(self.gram[np.ix_(b, b)])
         return float(np.linalg.norm(left @ self.gram[np.ix_(a, b)] @ right, 2))
 
     def same(self, one: int, other: int) -> bool:
-        """Whether two candidates are the same under two names: to fit both would say nothing."""
+        """Whether two candidates are one effect under two names."""
         shaped = self.scores[one].candidate.shape or self.scores[other].candidate.shape
         alike = len(self.columns[one]) == len(self.columns[other])
         return not shaped and alike and self.likeness(one, other) > 1 - SAME
 
     def best_pairs(self, places: Sequence[int], count: int) -> list[list[int]]:
-        """Return the pairs of candidates with the greatest joint gains, one of each effect."""
+        """Return the pairs of candidates with the greatest joint gains."""
         pairs = sorted(itertools.combinations(places, 2), key=self.together, reverse=True)
         return [list(pair) for pair in pairs[:count]]
 
 
-def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidate]]) -> Scores:
-    """Return the scores of candidates at a fit.
-
-    ``pool`` has by effect its shapes; as many effects are derived together, one shape of each, as
-    one pass of the integrator carries.
-    """
-    room = max(PASS - len({name.partition("[")[0] for name in trial.fit.names}) - STATE, 1)
+def score_candidates(
+    data: DataSplit, fitted: FittedModel, pool: Sequence[Sequence[Candidate]]
+) -> Scores:
+    """Return the scores of candidates at a fit; ``pool`` has the shapes of each effect."""
+    room = max(PASS - len({name.partition("[")[0] for name in fitted.fit.names}) - STATE, 1)
     sought = [shapes for shapes in pool if shapes[0].sought]
     queue = _passes([shapes for shapes in pool if not shapes[0].sought], room)
     queue = queue or [[]]
@@ -145,14 +137,14 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
     for present in queue:
         free = [name for candidate in present for name in candidate.free]
         found, slopes = window_slopes(
-            trial.fit, evidence.fitted, free, placed(trial.fit.model, present)
+            fitted.fit, data.fitted, free, add_candidates(fitted.fit.model, present)
         )
         wanted = [found.index(name) for name in free]
         if not passes:
-            names = [name for name in found if name in trial.fit.estimates]
+            names = [name for name in found if name in fitted.fit.estimates]
             wanted = [found.index(name) for name in names] + wanted
-            # Frequencies and instants are those that the residuals ask for.
-            queue += _passes(_located(evidence, sought, slopes, trial.fit.model), room)
+            # Frequencies and instants come from the residuals.
+            queue += _passes(_located(data, sought, slopes, fitted.fit.model), room)
         bare = passes[0] if passes else slopes
         passes.append(
             [
@@ -173,7 +165,7 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
     residual = residual - base @ (base.T @ residual)
     sizes = lengths(columns)
     columns /= np.where(sizes > 0, sizes, 1.0)
-    # Twice is enough: what rounding left of the base the first time is gone.
+    # The second time removes the rounding errors of the first.
     for _ in range(2):
         columns -= base @ (base.T @ columns)
     gram, pull = columns.T @ columns, columns.T @ residual
@@ -186,20 +178,20 @@ def scores_of(evidence: Evidence, trial: Trial, pool: Sequence[Sequence[Candidat
         own = list(range(first, first + len(candidate.free)))
         first += len(own)
         where.append(own)
-        faint = candidate.effect(trial.fit.model.units).parameters.get(candidate.size, 0.0)
+        faint = candidate.effect(fitted.fit.model.units).parameters.get(candidate.size, 0.0)
         scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], faint))
     return Scores(tuple(scores), tuple(where), gram, pull)
 
 
 def _located(
-    evidence: Evidence,
+    data: DataSplit,
     pool: Sequence[Sequence[Candidate]],
     windows: Sequence[WindowSlopes],
     model: Rig,
 ) -> list[list[Candidate]]:
-    """Return candidates with the frequencies or instants that residuals ask for most."""
+    """Return candidates with the frequencies or instants that residuals show most."""
     found: list[list[Candidate]] = []
-    responses = calm_responses(evidence.fitted, windows, model.c_over_m) if pool else []
+    responses = calm_responses(data.fitted, windows, model.c_over_m) if pool else []
     for one, *_ in pool if responses else ():
         scanned = one.sought or {}
         unit = model.w0 ** scanned["power_of_w0"]
@@ -213,7 +205,7 @@ def _located(
 
 
 def _passes(pool: Sequence[Sequence[Candidate]], room: int) -> list[list[Candidate]]:
-    """Divide candidates, one shape of an effect each, among passes of so many parameters."""
+    """Divide candidates among passes, each with one shape of an effect and few parameters."""
     passes: list[list[Candidate]] = []
     for batch in itertools.zip_longest(*pool):
         left = 0
@@ -229,14 +221,14 @@ def _passes(pool: Sequence[Sequence[Candidate]], room: int) -> list[list[Candida
 
 
 def _scored(candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, faint: float) -> Score:
-    """Score a candidate; ``faint`` is the size at which one with a phase is derived."""
+    """Return the score of a candidate; ``faint`` is its size if it has a phase."""
     if not gram.any():
         return Score(candidate, 0.0, {}, 0.0)
     step = np.where(sizes > 0, _inverse(gram) @ pull / np.where(sizes > 0, sizes, 1.0), 0.0)
     start = {candidate.free[0]: float(step[0])}
     scale = sizes.copy()
     if candidate.phase is not None:
-        # The derivative by the phase is the size times that of the same effect a quarter on.
+        # The derivative by the phase is the size times the response a quarter of a turn later.
         quadrature = float(step[1]) * faint
         start = {
             candidate.free[0]: math.hypot(step[0], quadrature),
@@ -267,4 +259,4 @@ def _orthonormal(columns: Floats) -> Floats:
     if not kept.size:
         return np.zeros((len(columns), 0))
     u, s, _ = np.linalg.svd(kept / sizes[sizes > 0], full_matrices=False)
-    return np.asarray(u[:, s > 1e-7 * s[0]], np.float64)  # a direction that is none
+    return np.asarray(u[:, s > 1e-7 * s[0]], np.float64)

@@ -1,18 +1,18 @@
-"""The search for the effects that a model lacks.
+"""The search for the effects that a model lacks: forward selection, elimination and swaps.
 
-1. The given model is fitted, and the physical core: viscous damping, Coulomb friction and quadratic
-   drag with the sensor's zero. The core keeps what it needs of its effects.
-2. Readings get the error that the best model so far leaves, beside their noise. A sum of squares
-   counts in independent readings of that model's residuals.
+1. The given model is fitted, and the physical core: viscous damping, Coulomb friction, quadratic
+   drag and the sensor's zero. The core keeps the effects that it needs.
+2. The error of the best model so far is added to the readings' noise. Sums of squares count in
+   independent readings of that model's residuals.
 3. All effects of the library, in all their shapes, are scored at the best model (Rao), alone and in
    pairs; at first also at the models without one of the core's effects.
 4. The best few are fitted with all other parameters, within physics.
-5. The cheapest, by its sum of squares and Schwarz's penalty, is fitted until it has converged, and
-   accepted if noise hardly gains as much, if it closes its share of a gap that it does not close
-   whole (with a frequency or an instant all of it), and if it loses on no held-out set.
-6. Accepted effects are dropped where they gain too little beside the others, and replaced by what
-   fits better by as much as in step 5; of fits that the records do not tell apart the simplest and
-   commonest stands. A model without an effect is never worse than one with fewer.
+5. The model of least cost, its sum of squares with Schwarz's penalty, is fitted until it converges.
+   It is accepted if noise hardly gains as much, if it closes its share of the gap (with a frequency
+   or an instant the whole gap), and if it loses on no held-out set.
+6. Accepted effects are dropped if they gain too little beside the others, and replaced by better
+   ones under the conditions of step 5. Of models that the records do not tell apart the simplest
+   and commonest is kept. A model never fits worse than one with fewer effects.
 7. Steps 2 to 6 are repeated until nothing is accepted.
 """
 
@@ -22,96 +22,109 @@ import math
 from typing import TYPE_CHECKING
 
 from pendmap.diagnosis.baseline import follows
-from pendmap.diagnosis.prune import pruned
 from pendmap.diagnosis.refit import key_of
 from pendmap.diagnosis.state import Attempt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from pendmap.diagnosis.fitted_model import Trial
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.refit import Key
     from pendmap.diagnosis.state import State
 
 
-def search(state: State, core: Trial | None, progress: Callable[[int], None]) -> Trial:
+def search(state: State, core: FittedModel | None, progress: Callable[[int], None]) -> FittedModel:
     """Return the best model."""
-    best = state.weigh(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
+    best = state.reweight(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
     core = best
-    best = pruned(state, beginnings(state, core)[0])
+    best = prune_effects(state, initial_models(state, core)[0])
     if core.chosen and state.most > 0:
-        state.attempts.append(core_attempt(state, core, accepted=bool(best.chosen)))
-    # What takes the place of the core's effects starts without them.
-    rests = [state.rest(best, candidate) for candidate in best.chosen]
-    starts = [rest for rest in rests if follows(state.evidence, rest)]
-    seen: dict[Key, float] = {}
-    # What is accepted may be dropped again: no set of effects is enlarged twice, unless a fit of it
-    # was found that the records tell from the first.
+        state.attempts.append(
+            Attempt(
+                core.names,
+                {},
+                (state.base.chi2 - core.chi2) / state.level,
+                state.cost(state.base) - state.cost(core),
+                None,
+                bool(best.chosen),
+                0,
+            )
+        )
+    # Alternatives of the core's effects are searched at models without these.
+    reduced = [state.leave_out(best, candidate) for candidate in best.chosen]
+    starts = [model for model in reduced if follows(state.data, model)]
+    best_known: dict[Key, float] = {}
+    # A set of effects is enlarged again only from a clearly better fit, as effects may be dropped.
     margin = state.thresholds.alike
-    while state.room(best) > 0 and best.chi2 + margin * best.level < seen.get(
-        key_of(best.chosen), math.inf
-    ):
-        seen[key_of(best.chosen)] = best.chi2
+    while state.remaining(best) > 0:
+        key = key_of(best.chosen)
+        if not best.chi2 + margin * best.level < best_known.get(key, math.inf):
+            break
+        best_known[key] = best.chi2
         step = _step(state, best, starts)
         if step is None:
             break
-        best, starts = pruned(state, state.weigh(step)), []
+        best, starts = prune_effects(state, state.reweight(step)), []
         progress(len(best.chosen))
-    return state.weigh(best)
+    return state.reweight(best)
 
 
-def beginnings(state: State, core: Trial) -> list[Trial]:
-    """Return the given model and the core with what it needs of its effects, the cheapest first."""
+def initial_models(state: State, core: FittedModel) -> list[FittedModel]:
+    """Return the given model, the core and the core without each effect, the cheapest first."""
     starts = [state.base]
     if core.chosen and state.most > 0:
         starts.append(core)
         state.accept(core)
         for candidate in core.chosen:
-            rest = state.rest(core, candidate)
-            starts += [rest] if rest.chosen else []
+            reduced = state.leave_out(core, candidate)
+            starts += [reduced] if reduced.chosen else []
     return sorted(starts, key=state.cost)
 
 
-def _step(state: State, best: Trial, starts: Sequence[Trial]) -> Trial | None:
-    """Return the cheapest model with more, or other, effects that is accepted."""
-    found: list[tuple[Trial, Trial, list[int]]] = []
-    for rest in [best, *(s for s in starts if s is not best)]:
-        singles, pairs = _promising(state, rest)
+def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> FittedModel | None:
+    """Return the cheapest accepted model with more, or other, effects; None without one."""
+    found: list[tuple[FittedModel, FittedModel, list[int]]] = []
+    most = state.thresholds.singles
+    for reduced in [best, *(s for s in starts if s is not best)]:
+        singles, pairs = _promising(state, reduced)
         fits = 0
         for places in [*singles, *pairs]:
-            if len(places) == 1 and fits == state.thresholds.singles:
+            if len(places) == 1 and fits == most:
                 continue
-            trial = state.refit(rest, places)
-            if trial is not None:
+            full = state.refit(reduced, places)
+            if full is not None:
                 fits += 1
-                found.append((trial, rest, places))
+                found.append((full, reduced, places))
     if not found:
         return None
-    level = min((trial for trial, _, _ in found), key=lambda t: t.chi2).level
+    level = min((full for full, _, _ in found), key=lambda t: t.chi2).level
     found.sort(key=lambda each: state.cost(each[0], level))
-    for fit, rest, places in found[: state.thresholds.singles]:
-        trial = state.settled(fit)
-        gains = state.room(trial) >= 0 and state.gains(best, trial)
-        good = gains and state.holds(best, trial)
-        state.attempts.append(attempt_of(state, rest, trial, places, tried=gains, accepted=good))
-        if good:
-            return trial
+    for fit, reduced, places in found[:most]:
+        full = state.converge(fit)
+        gains = state.remaining(full) >= 0 and state.is_significant(best, full)
+        accepted = gains and state.keeps_hold_out(best, full)
+        state.attempts.append(
+            _attempt(state, reduced, full, places, evaluated=gains, accepted=accepted)
+        )
+        if accepted:
+            return full
     return None
 
 
-def _promising(state: State, rest: Trial) -> tuple[list[list[int]], list[list[int]]]:
-    """Return the candidates, and the pairs of them, with the greatest scores at a model.
+def _promising(state: State, fitted: FittedModel) -> tuple[list[list[int]], list[list[int]]]:
+    """Return the candidates, and pairs of them, with the greatest scores at a model.
 
-    Twice as many candidates as are wanted: not each has a fit within physics.
+    Twice the number of candidates to fit: some have no fit within physics.
     """
     limits = state.thresholds
-    scores = state.scores(rest)
+    scores = state.scores(fitted)
     ranked = scores.best()
     chosen: list[list[int]] = []
     for k in ranked:
         if scores.scores[k].gain > 0 and not any(scores.same(j, k) for [j] in chosen):
             chosen.append([k])
-    if state.room(rest) < 2 or len(ranked) < 2:  # noqa: PLR2004 (a pair)
+    if state.remaining(fitted) < 2 or len(ranked) < 2:  # noqa: PLR2004 (a pair)
         return chosen[: 2 * limits.singles], []
     alone = scores.scores[ranked[0]].gain
     pairs = [
@@ -122,41 +135,75 @@ def _promising(state: State, rest: Trial) -> tuple[list[list[int]], list[list[in
     return chosen[: 2 * limits.singles], pairs
 
 
-# What a search has tried.
-
-
-def core_attempt(state: State, core: Trial, *, accepted: bool) -> Attempt:
-    """Return the attempt to add the physical core's effects to the given model."""
-    return Attempt(
-        core.names,
-        {},
-        (state.base.chi2 - core.chi2) / state.level,
-        state.cost(state.base) - state.cost(core),
-        None,
-        accepted,
-        0,
-    )
-
-
-def attempt_of(  # noqa: PLR0913 (a model, another, and what is between them)
+def _attempt(  # noqa: PLR0913 (two models and their comparison)
     state: State,
-    rest: Trial,
-    trial: Trial,
+    reduced: FittedModel,
+    full: FittedModel,
     places: Sequence[int],
     *,
-    tried: bool,
+    evaluated: bool,
     accepted: bool,
 ) -> Attempt:
-    """Return the attempt to add candidates to a model, those at some places of its scores."""
-    scores = state.scores(rest)
+    """Return the attempt to add the candidates at some places of a model's scores."""
+    scores = state.scores(reduced)
     added = [scores.scores[k].candidate for k in places]
-    pairs = zip(state.sets(rest), state.sets(trial), strict=False) if tried else ()
+    losses = state.hold_out_losses
+    pairs = zip(losses(reduced), losses(full), strict=False) if evaluated else ()
     return Attempt(
         tuple(candidate.name for candidate in added),
-        trial.shape_of(trial.chosen[-len(added)]),
+        full.shape_of(full.chosen[-len(added)]),
         scores.together(places) / state.level,
-        state.cost(rest) - state.cost(trial),
-        min(((less - more) / state.level for less, more in pairs), default=None),
+        state.cost(reduced) - state.cost(full),
+        min(((before - after) / state.level for before, after in pairs), default=None),
         accepted,
-        len(rest.chosen),
+        len(reduced.chosen),
     )
+
+
+def prune_effects(state: State, best: FittedModel) -> FittedModel:
+    """Return a model after backward elimination and swaps, in the simplest equivalent form.
+
+    No set of effects is visited twice.
+    """
+    visited: set[Key] = set()
+    following: FittedModel | None = best
+    while following is not None and key_of(following.chosen) not in visited:
+        best = state.converge(following)
+        visited.add(key_of(best.chosen))
+        state.accept(best)
+        following = _preferred(state, best)
+    return best
+
+
+def _preferred(state: State, best: FittedModel) -> FittedModel | None:
+    """Return a model that is preferred to the best one."""
+    for candidate in best.chosen:
+        reduced = state.leave_out(best, candidate)
+        if not state.is_significant(reduced, best):
+            return reduced
+        for _, other in fit_alternatives(state, best, candidate, reduced):
+            if (
+                other is not None
+                and other.chi2 < best.chi2 - state.thresholds.alike * best.level
+                and state.cost(other) < state.cost(best)
+                and state.closes_enough(best, other)
+                and state.is_significant(reduced, other)
+                and state.keeps_hold_out(best, other)
+            ):
+                return other
+    return state.simplest(best)
+
+
+def fit_alternatives(
+    state: State, best: FittedModel, candidate: Candidate, reduced: FittedModel
+) -> list[tuple[int, FittedModel | None]]:
+    """Return the candidates that promise most in the place of an effect, with their fits."""
+    limits = state.thresholds
+    scores = state.scores(reduced)
+    gain = reduced.chi2 - best.chi2
+    others = [
+        k
+        for k in scores.best()
+        if scores.name(k) != candidate.name and scores.scores[k].gain > limits.worth * gain
+    ]
+    return [(k, state.refit(reduced, [k])) for k in others[: limits.rivals]]

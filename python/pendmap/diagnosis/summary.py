@@ -1,4 +1,4 @@
-"""What a diagnosis found, as JSON and as text."""
+"""A diagnosis as a JSON object."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
-from pendmap.comparison.cycles import AFTER, BEFORE
-from pendmap.diagnosis.result import _ranking, given_out
+from pendmap.comparison.forecast import AFTER, BEFORE
+from pendmap.diagnosis.result import given_out, ranking
 from pendmap.records.summary import doubts
 
 if TYPE_CHECKING:
@@ -17,15 +17,16 @@ if TYPE_CHECKING:
 def as_json(found: Discrepancy) -> dict[str, Any]:
     """Return the JSON object of ``pendmap diagnose``, without the paths of files.
 
-    What could not be computed beside the verdict is null, and ``not_computed`` has the reason.
+    Parts that were not computed are null, with the reason in ``not_computed``.
     """
     unknown = found.not_computed
-    gap, judgement = found.gap, found.judgement
-    fit, base = found.best.trial.fit, found.base.trial.fit
-    wider = math.sqrt(found.best.trial.widening)
+    gap, assessment = dataclasses.asdict(found.gap), found.assessment
+    gap_by_run = gap.pop("by_run")
+    fit, base = found.best.fitted.fit, found.base.fitted.fit
+    wider = math.sqrt(found.best.fitted.widening)
     return {
-        "experiment": str(found.evidence.experiment.path),
-        "doubts": doubts(found.evidence.experiment, *found.evidence.runs),
+        "experiment": str(found.data.experiment.path),
+        "doubts": doubts(found.data.experiment, *found.data.runs),
         "verdict": found.verdict,
         "effects": [
             {
@@ -35,7 +36,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 "probability": effect.probability,
                 "approximate": effect.approximate,
                 "closes": next(
-                    s.closed for s in judgement.standings if s.candidate.name == effect.name
+                    s.closed for s in assessment.identified if s.candidate.name == effect.name
                 ),
                 "elsewhere": effect.elsewhere,
             }
@@ -43,24 +44,10 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         ],
         "equivalent": found.equivalent,
         "gap": {
-            "noise_floor": gap.noise_floor,
-            "held_out_noise_floor": gap.held_out_noise_floor,
-            "before": gap.before,
-            "after": gap.after,
-            "held_out_before": gap.held_out_before,
-            "held_out_after": gap.held_out_after,
-            "closed": judgement.closed if found.effects else None,
-            "closed_by_nearest": judgement.closed if judgement.standings else None,
-            "runs": [
-                {
-                    "name": run.name,
-                    "held_out": run.held_out,
-                    "noise_floor": run.noise_floor,
-                    "before": run.before,
-                    "after": run.after,
-                }
-                for run in gap.by_run
-            ],
+            **gap,
+            "closed": assessment.closed if found.effects else None,
+            "closed_by_nearest": assessment.closed if assessment.identified else None,
+            "runs": gap_by_run,
         },
         "forecast": [
             {
@@ -93,20 +80,20 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "detection_limits": None
         if "detection_limits" in unknown
         else {name: limit.size for name, limit in found.advice.limits.items()},
-        "nearest": list(found.nearest.trial.names),
+        "nearest": list(found.nearest.fitted.names),
         "left": {
-            "z": judgement.left,
-            "uneven": judgement.uneven,
-            "torque_by_chance": judgement.chance,
-            "chance": judgement.form.chance,
-            "chances": dict(judgement.form.chances),
-            "further": judgement.form.further,
-            "chi2_per_degree": judgement.ratio,
-            "chi2_per_degree_held_out": judgement.ratio_held,
-            "allowed": judgement.ratio_allowed,
+            "z": assessment.left,
+            "uneven": assessment.uneven,
+            "torque_by_chance": assessment.chance,
+            "chance": assessment.form.chance,
+            "chances": dict(assessment.form.chances),
+            "further": assessment.form.further,
+            "chi2_per_degree": assessment.ratio,
+            "chi2_per_degree_held_out": assessment.ratio_held,
+            "allowed": assessment.ratio_allowed,
         },
         "baseline": {name: e.value for name, e in base.estimates.items()},
-        "set_to_zero": list(found.best.trial.zeroed),
+        "set_to_zero": list(found.best.fitted.zeroed),
         "model_file": {"rms": fit.rms, "parameters": given_out(found.best)},
         "parameters": {
             name: {"value": e.value, "stderr": e.stderr and wider * e.stderr}
@@ -116,7 +103,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             name: [{"value": value, "stderr": error} for value, error in pairs]
             for name, pairs in found.runs.coefficients.items()
         },
-        "ranking": _ranking(found),
+        "ranking": ranking(found),
         "functions": None
         if "functions" in unknown
         else [dataclasses.asdict(score) for score in found.functions],
@@ -136,15 +123,15 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "findings": [
             finding.text
             for finding in (
-                *found.evidence.experiment.findings,
-                *(finding for run in found.evidence.runs for finding in run.findings),
+                *found.data.experiment.findings,
+                *(finding for run in found.data.runs for finding in run.findings),
             )
         ],
     }
 
 
 def _proposals(found: Discrepancy) -> dict[str, Any] | None:
-    """Return what is wanted, and of each kind of run that could be recorded the best."""
+    """Return the aim, and the best proposal of each kind of run; None without an outlook."""
     outlook = found.advice.outlook
     if outlook is None:
         return None

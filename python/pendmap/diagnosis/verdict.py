@@ -1,4 +1,4 @@
-"""The five verdicts, and what they rest on."""
+"""The five verdicts, the alternatives of each effect, and the statistics they are based on."""
 
 from __future__ import annotations
 
@@ -8,95 +8,243 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from pendmap.diagnosis.alternatives import Standing, standing_of
-from pendmap.diagnosis.candidates import choices_of
+from pendmap.comparison.data import counted
+from pendmap.diagnosis.candidates import count_choices
+from pendmap.diagnosis.scores import CONTAINS
+from pendmap.diagnosis.search import fit_alternatives
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.scores import Scores
-    from pendmap.diagnosis.state import Found, State
+    from pendmap.diagnosis.state import ScoredModel, State
     from pendmap.residuals.by_run import RunByRun
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
 SEVERAL: Final = 1.0
-"""Standard errors by which the greatest of several runs counts as less than all together."""
+"""Standard errors by which the greatest excess of several runs is reduced."""
+
+THIRDS: Final = 3
+"""Parts of a single run; a name must be better without any one of them."""
+
+COEFFICIENTS: Final = (1.94, 0.13, -1.65, 0.74, 0.8)
+"""``b0`` to ``b4`` of the probability of a name, from 163 names, of which 111 were right: 227
+experiments of the seed 8401, 67 of them with disturbances that no effect describes."""
+
+LEAST_CHANCE: Final = 1e-6
+"""Probability by noise alone below which the probability of a name no longer falls."""
+
+GAINS: Final = (10.0, 1e5)
+"""Range to which gains are clipped for the probability of a name."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Judgement:
-    """What a search amounts to."""
+class Alternative:
+    """Another effect in the place of one that was accepted."""
+
+    candidate: Candidate  # Effect and shape
+    gain: float  # Fall of the sum of squares with it, in independent readings
+    # Gain of the accepted effect less its own, each less the gain of a choice by chance: twice the
+    # difference of log-likelihoods.
+    behind: float
+    separation: float  # ``s = 1 - gain / gain of the accepted effect``
+    likeness: float  # Cosine of the angle between the responses of the readings to both
+    refitted: bool  # Whether the gain is that of a fit; else it is the score's
+    # Whether the accepted effect is its special case, and it gains no more than by chance.
+    contains: bool
+    # Whether the records do not tell them apart: it is behind by less than the threshold, or by the
+    # readings of one run alone, of a single run by a third, unless the accepted effect acts once.
+    alike: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Identifiability:
+    """An accepted effect among its alternatives."""
+
+    candidate: Candidate  # The effect
+    gain: float  # Fall of the sum of squares with it, in independent readings
+    closed: float  # Share of the squared gap above the noise that it closes beside the others
+    alternatives: tuple[Alternative, ...]  # The nearest first
+
+    @property
+    def equivalent(self) -> list[str]:
+        """Names that the records do not tell apart, its own first.
+
+        Where there are several, effects that contain one of them are included.
+        """
+        alike = [r for r in self.alternatives if r.alike and not r.contains]
+        wider = [r for r in self.alternatives if r.contains] if alike else []
+        return [self.candidate.name, *(r.candidate.name for r in (*alike, *wider))]
+
+    @property
+    def share(self) -> float:
+        """Share of its likelihood among all names with equal prior odds."""
+        others = [r for r in self.alternatives if not r.contains]
+        return 1.0 / (1.0 + sum([math.exp(-0.5 * max(r.behind, 0.0)) for r in others]))
+
+
+def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) -> Identifiability:
+    """Return an effect of the best model among its alternatives."""
+    level = best.level
+    reduced = state.leave_out(best, candidate)
+    gain = (reduced.chi2 - best.chi2) / level
+    scores = state.scores(reduced)
+    places = scores.best()
+    own = next((k for k in places if scores.name(k) == candidate.name), None)
+    if own is None:
+        return Identifiability(candidate, gain, state.closed(reduced, best), ())
+    fits = dict(fit_alternatives(state, best, candidate, reduced))
+    alternatives = []
+    for k in places:
+        score, fit = scores.scores[k], fits.get(k)
+        if k == own or score.gain <= 0:
+            continue
+        reached = score.gain / level
+        if scores.same(own, k):
+            reached = gain
+        elif fit is not None:
+            fit = state.converge(fit)
+            reached = (reduced.chi2 - fit.chi2) / level
+        likeness = scores.likeness(own, k)
+        more = score.candidate.count > candidate.count
+        chosen = score.candidate.choice_gain - candidate.choice_gain
+        behind = gain - reached + chosen
+        contains = more and likeness > CONTAINS and behind > -state.thresholds.alike
+        alike = behind < state.thresholds.alike
+        if fit is not None and not alike and not candidate.once:
+            # The accepted effect must be better without any one run, or any third of a single one.
+            parts = _by_part(fit) - _by_part(best)
+            alike = bool(parts.sum() - parts.max() + chosen * level < 0)
+        alternatives.append(
+            Alternative(
+                score.candidate,
+                reached,
+                behind,
+                1.0 - reached / gain if gain > 0 else 0.0,
+                likeness,
+                fit is not None,
+                contains,
+                alike,
+            )
+        )
+    alternatives.sort(key=lambda r: r.behind)
+    return Identifiability(candidate, gain, state.closed(reduced, best), tuple(alternatives))
+
+
+def _by_part(fitted: FittedModel) -> np.ndarray:
+    """Return the sum of squares of each run, or of each third of a single one."""
+    sums = []
+    for run, white in zip(fitted.runs, fitted.fit.white, strict=True):
+        sums.append(white[np.isfinite(white) & counted(run)] ** 2)
+    parts = sums if len(sums) > 1 else np.array_split(sums[0], THIRDS)
+    return np.array([float(np.sum(part)) for part in parts])
+
+
+@dataclasses.dataclass(frozen=True)
+class GoodnessOfFit:
+    """Probabilities that noise alone leaves the residuals of the best model.
+
+    A sum of squares hardly shows a form that is nearly right, whose error lies in one direction
+    among hundreds. So each direction is tested by itself.
+    """
+
+    # By test: other ``effects`` of the library in every shape (Rao's score at the best model), the
+    # ``torque`` over angle, velocity, amplitude, phase and time, ``slow`` residuals, equal
+    # parameters of all ``runs``, residuals of the ``held_out`` records.
+    chances: Mapping[str, float]
+    further: str | None  # The effect of the most significant score
+
+    @property
+    def chance(self) -> float:
+        """Least of all probabilities times their number (Bonferroni)."""
+        return min(min(self.chances.values()) * len(self.chances), 1.0)
+
+
+def assess_fit(
+    scores: Scores, chance_of: Callable[[float, int], float], others: Mapping[str, float]
+) -> GoodnessOfFit:
+    """Return the goodness of fit from the scores of further effects and the other tests."""
+    choices = count_choices([score.candidate for score in scores.scores])
+    tails = {}
+    for k in scores.best():
+        score = scores.scores[k]
+        name = score.candidate.name
+        if score.gain > 0:
+            tails[name] = choices[name] * chance_of(score.gain, len(scores.columns[k]))
+    further = min(tails, key=lambda name: tails[name], default=None)
+    effects = 1.0 if further is None else min(tails[further] * len(tails), 1.0)
+    return GoodnessOfFit({"effects": effects, **others}, further)
+
+
+@dataclasses.dataclass(frozen=True)
+class Assessment:
+    """Verdict and the statistics it is based on."""
 
     # ``none``: the baseline describes the records; ``named``: effects explain all; ``ambiguous``: a
     # class of effects does, which these records do not tell apart; ``partial``: effects close most
-    # of the gap and something is left; ``unknown``: something is missing that no candidate
-    # explains.
+    # of the gap, but not all; ``unknown``: no candidate explains the gap.
     verdict: Verdict
-    standings: tuple[Standing, ...]  # The effects that were found, among their rivals
-    left: float  # The slow part of what is left, over its standard error
-    # Sum of squares over degrees of freedom, and up to where chance and the doubt about the noise
-    # allow it: ``1 + 4 sqrt(2 / N + 4 r^2)``.
-    ratio: float
+    identified: tuple[Identifiability, ...]  # The effects found, among their alternatives
+    left: float  # Slow part of the residuals beyond noise, over its standard error
+    ratio: float  # Sum of squares over degrees of freedom
+    # Greatest such ratio allowed by chance and by the error ``r`` of the noise:
+    # ``1 + 4 sqrt(2 / N + 4 r^2)``.
     ratio_allowed: float
     ratio_held: float  # Sum of squares over degrees of freedom on what was held back
-    # Share of the squared gap above the noise that the effects close on what was fitted.
-    closed: float
-    # How differently the runs would have the parameters, over the standard error of that (Cochran's
-    # Q less its degrees of freedom over ``sqrt(2 degrees)``).
-    uneven: float
-    # That noise alone would show such a torque over angle, velocity, amplitude, drive phase or time
-    # as is left.
-    chance: float
-    form: Form  # What is left, looked for in every direction
-    # That the name of each standing, or one of its class, is right.
-    probabilities: tuple[float, ...]
-    # Whether names are given with reserve: something is left, or one of them is not sure.
-    approximate: bool
+    closed: float  # Share of the squared gap above the noise that the effects close
+    uneven: float  # Difference of parameters between runs, over its standard error (Cochran's Q)
+    chance: float  # Probability that noise alone shows the residual torque
+    form: GoodnessOfFit
+    probabilities: tuple[float, ...]  # That the name of each effect, or one of its class, is right
+    approximate: bool  # Whether names are given with reserve: the fit is poor, or one is not sure
 
 
-def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement:
+def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: float) -> Assessment:
     """Return the verdict on a search."""
-    limits, trial = state.thresholds, best.trial
-    degrees = max(trial.fit.degrees, 1)
-    # The doubt about the noise as it is seen without a model, run by run.
-    allowed = 1 + 4 * math.sqrt(2 / degrees + 4 * state.evidence.doubt**2)
-    ratio = trial.chi2 / degrees
-    # The greatest of several runs is greater by chance.
-    left = max(trial.remainder.z, max(trial.remainder.by_run) - SEVERAL)
-    held_out = limits.forecast * max(ratio, allowed)
+    limits, fitted, held = state.thresholds, best.fitted, best.hold_out
+    noise, degrees = fitted.noise, max(fitted.fit.degrees, 1)
+    allowed = 1 + 4 * math.sqrt(2 / degrees + 4 * state.data.doubt**2)
+    ratio = fitted.chi2 / degrees
+    # The greatest excess of several runs is greater by chance.
+    left = max(noise.z, max(noise.by_run) - SEVERAL)
+    held_out = 1.0
+    if fitted.chosen:
+        held_out = _hold_out_chance(best, limits.forecast * max(ratio, allowed))
     others = {
         "torque": chance,
-        "slow": trial.remainder.chance,
+        "slow": noise.chance,
         "runs": runs.chance,
-        "held_out": _foretold(best, held_out) if trial.chosen else 1.0,
+        "held_out": held_out,
     }
-    form = form_of(state.scores(trial), trial.remainder.chance_of, others)
-    rest = form.chance < limits.rest
+    form = assess_fit(state.scores(fitted), noise.chance_of, others)
+    lacks = form.chance < limits.rest
     closed = _closed(state, best)
-    standings = tuple(
+    identified = tuple(
         sorted(
-            (standing_of(state, trial, candidate) for candidate in trial.chosen),
+            (compare_alternatives(state, fitted, candidate) for candidate in fitted.chosen),
             key=lambda s: -s.gain,
         )
     )
-    sure = probabilities(form.chance, [s.gain for s in standings])
+    sure = probabilities(form.chance, [s.gain for s in identified])
     verdict: Verdict
-    if not standings:
-        verdict = "unknown" if rest else "none"
-    elif rest:
+    if not identified:
+        verdict = "unknown" if lacks else "none"
+    elif lacks:
         verdict = "partial" if closed >= limits.closes else "unknown"
-    elif any(len(standing.equivalent) > 1 for standing in standings):
+    elif any(len(each.equivalent) > 1 for each in identified):
         verdict = "ambiguous"
     else:
         verdict = "named"
-    return Judgement(
+    return Assessment(
         verdict,
-        standings,
+        identified,
         left,
         ratio,
         allowed,
-        best.held.chi2 / max(best.held.degrees, 1),
+        held.chi2 / max(held.degrees, 1),
         closed,
         runs.uneven,
         chance,
@@ -106,94 +254,31 @@ def judge(state: State, best: Found, runs: RunByRun, chance: float) -> Judgement
     )
 
 
-def _foretold(best: Found, ratio: float) -> float:
-    """Return the chance that noise alone leaves as much on what was held back.
-
-    ``ratio`` is the sum of squares per reading that counts as noise.
-    """
+def _hold_out_chance(best: ScoredModel, ratio: float) -> float:
+    """Return the probability that noise, ``ratio`` per reading, leaves the held-out residuals."""
     from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
 
-    readings = max(best.held.degrees / best.trial.level, 1.0)
-    return float(chdtrc(readings, best.held.chi2 / ratio / best.trial.level))
+    level, held = best.fitted.level, best.hold_out
+    return float(chdtrc(max(held.degrees / level, 1.0), held.chi2 / ratio / level))
 
 
-def _closed(state: State, best: Found) -> float:
-    """Return the share of the gap closed on what was fitted.
+def _closed(state: State, best: ScoredModel) -> float:
+    """Return the share of the gap that the best model closes in the fitted records.
 
-    The gap is the sum of squares above that of noise, as the best model's spectrum shows it; 1
-    where it is no more than noise scatters.
+    The gap is the sum of squares above that of the best model's noise; 1 where it is no more than
+    the scatter of noise.
     """
-    trial, base = best.trial, state.base
-    degrees = max(trial.fit.degrees, 1)
-    noise = min(trial.remainder.level, trial.chi2 / degrees)
+    fitted, base = best.fitted, state.base
+    degrees = max(fitted.fit.degrees, 1)
+    noise = min(fitted.noise.level, fitted.chi2 / degrees)
     gap = base.chi2 - noise * degrees
     if gap <= noise * math.sqrt(2 * degrees):
         return 1.0
-    return float(np.clip(1 - max(trial.chi2 - noise * degrees, 0.0) / gap, -1.0, 1.0))
-
-
-@dataclasses.dataclass(frozen=True)
-class Form:
-    """What is left beside the best model, looked for in every direction that has a name.
-
-    A sum of squares tells little of a form that is nearly right: what is left of it lies in one
-    direction among hundreds. So each says by itself how probable it is that noise leaves so much:
-    every other effect in every shape (Rao's score at the best model), the torque over angle,
-    velocity, amplitude, phase and time, the slow part of the residuals, whether all runs would have
-    the same parameters, and the residuals of what was held back.
-    """
-
-    # By what was looked at, that noise alone leaves as much: ``effects`` of the library that are
-    # not in the model, ``torque``, ``slow`` residuals, ``runs``, ``held_out`` sets.
-    chances: Mapping[str, float]
-    further: str | None  # The effect that would take up most of what is left
-
-    @property
-    def chance(self) -> float:
-        """The least of all chances, times how many there are (Bonferroni)."""
-        return min(min(self.chances.values()) * len(self.chances), 1.0)
-
-
-def form_of(
-    scores: Scores, chance_of: Callable[[float, int], float], others: Mapping[str, float]
-) -> Form:
-    """Return what is left.
-
-    ``others`` are the chances that noise alone leaves as much of all else that was looked at.
-    """
-    choices = choices_of([score.candidate for score in scores.scores])
-    tails = {}
-    for k in scores.best():
-        score = scores.scores[k]
-        name = score.candidate.name
-        if score.gain > 0:
-            tails[name] = choices[name] * chance_of(score.gain, len(scores.columns[k]))
-    further = min(tails, key=lambda name: tails[name], default=None)
-    effects = 1.0 if further is None else min(tails[further] * len(tails), 1.0)
-    return Form({"effects": effects, **others}, further)
-
-
-COEFFICIENTS: Final = (1.94, 0.13, -1.65, 0.74, 0.8)
-"""``b0`` to ``b4`` from 163 names, of which 111 were right: of 227 experiments of the seed 8401, 67
-of them with disturbances that no effect describes."""
-
-LEAST_CHANCE: Final = 1e-6
-"""Below this a chance says no more."""
-
-GAINS: Final = (10.0, 1e5)
-"""Gains beyond these are taken for these."""
+    return float(np.clip(1 - max(fitted.chi2 - noise * degrees, 0.0) / gap, -1.0, 1.0))
 
 
 def features(chance: float, gains: Sequence[float]) -> list[tuple[float, ...]]:
-    """Return for each name what its probability goes by.
-
-    Parameters
-    ----------
-    chance : float
-        That noise alone leaves as much as is left (:class:`pendmap.diagnosis.verdict.Form`).
-    gains : sequence of float
-        By how much the sum of squares rises without each effect, over the noise's level.
-    """
+    """Return the regressors of each name's probability in :func:`probabilities`."""
     low, high = GAINS
     kept = [min(max(gain, low), high) for gain in gains]
     left = math.log10(max(chance, LEAST_CHANCE))
@@ -208,9 +293,10 @@ def probabilities(chance: float, gains: Sequence[float]) -> tuple[float, ...]:
     """Return the probability that each name, or one of its class, is right.
 
     ``P = 1 / (1 + exp(-z))``, ``z = b0 + b1 log10(chance) + b2 (effects - 1)
-    + b3 log10(gain / strongest) + b4 log10(strongest / 100)``, fitted to right and wrong names of
-    blind experiments (``benchmarks/blind/calibration.py``), in a part of which the true effect was
-    withheld: then the nearest one takes its place, or two or three together.
+    + b3 log10(gain / strongest) + b4 log10(strongest / 100)``, with the ``chance`` of the goodness
+    of fit and the gains without each effect over the noise's level. It was fitted to blind
+    experiments (``benchmarks/blind/calibration.py``), some without the true effect among the
+    candidates, where the nearest effect or several together take its place.
     """
     rows = features(chance, gains)
     sums = [sum(b * x for b, x in zip(COEFFICIENTS, row, strict=True)) for row in rows]

@@ -33,7 +33,7 @@ Z95: Final = 1.959963984540054
 def draw_ranking(axes: Axes, found: Discrepancy) -> None:
     """Draw the greatest scores at the baseline, those of the effects found in colour."""
     best = [found.scores.scores[k] for k in found.scores.best()[:RANKED]]
-    level = found.base.trial.remainder.level
+    level = found.base.fitted.noise.level
     values = [max(score.gain / level, 0.1) for score in best]
     places = np.arange(len(best))[::-1]
     colours = [_colour(score.candidate.name, found) for score in best]
@@ -67,9 +67,9 @@ def shown_coefficients(found: Discrepancy) -> list[str]:
     Where nothing was found, the parameter that differs most between runs, by its errors. One run
     has nothing to be compared with.
     """
-    if len(found.evidence.fitted) == 1:
+    if len(found.data.fitted) == 1:
         return []
-    sizes = [standing.candidate.free[0] for standing in found.judgement.standings]
+    sizes = [each.candidate.free[0] for each in found.assessment.identified]
     known = [name for name in ("c_over_m", "w0", "Tr") if name in found.runs.coefficients]
 
     def apart(name: str) -> float:
@@ -102,21 +102,21 @@ def _together(found: Discrepancy, shown: str) -> tuple[float, float]:
 
     That of the effect found; of what is not claimed, by the standard error as the report widens it.
     """
-    trial = found.nearest.trial
-    estimate = trial.fit.estimates[shown]
-    for standing, effect in zip(found.judgement.standings, found.effects, strict=False):
-        bounds = effect.ci95.get(standing.candidate.size)
-        if standing.candidate.free[0] == shown and bounds is not None:
+    fitted = found.nearest.fitted
+    estimate = fitted.fit.estimates[shown]
+    for each, effect in zip(found.assessment.identified, found.effects, strict=False):
+        bounds = effect.ci95.get(each.candidate.size)
+        if each.candidate.free[0] == shown and bounds is not None:
             # A size below 0 may be stated as one above it, half a turn on.
-            turned = estimate.value * effect.parameters[standing.candidate.size] < 0
+            turned = estimate.value * effect.parameters[each.candidate.size] < 0
             return (-bounds[1], -bounds[0]) if turned else bounds
-    half = Z95 * math.sqrt(trial.widening) * (estimate.stderr or 0.0)
+    half = Z95 * math.sqrt(fitted.widening) * (estimate.stderr or 0.0)
     return estimate.value - half, estimate.value + half
 
 
 def _reach(found: Discrepancy, shown: str) -> tuple[float, float]:
     """Return the ends of the axis: a run that hardly shows the effect would hide the others."""
-    mean = found.nearest.trial.fit.estimates[shown].value
+    mean = found.nearest.fitted.fit.estimates[shown].value
     known = [(v, e) for v, e in found.runs.coefficients[shown] if math.isfinite(e)]
     errors = sorted(e for _, e in known)
     reach = 6 * errors[len(errors) // 2] if errors else 0.0
@@ -130,7 +130,7 @@ def draw_coefficients(axes: Axes, found: Discrepancy, shown: str) -> None:
     """Draw a parameter as each run would have it, over what all together have."""
     pairs = found.runs.coefficients[shown]
     known = [(k, v, e) for k, (v, e) in enumerate(pairs) if math.isfinite(e)]
-    mean = found.nearest.trial.fit.estimates[shown].value
+    mean = found.nearest.fitted.fit.estimates[shown].value
     power = 3 * math.floor(math.log10(abs(mean)) / 3) if mean else 0
     scale = 10.0**-power
     axes.axhspan(*(scale * end for end in _together(found, shown)), color=blocks.NOISE, lw=0)
@@ -145,7 +145,7 @@ def draw_coefficients(axes: Axes, found: Discrepancy, shown: str) -> None:
     )
     low, high = _reach(found, shown)
     axes.set_ylim(scale * low, scale * high)
-    name_runs(axes, [run.name for run in found.evidence.fitted])
+    name_runs(axes, [run.name for run in found.data.fitted])
     ends = axes.get_xaxis_transform()
     marks: dict[str, Any] = {"color": style.QUIET, "ls": "", "ms": 4.5, "transform": ends}
     up = [k for k, v, e in known if v + Z95 * e > high]

@@ -76,7 +76,7 @@ def models(found: Discrepancy) -> list[tuple[str, str]]:
 
 def draw_residuals(made: Figure, box: Box, found: Discrepancy) -> None:
     """Draw record less model of the runs that the baseline misses most, before and after."""
-    runs = found.evidence.fitted
+    runs = found.data.fitted
     rows = [row for row in found.gap.by_run if not row.held_out]
     order = sorted(range(len(runs)), key=lambda k: -rows[k].before / rows[k].noise_floor)[:RUNS]
     longest = max(float(runs[k].time[-1]) for k in order)
@@ -85,13 +85,13 @@ def draw_residuals(made: Figure, box: Box, found: Discrepancy) -> None:
         axes = cell.panel(made)
         run = runs[k]
         interval = float(np.median(np.diff(run.time)))
-        every = max(round(PART * math.tau / (found.base.trial.fit.model.w0 * interval)), 1)
+        every = max(round(PART * math.tau / (found.base.fitted.fit.model.w0 * interval)), 1)
         time = run.time[::every]
         floor = 1e3 * rows[k].noise_floor / math.sqrt(every)
         axes.axhspan(
             -2 * floor, 2 * floor, color=blocks.NOISE, lw=0, label="noise, 2 standard errors"
         )
-        fits = (found.base.trial.fit, found.best.trial.fit)
+        fits = (found.base.fitted.fit, found.best.fitted.fit)
         for (name, colour), fit in zip(models(found), fits, strict=False):
             residual = 1e3 * fit.residuals[k]
             if run.trusted is not None:

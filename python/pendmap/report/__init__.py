@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pendmap.report.diagnosis import diagnosis
-from pendmap.report.html import as_html
-from pendmap.report.markdown import as_markdown
+from pendmap.report.document import as_html, as_markdown
 
 __all__ = ["as_html", "as_markdown", "diagnosis"]

@@ -1,4 +1,4 @@
-"""Parts 1 to 4 of a diagnosis' report: the verdict, the gap, where it is, figure 7."""
+"""Verdict, gap, residual torque, and periods and peaks in the report of a diagnosis."""
 
 from __future__ import annotations
 
@@ -6,23 +6,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.comparison.data import counted, sigmas
 from pendmap.diagnosis.result import PLACES
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.report.document import Items, Name, Paragraph, Picture, Section, Strong, Table
+from pendmap.report.document import Name, Picture, Section, Strong, Table
 from pendmap.report.wording import chance, compared, joined, mrad, number, stated, values
 from pendmap.residuals.torque import STANDS_OUT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
     from pendmap.report.document import Block, Text
-
-    Floats = NDArray[np.float64]
-
 
 SAID: Final = {
     "none": "the model describes the records to within their noise.",
@@ -33,40 +29,41 @@ SAID: Final = {
     "unknown": "something is missing that no candidate explains. No name is claimed.",
 }
 
+PROBABILITY: Final = (
+    "The probability of a name is that it is right, given that the effect is in the library. "
+    "Blind experiments gave it: it is lower the more is left, the more effects it took and the "
+    "weaker the effect is beside the strongest."
+)
+
 RARE: Final = 1e-9
-"""Probabilities below this say no more than that."""
+"""Least probability that is given."""
+
+UNEVEN: Final = 1.5
+"""Ratio of the noise at high speed to that at low speed from which it is mentioned."""
+
+LIKE: Final = 1.3
+"""Root mean square over the noise up to which both look alike."""
+
+QUIET: Final = 20
+"""Percentage of the readings, those with the least noise, for which residuals are compared."""
 
 
 def verdict(found: Discrepancy) -> Section:
-    """Return the verdict with its probability, and what it rests on."""
-    blocks: list[Block] = [
-        Paragraph((Strong(found.verdict.capitalize()), ": ", SAID[found.verdict]))
-    ]
-    effects = tuple(
+    """Return the verdict with its probabilities and the statistics it is based on."""
+    blocks: list[Block] = [(Strong(found.verdict.capitalize()), ": ", SAID[found.verdict])]
+    effects: list[Text] = [
         (*values(effect), f"; probability {chance(effect.probability)}") for effect in found.effects
-    )
-    if effects:
-        blocks += [Items(effects), Paragraph(_meant(found))]
-    blocks += [
-        Paragraph(("Not told apart here: ", *joined(names), ".")) for names in found.equivalent
     ]
-    blocks += [Paragraph("It rests on this:"), Items(tuple(_rests(found)))]
+    shared = " Names that are not told apart share it." if found.verdict == "ambiguous" else ""
+    blocks += [effects, PROBABILITY + shared] if effects else []
+    blocks += [("Not told apart here: ", *joined(names), ".") for names in found.equivalent]
+    blocks += ["It rests on this:", list(_statistics(found))]
     return Section("Verdict", tuple(blocks))
 
 
-def _meant(found: Discrepancy) -> str:
-    """Return what the probability of a name says."""
-    said = (
-        "The probability of a name is that it is right, given that the effect is in the library. "
-        "Blind experiments gave it: it is lower the more is left, the more effects it took and the "
-        "weaker the effect is beside the strongest."
-    )
-    shared = " Names that are not told apart share it."
-    return said + shared if found.verdict == "ambiguous" else said
-
-
-def _rests(found: Discrepancy) -> Iterator[Text]:
-    judged = found.judgement
+def _statistics(found: Discrepancy) -> Iterator[Text]:
+    """Yield the statistics of the verdict."""
+    judged = found.assessment
     form = judged.form
     yield (
         f"Chi-squared over degrees of freedom is {number(judged.ratio, 4)}, where noise alone has "
@@ -81,26 +78,23 @@ def _rests(found: Discrepancy) -> Iterator[Text]:
         "runs": ("the parameters of the runs as far apart",),
         "effects": ("as much for an effect that is not in the model to explain", *further),
     }
-    if judged.standings:
+    if judged.identified:
         most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
         left["held_out"] = (f"{number(most, 3)} of chi-squared over degrees of freedom held out",)
+    rare = f"below {number(RARE, 1)}"
     for key, words in left.items():
-        chance_of = _rare(form.chances[key])
-        yield ("Noise alone would leave ", *words, f" with a probability {chance_of}.")
+        chance_of = form.chances[key]
+        said = f"of {number(chance_of, 2)}" if chance_of > RARE else rare
+        yield ("Noise alone would leave ", *words, f" with a probability {said}.")
     yield (
         f"The least of these {count} probabilities, times {count} because so many were looked at, "
-        f"is {number(form.chance, 2) if form.chance > RARE else f'below {number(RARE, 1)}'}. Below "
+        f"is {number(form.chance, 2) if form.chance > RARE else rare}. Below "
         f"{limits.rest:g} it counts as no chance: something is left."
     )
 
 
-def _rare(probability: float) -> str:
-    said = number(probability, 2) if probability > RARE else number(RARE, 1)
-    return f"of {said}" if probability > RARE else f"below {said}"
-
-
 def gap(found: Discrepancy) -> Iterator[Section]:
-    """Yield the gap before and after, and how forecasts lose their way."""
+    """Yield the gap before and after, and the error of forecasts."""
     own = found.gap
     floor = mrad(own.held_out_noise_floor)
     rows = [
@@ -116,47 +110,42 @@ def gap(found: Discrepancy) -> Iterator[Section]:
         )
         for run in own.by_run
     ]
-    names = joined(dict.fromkeys(run.name for run in found.evidence.held))
-    parts = "Held out: stretches of " if found.evidence.inside else "Held out: "
+    names = joined(dict.fromkeys(run.name for run in found.data.held))
+    parts = "Held out: stretches of " if found.data.inside else "Held out: "
     after = "; before is the baseline, after the model found" if found.adds else ""
     yield Section(
         "The gap",
         (
-            Paragraph(
-                (
-                    f"Root mean squares of record less model{after}. {parts}",
-                    *names,
-                    ". No parameter was fitted to that.",
-                )
+            (
+                f"Root mean squares of record less model{after}. {parts}",
+                *names,
+                ". No parameter was fitted to that.",
             ),
             compared(found, Table(("residual", "before", "after", "noise"), (*rows, *each))),
-            *worth(found),
+            *noise_of(found),
             Picture("gap", "Residual by run, and the error of forecasts against their horizon."),
             Picture("residuals", "Record less model where the baseline misses most."),
         ),
     )
     if found.forecasts:
-        yield Section(
-            "How far ahead the models see",
+        ahead = tuple(row for f in found.forecasts for row in _ahead(f))
+        blocks = (
             (
-                Paragraph(
-                    "From starts on held-out data each model runs forward without any further "
-                    "reading; its state at the start comes from the swing before. Root mean square "
-                    "errors:"
-                ),
-                compared(
-                    found,
-                    Table(
-                        ("runs", "ahead", "before", "after", "noise"),
-                        tuple(row for f in found.forecasts for row in _ahead(f)),
-                    ),
-                ),
-                *_chaotic(found),
+                "From starts on held-out data each model runs forward without any further reading; "
+                "its state at the start comes from the swing before. Root mean square errors:"
             ),
+            compared(found, Table(("runs", "ahead", "before", "after", "noise"), ahead)),
         )
+        chaotic = (
+            "A forced motion may be chaotic; then what the noise hides of the state grows in every "
+            "model."
+        )
+        forced = any(forecast.kind == "forced" for forecast in found.forecasts)
+        yield Section("How far ahead the models see", (*blocks, *([chaotic] if forced else ())))
 
 
 def _ahead(forecast: Forecast) -> Iterator[tuple[str, ...]]:
+    """Yield rows of the error at some horizons."""
     last = forecast.horizon.size - 1
     for k in dict.fromkeys((0, last // 4, last // 2, last)):
         yield (
@@ -168,41 +157,29 @@ def _ahead(forecast: Forecast) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _chaotic(found: Discrepancy) -> Iterator[Block]:
-    if any(forecast.kind == "forced" for forecast in found.forecasts):
-        yield Paragraph(
-            "A forced motion may be chaotic; then what the noise hides of the state grows in every "
-            "model."
-        )
-
-
 def where(found: Discrepancy) -> Iterator[Section]:
-    """Yield where torque is lacking, and the errors of periods and peaks."""
-    blocks: list[Block] = []
+    """Yield the bins where torque is lacking, and the errors of periods and peaks."""
     clearest: dict[str, dict[str, Any]] = {}
     for row in found.where:
         clearest.setdefault(row["over"], row)
+    blocks: tuple[Block, ...] = (
+        (
+            f"The torque that the baseline lacks stands out nowhere by more than {STANDS_OUT:g} "
+            "standard errors."
+        ),
+    )
     if clearest:
-        blocks += [
-            Paragraph(
-                "The torque per moment of inertia that the baseline lacks stands out most clearly:"
-            ),
-            Items(tuple(_place(row) for row in clearest.values())),
-            Paragraph(
+        blocks = (
+            "The torque per moment of inertia that the baseline lacks stands out most clearly:",
+            [_place(row) for row in clearest.values()],
+            (
                 "Each is fitted by itself, as if the torque went by that quantity alone, beyond "
                 "what damping, friction, frequency and initial states can take up. Where it really "
                 "goes by another, it may come out too large, and with either sign."
             ),
-        ]
-    else:
-        blocks.append(
-            Paragraph(
-                f"The torque that the baseline lacks stands out nowhere by more than "
-                f"{STANDS_OUT:g} standard errors."
-            )
         )
-    blocks.append(Picture("torque", "Torque that is lacking, with bands of 95 %."))
-    yield Section("Where the gap is", tuple(blocks))
+    picture = Picture("torque", "Torque that is lacking, with bands of 95 %.")
+    yield Section("Where the gap is", (*blocks, picture))
     rows: list[tuple[Text, ...]] = [
         (
             ("held out: " if one.held_out else "", Name(one.name)),
@@ -219,7 +196,7 @@ def where(found: Discrepancy) -> Iterator[Section]:
         yield Section(
             "Periods and peaks",
             (
-                Paragraph(
+                (
                     "Each model runs forward from the first measured peak, as in the paper's "
                     "figure 7. Root mean square errors:"
                 ),
@@ -238,80 +215,52 @@ def _place(row: dict[str, Any]) -> str:
     )
 
 
-# What the noise of a diagnosis' report is, and where root mean squares do not say all.
-
-
-UNEVEN: Final = 1.5
-"""Ratio of the noise at high speed to that at low speed from which on it is told."""
-
-LIKE: Final = 1.3
-"""Times the noise up to which a root mean square looks like it."""
-
-QUIET: Final = 20
-"""Percent of the readings that have the least noise."""
-
-
-def worth(found: Discrepancy) -> Iterator[Paragraph]:
-    """Yield which noise is meant, and why chi-squared may say more than root mean squares."""
-    residual, sigma = _weighed(found)
+def noise_of(found: Discrepancy) -> Iterator[Text]:
+    """Yield which noise is meant, and where chi-squared shows more than root mean squares."""
+    residuals, noise = [], []
+    for run, own in zip(found.data.fitted, found.best.fitted.fit.residuals, strict=False):
+        good = np.isfinite(own) & counted(run)
+        residuals.append(own[good])
+        noise.append(sigmas(run)[good])
+    residual, sigma = np.concatenate(residuals), np.concatenate(noise)
     low, high = (float(end) for end in np.percentile(sigma, (5, 95)))
     uneven = high > UNEVEN * low
     if uneven:
-        yield Paragraph(
+        yield (
             (
-                (
-                    "The noise is that of the readings used, each at its own speed: about "
-                    f"{mrad(low)} where they are slow and {mrad(high)} where they are fast. ("
-                ),
-                Name("pendmap look"),
-                " gives one number for a whole record.)",
-            )
+                "The noise is that of the readings used, each at its own speed: about "
+                f"{mrad(low)} where they are slow and {mrad(high)} where they are fast. ("
+            ),
+            Name("pendmap look"),
+            " gives one number for a whole record.)",
         )
-    yield from _means(found)
-    judged, gap = found.judgement, found.gap
+    yield from _block_means(found)
+    judged, gap = found.assessment, found.gap
     alike = gap.after < LIKE * gap.noise_floor
     if uneven and alike and found.adds and judged.ratio > judged.ratio_allowed:
         still = sigma <= np.percentile(sigma, QUIET)
-        yield Paragraph(
+        quiet, floor = (float(np.sqrt(np.mean(x[still] ** 2))) for x in (residual, sigma))
+        yield (
             "Root mean squares hang on the fast readings, which have the most noise; chi-squared "
             "takes each residual over the noise at its own speed. Thus chi-squared over degrees of "
             f"freedom is {number(judged.ratio)}, although the residual as a whole is as large as "
             f"the noise: in the fifth of the readings that have the least noise, the residual is "
-            f"{mrad(_rms(residual[still]))} and the noise {mrad(_rms(sigma[still]))}."
+            f"{mrad(quiet)} and the noise {mrad(floor)}."
         )
 
 
-def _means(found: Discrepancy) -> Iterator[Paragraph]:
-    """Yield that readings far denser than the motion were put together."""
-    evidence = found.evidence
-    for run, k in zip(evidence.fitted, evidence.fitted_of, strict=True):
-        size = evidence.runs[k].time.size
+def _block_means(found: Discrepancy) -> Iterator[Text]:
+    """Yield the runs whose dense readings were averaged."""
+    data = found.data
+    for run, k in zip(data.fitted, data.fitted_of, strict=True):
+        size = data.runs[k].time.size
         if run.time.size < size:
-            yield Paragraph(
+            yield (
+                f"The {size} readings of ",
+                Name(run.name),
                 (
-                    f"The {size} readings of ",
-                    Name(run.name),
-                    (
-                        f" are denser than the motion needs: {run.time.size} means of them were "
-                        "fitted, and the noise above is that of the means. A reading by itself has "
-                        f"{mrad(evidence.readings[k].sigma)}."
-                    ),
-                )
+                    f" are denser than the motion needs: {run.time.size} means of them were "
+                    "fitted, and the noise above is that of the means. A reading by itself has "
+                    f"{mrad(data.readings[k].sigma)}."
+                ),
             )
-
-
-def _weighed(found: Discrepancy) -> tuple[Floats, Floats]:
-    """Return residuals of the model that is given out, and their standard errors, rad."""
-    residuals, sigmas = [], []
-    for run, residual in zip(found.evidence.fitted, found.best.trial.fit.residuals, strict=False):
-        good = np.isfinite(residual)
-        if run.trusted is not None:
-            good &= run.trusted
-        sigma = np.broadcast_to(np.asarray(run.sigma, np.float64), residual.shape)
-        residuals.append(residual[good])
-        sigmas.append(sigma[good])
-    return np.concatenate(residuals), np.concatenate(sigmas)
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,4 +1,4 @@
-"""Words that several parts of a report share."""
+"""Numbers and phrases that several parts of a report share."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 Parts = tuple[str | Name | Strong, ...]
 
 SMALL, LARGE = -4, 6
-"""Powers of ten from which on, and below which, numbers are written out."""
+"""Powers of ten, from the first and below the second, of numbers without an exponent."""
 
 FAINT: Final = 1e-7
-"""Errors from which on they are written out."""
+"""Least standard error without an exponent."""
 
 RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number with so many digits; by a power of ten where it is very small or large."""
+    """Return a number with some digits; with an exponent where it is very small or large."""
     if not value or not math.isfinite(value):
         return f"{value:g}"
     power = _power(float(f"{value:.{digits - 1}e}"))
@@ -39,7 +39,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def within(value: float, width: float) -> str:
-    """Return a number with two digits of its uncertainty, by a power of ten where it is small."""
+    """Return a number to two digits of its uncertainty, with an exponent where it is small."""
     most = max(abs(value), abs(width))
     if not math.isfinite(most) or not 0 < most < 10.0**SMALL:
         return written(value, width)
@@ -48,7 +48,7 @@ def within(value: float, width: float) -> str:
 
 
 def stated(value: float, error: float) -> str:
-    """Return a number with its standard error to two digits, both by the same power of ten."""
+    """Return a number with its standard error to two digits, with one exponent."""
     if not (error and math.isfinite(error)):
         return number(value, 5)
     power = 0
@@ -68,7 +68,7 @@ def _times(power: int) -> str:
 
 
 def mrad(value: float) -> str:
-    """Return an angle that is small."""
+    """Return a small angle, rad, in mrad."""
     return f"{number(1e3 * value)} mrad"
 
 
@@ -78,7 +78,7 @@ def gained(value: float) -> str:
 
 
 def chance(probability: float) -> str:
-    """Return a probability, none of them certain."""
+    """Return a probability in percent, never certain."""
     if probability > 0.999:  # noqa: PLR2004 (as far as it is known)
         return "above 99.9 %"
     if probability < 0.001:  # noqa: PLR2004
@@ -87,12 +87,12 @@ def chance(probability: float) -> str:
 
 
 def share(part: float) -> str:
-    """Return a part of something."""
+    """Return a share in percent."""
     return f"{100 * part:.3g} %" if part > 0.99 else f"{100 * part:.0f} %"  # noqa: PLR2004
 
 
 def joined(names: Iterable[str], last: str = "and") -> Parts:
-    """Return names as a sentence has them."""
+    """Return names joined as in a sentence."""
     each = [Name(name) for name in names]
     parts: list[str | Name | Strong] = []
     for k, name in enumerate(each):
@@ -123,8 +123,8 @@ def values(effect: NamedEffect) -> Parts:
 def lead(found: Discrepancy) -> Parts:
     """Return a diagnosis in one sentence."""
     names = joined(effect.name for effect in found.effects)
-    nearest = found.nearest.trial.names
-    gap, closed = found.gap, found.judgement.closed
+    nearest = found.nearest.fitted.names
+    gap, closed = found.gap, found.assessment.closed
     to = f"from {mrad(gap.held_out_before)} to {mrad(gap.held_out_after)}"
     noise = f"the noise is {mrad(gap.held_out_noise_floor)}"
     if found.verdict == "none":
@@ -135,26 +135,15 @@ def lead(found: Discrepancy) -> Parts:
         )
     if found.verdict == "named":
         with_it = "With them" if len(found.effects) > 1 else "With it"
-        return (
-            Strong("The model lacks"),
-            " ",
-            *names,
-            f". {with_it} the residual on held-out data falls {to}; {noise}.",
-        )
+        end = f". {with_it} the residual on held-out data falls {to}; {noise}."
+        return (Strong("The model lacks"), " ", *names, end)
     if found.verdict == "ambiguous":
-        alike = [joined(each, "or") for each in found.equivalent]
-        classes: Parts = tuple(
-            part for k, each in enumerate(alike) for part in (*(("; ",) if k else ()), *each)
+        classes = [part for each in found.equivalent for part in ("; ", *joined(each, "or"))]
+        end = (
+            f". These records do not tell which. With the first, the residual on held-out data "
+            f"falls {to}; {noise}."
         )
-        return (
-            Strong("The model lacks one of a class"),
-            ": ",
-            *classes,
-            (
-                f". These records do not tell which. With the first, the residual on held-out data "
-                f"falls {to}; {noise}."
-            ),
-        )
+        return (Strong("The model lacks one of a class"), ": ", *classes[1:], end)
     if found.verdict == "partial":
         verb = "They close" if len(found.effects) > 1 else "It closes"
         end = (
@@ -162,21 +151,18 @@ def lead(found: Discrepancy) -> Parts:
             f"held-out data falls {to}; {noise}."
         )
         return (Strong("What the model lacks is nearly"), " ", *names, end)
-    near: Parts = ()
-    if nearest:
-        verb = "close" if len(nearest) > 1 else "closes"
-        part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
-        end = f", {verb} {part}; no name is claimed."
-        near = (" What comes nearest, ", *joined(nearest), end)
-    return (
-        Strong("Something is missing that no candidate explains"),
-        f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}.",
-        *near,
-    )
+    missing = Strong("Something is missing that no candidate explains")
+    end = f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}."
+    if not nearest:
+        return missing, end
+    verb = "close" if len(nearest) > 1 else "closes"
+    part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
+    near = f", {verb} {part}; no name is claimed."
+    return (missing, end, " What comes nearest, ", *joined(nearest), near)
 
 
 def compared(found: Discrepancy, table: Table) -> Table:
-    """Return a table without what stands under ``after`` where the model stays the baseline."""
+    """Return a table, without the columns ``after`` where the best model is the baseline."""
     if found.adds:
         return table
     kept = [k for k, name in enumerate(table.head) if not name.startswith(("after", "moved"))]
@@ -188,5 +174,5 @@ def compared(found: Discrepancy, table: Table) -> Table:
 
 
 def own_parameters(effects: Iterable[str]) -> set[str]:
-    """Return the parameters of a rig that say the same as one of these effects."""
+    """Return the parameters of a rig that are equivalent to one of these effects."""
     return {own for effect in effects if (own := own_name(effect)) is not None}

@@ -1,5 +1,5 @@
-"""The residuals of a fit: their spectra, and the noise in them with its colour."""
+"""Residuals of a fit: their noise with its colour, the torque that they lack, and its times."""
 
-from pendmap.residuals.noise import Remainder, remainder_of
+from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
-__all__ = ["Remainder", "remainder_of"]
+__all__ = ["ResidualNoise", "estimate_noise"]

@@ -1,4 +1,4 @@
-"""Whether all runs would have the same parameters, and what each of them would have."""
+"""Parameters run by run, and whether they differ between runs by more than noise."""
 
 from __future__ import annotations
 
@@ -17,36 +17,34 @@ if TYPE_CHECKING:
 
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
-    from pendmap.residuals.noise import Remainder
+    from pendmap.residuals.noise import ResidualNoise
 
 CHANCE: Final = 1e-3
-"""Probability that noise alone makes a parameter differ between runs, below which it differs."""
+"""Probability by noise alone below which a parameter differs between runs."""
 
 BLIND: Final = 1e-9
-"""A direction with this part of a run's greatest information is not seen in it."""
+"""Information, over the greatest of a run, below which a direction is not determined."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RunByRun:
     """Parameters run by run."""
 
-    # For each parameter its value in each run with its standard error (SI), the others kept as all
-    # runs together have them; an infinite error where the run does not show it.
+    # Value and standard error (SI) of each parameter in each run, the others fixed at the values of
+    # all runs; an infinite error where the run does not determine it.
     coefficients: dict[str, list[tuple[float, float]]]
-    # Cochran's Q over all parameters together, less its degrees of freedom, over its standard
-    # deviation: what the sum of squares would gain if each run had parameters of its own.
-    uneven: float
-    chance: float  # That noise alone makes it so great
+    uneven: float  # Cochran's Q of all parameters less its degrees of freedom, over its deviation
+    chance: float  # Probability that noise alone gives that Q
 
     def shown(self, name: str) -> list[tuple[float, float]]:
-        """Return values and standard errors of a parameter in the runs that show it, SI."""
+        """Return values and standard errors of a parameter in the runs that determine it, SI."""
         return [(v, e) for v, e in self.coefficients.get(name, []) if math.isfinite(e) and e > 0]
 
     def between(self, name: str) -> float:
         """Return the standard deviation of a parameter between the runs beyond its errors, SI.
 
-        That of DerSimonian & Laird (1986), Controlled Clinical Trials 7, 177; 0 where fewer than
-        two runs show the parameter, or chance makes it differ as much (Cochran's Q).
+        By DerSimonian & Laird (1986), Controlled Clinical Trials 7, 177; 0 where fewer than two
+        runs determine it, or noise alone explains the difference (Cochran's Q).
         """
         from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
 
@@ -63,15 +61,10 @@ class RunByRun:
         return math.sqrt(max(q - (len(shown) - 1), 0.0) / scale)
 
 
-def run_by_run(
-    runs: Sequence[FitRun], fit: TrajectoryFit, noise: Remainder, level: float
+def parameters_by_run(
+    runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualNoise, level: float
 ) -> RunByRun:
-    """Return what each run would have, to first order from the fit of all.
-
-    References
-    ----------
-    Cochran (1954), Biometrics 10, 101.
-    """
+    """Return the parameters of each run, to first order (Cochran 1954, Biometrics 10, 101)."""
     found = sensitivities(fit, runs, (), fit.model)
     sizes = np.linalg.norm(found.columns, axis=0)
     columns = found.columns / np.where(sizes > 0, sizes, 1.0)
@@ -83,13 +76,14 @@ def run_by_run(
         q += float(pull @ np.linalg.pinv(information, rcond=BLIND, hermitian=True) @ pull)
         degrees += _rank(information)
         for place, name in enumerate(found.names):
-            seen = float(information[place, place])
+            own_information = float(information[place, place])
             value = fit.estimates[name].value
-            if seen <= BLIND:
+            if own_information <= BLIND:
                 wanted[name].append((value, math.inf))
                 continue
-            step = float(pull[place]) / seen / sizes[place]
-            wanted[name].append((value + step, math.sqrt(level / seen) / sizes[place]))
+            step = float(pull[place]) / own_information / sizes[place]
+            error = math.sqrt(level / own_information) / sizes[place]
+            wanted[name].append((value + step, error))
     degrees = max(degrees, 0)
     uneven = (q / noise.level - degrees) / math.sqrt(2 * degrees) if degrees else 0.0
     return RunByRun(wanted, uneven, noise.chance_of(q, degrees))

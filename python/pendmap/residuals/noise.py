@@ -1,22 +1,40 @@
-"""The noise of residuals, with its colour, and what is in them besides.
+"""Noise of residuals: its spectrum, the laws of its colour, and what exceeds it.
 
-A pendulum's model errs slowly: what it lacks shows at the frequencies of the swing, of its few
-lowest harmonics and below. Noise stands above them too, so that the spectrum there says how strong
-it is where errors of the model cannot be told from it: as strong if it is white, stronger where it
-is correlated from sample to sample. The laws that the upper part of the spectrum allows
-(:mod:`pendmap.residuals.colour`) are continued downward, each with its probability.
+Errors of a pendulum's model show at the frequency of the swing, at its lowest harmonics and below.
+Above these the spectrum shows noise alone. Its law is continued to low frequencies, where noise
+correlated from sample to sample is stronger. Spectra are cosine transforms window by window, which
+need no period, summed in bins that are narrow against the colour of any noise.
+
+Correlated noise is a process of first order, AR(1), with the correlation ``rho``, plus white noise,
+as rounding makes it. The spectral density at the phase ``w`` from sample to sample is
+
+``S(w) = scale (c (1 - rho^2) / (1 + rho^2 - 2 rho cos w) + 1 - c)``,
+
+with the coloured share ``c`` of the variance ``scale``. The white part over the least density of
+the coloured part is
+
+``phi = (1 - c) / c (1 + |rho|) / (1 - |rho|)``.
+
+By Whittle's likelihood a squared amplitude ``P`` adds ``log S + P / S`` to the deviance. High
+frequencies alone determine ``rho`` and ``phi`` only together, so no law is chosen: each has its
+posterior probability, with a prior uniform in ``log phi`` and in ``arctanh rho``, a quarter of the
+logarithm of the ratio of the coloured densities at the lowest and the highest frequency. Rounding
+to counts of ``q`` has the variance ``q^2 / 12``: no law has less white noise, and laws with just
+that are more probable, since other white noise is rare.
+
+References
+----------
+Whittle (1953), Arkiv foer Matematik 2, 423.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-
-from pendmap.residuals.colour import Laws, laws_of
-from pendmap.residuals.spectrum import spectra_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,71 +46,75 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FOR_SURE: Final = 1e9
-"""So many amplitudes tell a level for sure."""
+CERTAIN: Final = 1e9
+"""Number of amplitudes that stands for a known noise level."""
 
 ARITHMETIC: Final = 1e-4
-"""Mean square of residuals, over the readings' standard errors, below which they are not looked
-into: of records without noise fits leave less, and it has a shape."""
+"""Mean squared residual, in standard errors squared, below which residuals are rounding errors."""
+
+BINS: Final = 256
+"""Bins of frequency from 0 to half the sampling rate."""
+
+PHASES: Final = np.pi * (np.arange(BINS) + 0.5) / BINS
+"""Phase from sample to sample, rad, at the middle of each bin."""
+
+HARMONICS: Final = 4.0
+"""Frequency up to which errors of a model show, over that of swing or rotation."""
+
+GAP: Final = 1.5
+"""Frequency from which noise is read, over the frequency up to which errors of a model show."""
+
+WIDEST: Final = 0.4
+"""Greatest part of all frequencies that counts as slow."""
+
+STATES: Final = 2
+"""Fitted numbers of each window: angle and velocity at its start."""
+
+LEAST: Final = 8
+"""Fewest samples of a window with a spectrum."""
+
+COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 101))
+"""Correlations ``rho`` of the laws."""
+
+FLOORS: Final = np.concatenate([[0.0], np.geomspace(0.03, 50.0, 35)])
+"""Ratios ``phi`` of the laws."""
+
+RARE: Final = 0.0025
+"""Prior odds of all coloured laws together against white noise."""
+
+FAINT: Final = 1e-6
+"""Probability of a law, over that of the most probable one, below which it is left out."""
+
+COUNTED: Final = 10.0
+"""Prior odds of a white part of rounding alone against any other."""
+
+OWN: Final = 50
+"""Fewest amplitudes from which the noise of one run is read by itself."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Remainder:
-    """What residuals hold, in units of the readings' standard errors.
+class ResidualNoise:
+    """Noise of residuals, and what exceeds it, in units of the readings' standard errors."""
 
-    Parameters
-    ----------
-    level : float
-        Spectral density of the noise where the motion is; 1 for white noise of the stated size.
-        Sums of squares that a slow effect gains count as so much less.
-    colour : float
-        Correlation of the noise from sample to sample, the mean over all laws that it may have.
-    excess : float
-        What is left in the slow part beyond noise: the sum of squares, over the noise's density,
-        that a model without error would gain.
-    stderr : float
-        Its standard error from the noise alone, and from what is not known of its law.
-    by_run : tuple of float
-        The same for each run, over its own standard error.
-    chance : float
-        That noise alone leaves so much, in all runs together or in any of them: Fisher's F of the
-        slow part over the rest, times how often was looked (Bonferroni); the mean over all laws of
-        the noise.
-    laws : ndarray of float, shape (2, laws)
-        Levels of the laws that the noise may have, and the probability of each.
-    amplitudes : float
-        How many independent amplitudes a level was read from.
-    independent : float
-        Independent readings among the residuals: of squared amplitudes ``P`` of their spectrum
-        ``3 (sum P)^2 / sum P^2``, their number for white noise, a few for residuals that oscillate.
-    """
-
-    level: float
-    colour: float
-    excess: float
-    stderr: float
-    by_run: tuple[float, ...]
+    level: float  # Spectral density of the noise where the motion is; 1 for white stated noise
+    colour: float  # Correlation from sample to sample, mean over all laws
+    excess: float  # Sum of squares of the slow part beyond noise, over the noise's density
+    stderr: float  # Standard error of the excess, from the noise and its unknown law
+    by_run: tuple[float, ...]  # Excess of each run over its standard error
+    # Probability that noise alone leaves the slow part of all runs or of any one: Fisher's F of the
+    # slow part over the rest, with Bonferroni's factor, mean over all laws.
     chance: float
-    laws: Floats = dataclasses.field(repr=False)
-    amplitudes: float = dataclasses.field(repr=False)
+    laws: Floats = dataclasses.field(repr=False)  # Level and probability of each law, (2, laws)
+    amplitudes: float = dataclasses.field(repr=False)  # Independent amplitudes of a level
+    # ``3 (sum P)^2 / sum P^2`` of squared amplitudes ``P``: the number of independent readings for
+    # white noise, a few for residuals that oscillate.
     independent: float
 
     def chance_of(self, gain: float, count: int, least: float = 0.0) -> float:
-        """Return the chance that noise alone makes a sum of squares fall by so much.
+        """Return the probability that noise alone gains as much with ``count`` parameters.
 
-        Parameters
-        ----------
-        gain : float
-            By how much, in units of the readings' standard errors squared.
-        count : int
-            How many numbers were adapted for it.
-        least : float
-            Levels below it count as this one.
-
-        Returns
-        -------
-        float
-            By Fisher's F, the mean over all laws of the noise; 1 where nothing was adapted.
+        By Fisher's F, mean over all laws; levels below ``least`` count as ``least``; 1 without
+        parameters. The gain is a fall of the sum of squares, in standard errors squared.
         """
         from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
 
@@ -107,34 +129,28 @@ class Remainder:
         return self.excess / self.stderr if self.stderr > 0 else 0.0
 
 
-def remainder_of(
+def estimate_noise(
     fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int, floors: Sequence[float]
-) -> Remainder:
-    """Return what a fit leaves."""
-    spectra = spectra_of(fit, runs)
+) -> ResidualNoise:
+    """Return the noise of a fit's residuals, given the number of its parameters.
+
+    ``floors`` is the share of rounding in the variance of each run's noise.
+    """
+    spectra = residual_spectra(fit, runs)
     if not spectra.quick_sizes.any() or spectra.mean < ARITHMETIC:
-        return Remainder(
-            1.0,
-            0.0,
-            0.0,
-            0.0,
-            (0.0,) * len(runs),
-            1.0,
-            np.ones((2, 1)),
-            FOR_SURE,
-            spectra.independent,
-        )
-    laws = laws_of(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
+        none, known = (0.0,) * len(runs), np.ones((2, 1))
+        return ResidualNoise(1.0, 0.0, 0.0, 0.0, none, 1.0, known, CERTAIN, spectra.independent)
+    laws = noise_laws(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
     sizes = spectra.slow_sizes.sum(axis=1)
     degrees = sizes - spectra.states - adapted * sizes / sizes.sum()
-    # Of each law and run: the slow part over what is expected of noise.
+    # Of each law and run: the slow part over its expectation from noise.
     left = ((1 / laws.shapes) @ spectra.slow.T) / laws.scales
-    laws = _tenable(laws, left, degrees, sizes)
-    excess, stderr, chance = _beyond(left, degrees, sizes, laws)
+    laws = _posterior(laws, left, degrees, sizes)
+    excess, stderr, chance = _excess(left, degrees, sizes, laws)
     by_run, chances = [], [chance]
     for k in range(len(runs)):
         own = slice(k, k + 1)
-        above, error, chance = _beyond(
+        above, error, chance = _excess(
             left[:, own], degrees[own], sizes[own], dataclasses.replace(laws, sizes=laws.sizes[own])
         )
         by_run.append(above / error if error > 0 else 0.0)
@@ -142,9 +158,9 @@ def remainder_of(
     chance = min(min(chances) * len(chances), 1.0)
     # The noise's density where the motion is.
     levels = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1) / spectra.motion.sum()
-    return Remainder(
+    return ResidualNoise(
         float(laws.weights @ levels),
-        laws.correlation,
+        float(laws.weights @ (laws.colours * laws.shares)),
         excess,
         stderr,
         tuple(by_run),
@@ -155,12 +171,11 @@ def remainder_of(
     )
 
 
-def _tenable(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws:
-    """Return the laws with what the slow part says of them.
+def _posterior(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws:
+    """Return the laws weighted with the likelihood of the slow part.
 
-    What a model lacks only adds to noise. So a law is as much less likely as it is improbable that
-    noise leaves so little, the likelihood where any sum may have been added; or as it is that noise
-    leaves just as much, where the model lacks nothing. Both are equally likely beforehand.
+    Errors of a model only add to noise. With equal odds, the model errs and the likelihood is the
+    probability that noise leaves less, or it does not and the likelihood is the density.
     """
     from scipy.special import fdtr  # noqa: PLC0415 (where it is needed)
     from scipy.stats import f  # noqa: PLC0415
@@ -169,21 +184,21 @@ def _tenable(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws:
     if laws.weights.size == 1 or free <= 0:
         return laws
     mean = left.sum(axis=1) / free
-    others = _others(laws, sizes)
+    others = _denominator_degrees(laws, sizes)
     weights = laws.weights * (fdtr(free, others, mean) + mean * f.pdf(mean, free, others))
-    # All are too great where parameters took up noise: the quick part alone has the say then.
+    # All laws exceed the slow part where parameters took up noise: then only the quick part counts.
     if not weights.sum() > 0:
         return laws
     return dataclasses.replace(laws, weights=weights / weights.sum())
 
 
-def _others(laws: Laws, sizes: Floats) -> float:
-    """Return the degrees of freedom of what slow parts are divided by (Satterthwaite's)."""
+def _denominator_degrees(laws: Laws, sizes: Floats) -> float:
+    """Return the degrees of freedom of the noise level of slow parts (Satterthwaite)."""
     return float(sizes.sum() ** 2 / np.sum(sizes**2 / laws.sizes))
 
 
-def _beyond(left: Floats, degrees: Floats, sizes: Floats, laws: Laws) -> tuple[float, float, float]:
-    """Return what runs leave beyond noise, its standard error, and the chance of so much."""
+def _excess(left: Floats, degrees: Floats, sizes: Floats, laws: Laws) -> tuple[float, float, float]:
+    """Return the excess of runs over noise, its standard error, and the probability by chance."""
     from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
 
     number, free = float(sizes.sum()), float(degrees.sum())
@@ -193,5 +208,146 @@ def _beyond(left: Floats, degrees: Floats, sizes: Floats, laws: Laws) -> tuple[f
     mean = float(laws.weights @ total)
     scatter = 2 * number + 2 * float(np.sum(sizes**2 / laws.sizes))
     stderr = math.sqrt(scatter + float(laws.weights @ (total - mean) ** 2))
-    chances = fdtrc(free, _others(laws, sizes), total / free)
+    chances = fdtrc(free, _denominator_degrees(laws, sizes), total / free)
     return mean - free, stderr, float(laws.weights @ chances)
+
+
+@dataclasses.dataclass(frozen=True)
+class Spectra:
+    """Squared amplitudes of residuals by run and bin, in standard errors squared."""
+
+    slow: Floats  # Sum in each bin where errors of a model show, shape (runs, BINS)
+    quick: Floats  # Sum in each bin where noise is alone, shape (runs, BINS)
+    slow_sizes: Floats  # Number of slow amplitudes, shape (runs, BINS)
+    quick_sizes: Floats  # Number of quick amplitudes, shape (runs, BINS)
+    # Share of each bin in the slow part of the velocity, times samples: where parameters act.
+    motion: Floats
+    states: Floats  # Number of fitted initial states, shape (runs,)
+    independent: float  # As in ResidualNoise
+
+    @property
+    def mean(self) -> float:
+        """Mean squared amplitude."""
+        sizes = self.slow_sizes.sum() + self.quick_sizes.sum()
+        return float((self.slow.sum() + self.quick.sum()) / sizes)
+
+
+def residual_spectra(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:
+    """Return the spectra of a fit's residuals."""
+    from scipy.fft import dct  # noqa: PLC0415 (where it is needed)
+
+    slow, quick, slow_sizes, quick_sizes, motion = np.zeros((5, len(runs), BINS))
+    states = np.zeros(len(runs))
+    total, fourth = 0.0, 0.0
+    for run, first, last, *_ in fit.windows:
+        record = runs[run]
+        residual = fit.white[run][first:last]
+        good = np.isfinite(residual)
+        if record.trusted is not None:
+            good &= record.trusted[first:last]
+        if np.count_nonzero(good) < LEAST:
+            continue
+        time = record.time[first:last][good]
+        velocity = fit.curves[run][1][first:last][good]
+        # The angle of a rotation is a ramp, its velocity is not.
+        rows = np.stack([residual[good], velocity - velocity.mean()])
+        power, moved = np.asarray(dct(rows, type=2, norm="ortho"), np.float64) ** 2
+        total, fourth = total + float(power.sum()), fourth + float(power @ power)
+        swing = max(
+            fit["w0"] if "w0" in fit.estimates else fit.model.w0,
+            float(np.quantile(np.abs(velocity), 0.9)),
+        )
+        edge = min(HARMONICS * swing * float(np.median(np.diff(time))), WIDEST * np.pi)
+        phase = np.pi * np.arange(time.size) / time.size
+        place = np.minimum((phase / np.pi * BINS).astype(int), BINS - 1)
+        below, above = phase <= edge, phase >= GAP * edge
+        for chosen, sums, sizes in ((below, slow, slow_sizes), (above, quick, quick_sizes)):
+            sums[run] += np.bincount(place[chosen], power[chosen], BINS)
+            sizes[run] += np.bincount(place[chosen], minlength=BINS)
+        moved = moved[below] if moved[below].any() else np.ones(np.count_nonzero(below))
+        motion[run] += np.bincount(place[below], time.size * moved / moved.sum(), BINS)
+        states[run] += STATES
+    independent = 3 * total**2 / fourth if fourth > 0 else 1.0
+    return Spectra(slow, quick, slow_sizes, quick_sizes, motion, states, independent)
+
+
+@dataclasses.dataclass(frozen=True)
+class Laws:
+    """Laws of noise that a spectrum allows."""
+
+    weights: Floats  # Probability of each, shape (laws,)
+    colours: Floats  # ``rho``; 0 of white noise, shape (laws,)
+    shares: Floats  # ``c``; 1 of white noise, shape (laws,)
+    shapes: Floats  # Spectral density over the variance, shape (laws, BINS)
+    scales: Floats  # Variance in each run, in standard errors squared, shape (laws, runs)
+    sizes: Floats  # Number of amplitudes of each scale, shape (runs,)
+
+
+def noise_laws(power: Floats, sizes: Floats, floors: Floats) -> Laws:
+    """Return the laws that spectra of noise allow.
+
+    ``power`` and ``sizes``, shape (runs, BINS), are the sum and the number of squared amplitudes in
+    each bin; ``floors``, shape (runs,), the variance of rounding in standard errors squared.
+    """
+    grid = _law_grid()
+    total, number = sizes.sum(), sizes.sum(axis=1)
+    own = number >= OWN
+    sums = grid.inverse @ power.T
+    together = sums.sum(axis=1) / total
+    scales = np.where(own, sums / np.where(own, number, 1.0), together[:, None])
+    scales = np.maximum(scales, np.finfo(float).tiny)
+    deviance = grid.logarithms @ sizes.sum(axis=0) + np.log(scales) @ number
+    deviance += (sums / scales).sum(axis=1)
+    prior = _prior(grid, float(floors @ number) / (scales @ number))
+    deviance[prior == 0] = np.inf
+    weights = prior * np.exp(-0.5 * (deviance - deviance.min()))
+    weights /= weights.sum()
+    keep = weights > FAINT * weights.max()
+    weights, scales = weights[keep], scales[keep]
+    rho, share, shape = (values[keep] for values in (grid.colours, grid.shares, grid.shapes))
+    return Laws(weights, rho, share, shape, scales, np.where(own, number, total))
+
+
+@dataclasses.dataclass(frozen=True)
+class _LawGrid:
+    """All laws, white noise first."""
+
+    colours: Floats
+    floors: Floats
+    shares: Floats
+    shapes: Floats  # Spectral density over the variance
+    inverse: Floats  # One over the shapes
+    logarithms: Floats  # Of the shapes
+
+
+@functools.cache
+def _law_grid() -> _LawGrid:
+    rho, floor = (v.ravel() for v in np.meshgrid(COLOURS, FLOORS, indexing="ij"))
+    share = 1 / (1 + floor * _least_density(rho))
+    rho, floor, share = (
+        np.concatenate([[white], values])
+        for white, values in ((0.0, rho), (0.0, floor), (1.0, share))
+    )
+    r, c = rho[:, None], share[:, None]
+    shapes = c * (1 - r**2) / (1 + r**2 - 2 * r * np.cos(PHASES)) + 1 - c
+    return _LawGrid(rho, floor, share, shapes, 1 / shapes, np.log(shapes))
+
+
+def _least_density(rho: Floats) -> Floats:
+    """Return the least spectral density of a process of first order over its variance."""
+    return np.asarray((1 - np.abs(rho)) / (1 + np.abs(rho)), np.float64)
+
+
+def _prior(grid: _LawGrid, rounding: Floats) -> Floats:
+    """Return the prior probability of laws, given the share of rounding in each variance."""
+    ratio = rounding / (grid.shares * _least_density(grid.colours))
+    # Steps from the floor of rounding up to that of the law.
+    steps = np.arange(FLOORS.size)
+    place = np.interp(np.log(np.maximum(ratio, FLOORS[1])), np.log(FLOORS[1:]), steps[1:])
+    place = np.minimum(place, ratio / FLOORS[1])
+    above = np.searchsorted(FLOORS, grid.floors) - place
+    rounded = COUNTED * FLOORS.size * np.maximum(1 - np.abs(above), 0)
+    prior = np.where(above > -1, 1 + rounded, 0.0)
+    prior[1:] *= RARE / prior[1:].sum()
+    prior[0] = 1.0
+    return np.asarray(prior, np.float64)

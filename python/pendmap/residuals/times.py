@@ -1,11 +1,10 @@
-"""Frequencies and instants at which residuals ask for a torque.
+"""Frequencies and instants at which residuals show a torque.
 
 A torque ``f`` at time ``s`` moves the angle at ``t`` by ``(a(s) b(t) - b(s) a(t))/W(s)`` times
-``f ds``, where ``a`` and ``b`` are the derivatives of the angle by the initial angle and velocity,
-and ``W`` is their Wronskian, ``exp(-c t/m)`` with viscous damping alone. So the products of the
-residuals with what a torque at each time would do, for all times, cost two cumulative sums; a
-torque that repeats has those of their Fourier transform. They are divided by what noise makes of
-them.
+``f ds``, with the derivatives ``a`` and ``b`` of the angle by the initial angle and velocity, and
+their Wronskian ``W``, ``exp(-c t/m)`` with viscous damping alone. Products of the residuals with
+the response to a torque at each time thus need two cumulative sums, and those with a periodic
+torque their Fourier transform. They are divided by their variance from noise.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -27,40 +26,108 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 KEPT: Final = 4
-"""Frequencies, or instants, that are kept."""
+"""Number of frequencies, or instants, that are kept; fewest readings of a window."""
 
 FINE: Final = 4
-"""Frequencies looked at in one over the time that the records span."""
+"""Frequencies tried within one over the duration of the records."""
 
 MOST: Final = 1 << 18
-"""Frequencies looked at, however long the records span."""
+"""Most frequencies tried."""
 
 GROWTH: Final = 30.0
-"""Growth of a change of the start, over the least of all windows, up to which a window is calm."""
+"""Growth of a change of the start, over the least of all windows, up to which motion is calm."""
 
 LOOKED_AT: Final = 4
-"""The best ``LOOKED_AT * KEPT`` frequencies get an exact gain, without draws of noise."""
+"""Frequencies whose exact gain is computed, over the number kept."""
 
 DRAWS: Final = 32
-"""Draws of noise that say what it makes of the products at each frequency."""
+"""Draws of noise from which the variance of the products is estimated."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Response:
+    """Response of the readings of a window to torques, by the formula at the head of the module."""
+
+    time: Floats  # In the laboratory, s
+    cosine: Floats  # Of the angle
+    residual: Floats  # Over the standard errors, orthogonal to the basis
+    states: Floats  # Derivatives by the initial angle and velocity, over the standard errors
+    weight: Floats  # One over the standard errors
+    wronskian: Floats
+    basis: Floats  # Orthonormal basis of what the initial state does
+
+    @property
+    def _kernel(self) -> Floats:
+        """The factors ``-b/W`` and ``a/W`` of later ``a`` and ``b``."""
+        a, b = (self.states / self.weight[:, None]).T
+        return np.stack([-b, a], axis=1) / self.wronskian[:, None]
+
+    def pull(self, residual: Floats) -> Floats:
+        """Return the product of residuals with the response to a torque at each time."""
+        later = _later(self.states * residual[:, None])
+        return np.asarray(np.einsum("nk,nk->n", self._kernel, later), np.float64)
+
+    def answer(self, impulse: NDArray[np.complex128]) -> Floats:
+        """Return responses to real and imaginary part of impulses, with the start fitted."""
+        parts = np.stack([impulse.real, impulse.imag], axis=1)
+        sums = np.cumsum(self._kernel[:, :, None] * parts[:, None, :], axis=0)
+        columns = np.einsum("nk,nkp->np", self.states, sums)
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns), np.float64)
+
+    def information(self) -> Floats:
+        """Return the squared norm of the response to a torque at each time, the start fitted."""
+        gram = _later(np.einsum("nj,nk->njk", self.states, self.states))
+        whole = np.linalg.pinv(self.states.T @ self.states, hermitian=True)
+        free = gram - gram @ whole @ gram
+        left = np.einsum("nj,njk,nk->n", self._kernel, free, self._kernel)
+        return np.asarray(left, np.float64)
+
+    def noise(self, rng: np.random.Generator) -> Floats:
+        """Return residuals of noise alone."""
+        drawn = rng.standard_normal(self.residual.size)
+        return np.asarray(drawn - self.basis @ (self.basis.T @ drawn), np.float64)
+
+
+def _later(values: Floats) -> Floats:
+    """Return the sums over all later samples."""
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1] - values, np.float64)
 
 
 def calm_responses(
     runs: Sequence[FitRun], windows: Sequence[WindowSlopes], damping: float
 ) -> list[Response]:
-    """Return what torques do in the windows in which motions do not part.
+    """Return the responses of windows in which a change of the start grows little.
 
-    What a torque does where a change of the start grows far more than in other windows is great,
-    and to first order wrong. ``damping`` is ``c/m``, 1/s.
+    In others the response is large, and wrong to first order. ``damping`` is ``c/m``, 1/s.
     """
-    every = list(_responses(runs, windows, damping))
+    every = []
+    for window in windows:
+        run = runs[window.run]
+        kept = np.flatnonzero(window.weight > 0)
+        if kept.size < KEPT:
+            continue
+        time = run.time[window.first + kept]
+        states, weight = window.states[kept], window.weight[kept]
+        basis, _ = np.linalg.qr(states)
+        residual = window.residual[kept]
+        every.append(
+            Response(
+                run.lab_time_s + time,
+                np.cos(run.theta[window.first + kept]),
+                residual - basis @ (basis.T @ residual),
+                states,
+                weight,
+                np.exp(damping * (time[0] - time)),
+                basis,
+            )
+        )
     growth = [float(np.abs(own.states / own.weight[:, None]).max()) for own in every]
     least = GROWTH * min(growth, default=0.0)
     return [own for own, by in zip(every, growth, strict=True) if by <= least]
 
 
 def instants(responses: Sequence[Response]) -> list[float]:
-    """Return the times in the laboratory, s, of the knocks that would gain most."""
+    """Return the times in the laboratory, s, of the impulses with the greatest gains."""
     time, gain = [], []
     for own in responses:
         pull, information = own.pull(own.residual), own.information()
@@ -72,11 +139,11 @@ def instants(responses: Sequence[Response]) -> list[float]:
 
 
 def frequencies(responses: Sequence[Response], most: float) -> list[float]:
-    """Return the frequencies up to ``most``, rad/s, of the sways that would gain most.
+    """Return the frequencies up to ``most``, rad/s, of the sways with the greatest gains.
 
-    Each window has its products ``P`` with ``exp(i w t)`` in its own time, and what noise makes of
-    them, ``E |P|^2`` and ``E P^2``; all three turn with the window's place in the laboratory's time
-    and add up.
+    Each window has its products ``P`` with ``exp(i w t)`` in its own time, and their moments from
+    noise, ``E |P|^2`` and ``E P^2``; all three turn with the window's start in the laboratory and
+    add up.
     """
     first = min(own.time[0] for own in responses)
     span = max(own.time[-1] for own in responses) - first
@@ -86,7 +153,7 @@ def frequencies(responses: Sequence[Response], most: float) -> list[float]:
     coarse = 2 * np.pi * np.fft.rfftfreq(size, spacing)
     count = min(int(FINE * most * span / (2 * np.pi)), MOST)
     omega = most * np.arange(1, count + 1) / max(count, 1)
-    # A frequency of less than one in the records is a constant torque or a drift.
+    # Less than one period in the records is a constant torque or a drift.
     omega = omega[omega >= 2 * np.pi / span]
     if omega.size < 3:  # noqa: PLR2004 (no peak)
         return []
@@ -102,19 +169,19 @@ def frequencies(responses: Sequence[Response], most: float) -> list[float]:
         pull += turn * np.interp(omega, coarse, products[0])
         square += turn**2 * np.interp(omega, coarse, np.mean(products[1:] ** 2, axis=0))
         both += np.interp(omega, coarse, np.mean(np.abs(products[1:]) ** 2, axis=0))
-    # Motions that part from each other make squares beyond all numbers.
+    # Squares of chaotic motions may overflow.
     unit = max(float(both.real.max()), 1e-300)
     pull, square, both = pull / math.sqrt(unit), square / unit, both / unit
     score = both.real * np.abs(pull) ** 2 - (square.conj() * pull**2).real
     score /= np.maximum(both.real**2 - np.abs(square) ** 2, 1e-300)
     peaks = np.flatnonzero((score[1:-1] > score[:-2]) & (score[1:-1] >= score[2:])) + 1
     peaks = peaks[np.argsort(-score[peaks])][: LOOKED_AT * KEPT]
-    gains = [_gain(responses, float(value)) for value in omega[peaks]]
+    gains = [_exact_gain(responses, float(value)) for value in omega[peaks]]
     return _greatest(omega[peaks], np.array(gains), np.pi / longest)
 
 
-def _gain(responses: Sequence[Response], omega: float) -> float:
-    """Return the gain of a sway of one frequency, draws of noise aside."""
+def _exact_gain(responses: Sequence[Response], omega: float) -> float:
+    """Return the gain of a sway of one frequency, without draws of noise."""
     pull, information = np.zeros(2), np.zeros((2, 2))
     for own in responses:
         columns = own.answer(np.exp(1j * omega * own.time) * own.cosine * np.gradient(own.time))
@@ -124,84 +191,9 @@ def _gain(responses: Sequence[Response], omega: float) -> float:
 
 
 def _greatest(values: Floats, gains: Floats, apart: float) -> list[float]:
-    """Return the values with the greatest gains, none nearer to another than ``apart``."""
+    """Return the values with the greatest gains that are more than ``apart`` from each other."""
     kept: list[float] = []
     for k in np.argsort(-gains):
         if len(kept) < KEPT and all(abs(values[k] - other) > apart for other in kept):
             kept.append(float(values[k]))
     return kept
-
-
-@dataclasses.dataclass(frozen=True)
-class Response:
-    """What torques do in a window, by what stands at the head of the file.
-
-    ``time`` is that of the laboratory, ``basis`` spans what the initial state does.
-    """
-
-    time: Floats
-    cosine: Floats
-    residual: Floats
-    states: Floats
-    weight: Floats
-    wronskian: Floats
-    basis: Floats
-
-    @property
-    def _here(self) -> Floats:
-        """``-b/W`` and ``a/W``: by which later ``a`` and ``b`` are multiplied."""
-        a, b = (self.states / self.weight[:, None]).T
-        return np.stack([-b, a], axis=1) / self.wronskian[:, None]
-
-    def pull(self, residual: Floats) -> Floats:
-        """Return the product of residuals with what a torque at each time would do."""
-        later = _later(self.states * residual[:, None])
-        return np.asarray(np.einsum("nk,nk->n", self._here, later), np.float64)
-
-    def answer(self, impulse: NDArray[np.complex128]) -> Floats:
-        """Return what the real and the imaginary part of impulses do, the start freed."""
-        parts = np.stack([impulse.real, impulse.imag], axis=1)
-        sums = np.cumsum(self._here[:, :, None] * parts[:, None, :], axis=0)
-        columns = np.einsum("nk,nkp->np", self.states, sums)
-        return np.asarray(columns - self.basis @ (self.basis.T @ columns), np.float64)
-
-    def information(self) -> Floats:
-        """Return the sum of squares of what a torque at each time would do, the start freed."""
-        gram = _later(np.einsum("nj,nk->njk", self.states, self.states))
-        whole = np.linalg.pinv(self.states.T @ self.states, hermitian=True)
-        free = gram - gram @ whole @ gram
-        left = np.einsum("nj,njk,nk->n", self._here, free, self._here)
-        return np.asarray(left, np.float64)
-
-    def noise(self, rng: np.random.Generator) -> Floats:
-        """Return residuals of noise alone."""
-        drawn = rng.standard_normal(self.residual.size)
-        return np.asarray(drawn - self.basis @ (self.basis.T @ drawn), np.float64)
-
-
-def _later(values: Floats) -> Floats:
-    """Return the sums over all later samples."""
-    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1] - values, np.float64)
-
-
-def _responses(
-    runs: Sequence[FitRun], windows: Sequence[WindowSlopes], damping: float
-) -> Iterator[Response]:
-    for window in windows:
-        run = runs[window.run]
-        kept = np.flatnonzero(window.weight > 0)
-        if kept.size < KEPT:
-            continue
-        time = run.time[window.first + kept]
-        states, weight = window.states[kept], window.weight[kept]
-        basis, _ = np.linalg.qr(states)
-        residual = window.residual[kept]
-        yield Response(
-            run.lab_time_s + time,
-            np.cos(run.theta[window.first + kept]),
-            residual - basis @ (basis.T @ residual),
-            states,
-            weight,
-            np.exp(damping * (time[0] - time)),
-            basis,
-        )

@@ -1,18 +1,15 @@
-"""Where a model fails: the torque that it lacks, over angle, velocity, amplitude, phase and time.
+"""The torque that a model lacks, over angle, velocity, amplitude, drive phase and time.
 
-A small torque ``u(s)`` per inertia that the model lacks moves its readings, to first order, by
+A small torque ``u(s)`` per moment of inertia that the model lacks moves its readings, to first
+order (variation of constants), by
 
 ``e(t) = int_0^t (b(t) a(s) - a(t) b(s)) / W(s) u(s) ds``,   ``W = a b' - a' b``,
 
-where ``a`` and ``b`` are the derivatives of the angle by the initial angle and velocity, which a
-fit has anyhow (variation of constants). A torque that is constant while the pendulum is in one bin
-of the angle, say, so has a column like any parameter, at the price of two running integrals; the
-torques of all bins are fitted together, with what the parameters and the initial states can follow
-taken off. Since an error adds up over a record, this sees torques far below what second differences
-of the readings show. The bins of angle, velocity, amplitude, phase and time are fitted together
-too: what one of them explains is no artefact of another.
-
-What is shown is therefore the torque beyond what the model's own terms could take up.
+with the derivatives ``a`` and ``b`` of the angle by the initial angle and velocity. A constant
+torque in one bin of the angle thus has a column like a parameter, at the price of two running
+integrals. Bins of all quantities are fitted together, orthogonal to the model's parameters and
+initial states: the result is the torque beyond what the model's own terms could take up. Errors add
+up over a record, so torques show far below the noise of second differences.
 """
 
 from __future__ import annotations
@@ -33,7 +30,7 @@ if TYPE_CHECKING:
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
-    from pendmap.residuals.noise import Remainder
+    from pendmap.residuals.noise import ResidualNoise
 
     Floats = NDArray[np.float64]
 
@@ -44,54 +41,51 @@ OVER: Final = {
     "drive_phase": "rad",
     "lab_time": "s",
 }
-"""What the torque is shown over, and the units."""
+"""Quantities over which the torque is given, and their units."""
 
 ALONG: Final = ("amplitude", "lab_time")
-"""Over these it is the torque along the motion, positive where it drives: of the torque itself as
-much goes one way as the other."""
+"""Quantities over which the torque along the motion is given, positive where it drives."""
 
 BINS: Final = 10
-"""Bins with equally many samples."""
+"""Number of bins, with equally many samples."""
 
 STANDS_OUT: Final = 4.0
-"""Standard errors from which a bin stands out: of fifty, none does by chance."""
+"""Standard errors from which a bin stands out; none of fifty does by chance."""
 
 BLIND: Final = 1e-5
-"""A combination of bins with this part of the greatest information is taken for unseen."""
+"""Information of a combination of bins, over the greatest, below which it is not determined."""
 
 LOST: Final = 1e-6
-"""Where ``W`` has fallen to this part of its start the motion has forgotten how it began."""
+"""``W`` over its greatest below which the motion no longer depends on its start."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Torque:
     """The torque that a model lacks."""
 
-    # For each of OVER a row a bin: ``from`` and ``to``, ``torque`` and ``stderr`` in rad/s^2, ``z``
-    # their ratio, whether it is the torque along the motion. Empty where the records do not show
-    # it.
+    # Rows of bins by quantity: ``from`` and ``to``, ``torque`` and ``stderr`` in rad/s^2, their
+    # ratio ``z``, and whether it is along the motion. Empty where the records do not show it.
     rows: dict[str, list[dict[str, Any]]]
-    # For each what the sum of squares falls by if the torques of all its bins are added to the
-    # model, and how many numbers that is.
+    # Fall of the sum of squares with the torques of all bins of a quantity, and their number.
     gains: dict[str, tuple[float, int]]
-    remainder: Remainder  # What the model leaves, and with it the noise
+    noise: ResidualNoise  # Of the model
 
     @classmethod
-    def unknown(cls, remainder: Remainder) -> Torque:
-        """Return that of a model of which it cannot be computed."""
-        return cls({name: [] for name in OVER}, {}, remainder)
+    def unknown(cls, noise: ResidualNoise) -> Torque:
+        """Return the result for a model whose torque cannot be computed."""
+        return cls({name: [] for name in OVER}, {}, noise)
 
     @property
     def chance(self) -> float:
-        """The chance that noise alone gains so much: the least of all, times how many there are."""
+        """Probability that noise alone gains as much over any quantity (Bonferroni)."""
         gains = [(gain, count) for gain, count in self.gains.values() if count]
-        tails = [self.remainder.chance_of(gain, count) for gain, count in gains]
+        tails = [self.noise.chance_of(gain, count) for gain, count in gains]
         return min(min(tails, default=1.0) * max(len(tails), 1), 1.0)
 
 
-def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, remainder: Remainder) -> Torque:
-    """Return the torque that a fitted model lacks in the runs that it was fitted to."""
-    windows, places = windows_of(runs, fit)
+def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualNoise) -> Torque:
+    """Return the torque that a model lacks in the runs to which it is fitted."""
+    windows, places = window_derivatives(runs, fit)
     names = [name for name in OVER if any(np.isfinite(p[name]).any() for p in places)]
     edges = {
         name: np.unique(
@@ -104,12 +98,12 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, remainder: Remai
         responses(runs[window.run], window, _binned(place, {n: edges[n] for n in names}))
         for window, place in zip(windows, places, strict=True)
     ]
-    further, residual = freed(runs, windows, columns)
+    further, residual = project_out(runs, windows, columns)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
     joint = _solved(further, residual)
-    # Errors are those of what the bins together leave.
-    wide = math.sqrt(max(remainder.level, _level(residual - further @ joint.torque)))
+    # Errors from the residuals of all bins together.
+    wide = math.sqrt(max(noise.level, _level(residual - further @ joint.torque)))
     first = 0
     for name in names:
         last = first + edges[name].size - 1
@@ -130,11 +124,11 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, remainder: Remai
             for k in range(torque.size)
         ]
         first = last
-    return Torque(found, gains, remainder)
+    return Torque(found, gains, noise)
 
 
 def _level(residual: Floats) -> float:
-    """Return the sum of squares over the number of independent readings among residuals."""
+    """Return the sum of squares over the number of independent readings (residuals.noise)."""
     from scipy.fft import dct  # noqa: PLC0415 (where it is needed)
 
     power = dct(residual, norm="ortho") ** 2
@@ -142,24 +136,21 @@ def _level(residual: Floats) -> float:
     return float(np.sum(power**2)) / (3 * total) if total > 0 else 0.0
 
 
-def windows_of(
+def window_derivatives(
     runs: Sequence[FitRun], fit: TrajectoryFit
 ) -> tuple[list[WindowSlopes], list[dict[str, Floats]]]:
-    """Return the derivatives of a fit window by window, and where the motion is at each sample.
-
-    All samples have them: integrals run through those that do not count.
-    """
+    """Return derivatives and quantities of a fit in each window, also at samples without weight."""
     whole = [dataclasses.replace(run, trusted=None) for run in runs]
     _, windows = window_slopes(fit, whole, (), fit.model)
     return windows, [_places(runs[w.run], fit, w) for w in windows]
 
 
-def freed(
+def project_out(
     runs: Sequence[FitRun], windows: Sequence[WindowSlopes], columns: Sequence[Floats]
 ) -> tuple[Floats, Floats]:
-    """Return columns and residuals, what parameters and initial states can follow taken off.
+    """Return columns and residuals orthogonal to parameters and initial states.
 
-    Samples that do not count are left out, also of ``windows``.
+    Samples that do not count are set to 0, also in ``windows``.
     """
     parts = []
     for window, own in zip(windows, columns, strict=True):
@@ -176,19 +167,19 @@ def freed(
     return further - u @ (u.T @ further), residual - u @ (u.T @ residual)
 
 
-def standing_out(torque: Torque) -> list[dict[str, Any]]:
-    """Return the bins in which a torque stands out of the noise, the clearest first."""
+def outstanding_bins(torque: Torque) -> list[dict[str, Any]]:
+    """Return the bins in which a torque stands out, the most significant first."""
     rows = [row for rows in torque.rows.values() for row in rows if abs(row["z"]) > STANDS_OUT]
     return sorted(rows, key=lambda row: -abs(row["z"]))
 
 
 def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, Floats]:
-    """Return where the motion is at each sample of a window."""
+    """Return the quantities of OVER at each sample of a window."""
     own = slice(window.first, window.first + len(window.residual))
     theta, velocity = (row[own] for row in fit.curves[window.run])
     energy = 1 - np.cos(theta) + 0.5 * (velocity / fit.model.w0) ** 2
     amplitude = np.where(
-        energy > 2,  # noqa: PLR2004 (that of the upright rest)
+        energy > 2,  # noqa: PLR2004 (of the inverted pendulum at rest)
         math.pi * np.sqrt(energy / 2),
         np.arccos(np.clip(1 - energy, -1, 1)),
     )
@@ -209,7 +200,7 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
 
 
 def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
-    """Return a torque of 1 rad/s^2 in each bin, by columns."""
+    """Return torques of 1 rad/s^2 in each bin, as columns."""
     torques = []
     for name, edge in edges.items():
         which = np.clip(np.searchsorted(edge, place[name], side="right") - 1, 0, edge.size - 2)
@@ -220,9 +211,9 @@ def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
 
 
 def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
-    """Return what torques do to the readings of a window, over their standard errors.
+    """Return the response of a window's readings to torques, over standard errors, shape (n, k).
 
-    Torques per moment of inertia at the window's samples, rad/s^2; both have the shape (n, k).
+    Torques per moment of inertia at the window's samples, rad/s^2, shape (n, k).
     """
     own = slice(window.first, window.first + len(window.residual))
     time = run.time[own]
@@ -246,24 +237,24 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
 
 @dataclasses.dataclass(frozen=True)
 class _Solution:
-    """Torques of bins that are fitted together, their errors for noise of 1, and what they gain."""
+    """Torques of bins that are fitted together."""
 
     torque: Floats
-    errors: Floats
-    gain: float
+    errors: Floats  # For a noise level of 1
+    gain: float  # Fall of the sum of squares
     rank: int
 
 
 def _solved(columns: Floats, residual: Floats) -> _Solution:
-    """Return the torques of bins that explain residuals best, those of least size where many do."""
+    """Return the least-squares torques of bins, of least norm where they are not unique."""
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
     scale[scale == 0] = 1.0
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    seen = values > BLIND * max(float(values[-1]), 1e-300)
-    spread = vectors[:, seen] / np.sqrt(values[seen])
+    known = values > BLIND * max(float(values[-1]), 1e-300)
+    spread = vectors[:, known] / np.sqrt(values[known])
     inverse = (spread @ spread.T) / np.outer(scale, scale)
     pull = columns.T @ residual
     torque = inverse @ pull
     errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    return _Solution(torque, errors, float(pull @ torque), int(np.count_nonzero(seen)))
+    return _Solution(torque, errors, float(pull @ torque), int(np.count_nonzero(known)))

@@ -70,20 +70,20 @@ class Beside:
 
 def beside(found: Discrepancy) -> list[Beside]:
     """Return all runs, those that were held back whole after the others."""
-    evidence, base, best = found.evidence, found.base, found.best
-    fits, w0 = (base.trial.fit, best.trial.fit), found.base.trial.fit.model.w0
-    held = (base.held.fit, best.held.fit)
+    data, base, best = found.data, found.base, found.best
+    fits, w0 = (base.fitted.fit, best.fitted.fit), found.base.fitted.fit.model.w0
+    held = (base.hold_out.fit, best.hold_out.fit)
     made = []
-    for k, run in enumerate(evidence.fitted):
+    for k, run in enumerate(data.fitted):
         left = [_left(run, fit, k) for fit in fits]
-        if evidence.inside and evidence.fitted_of[k] in evidence.held_of:
+        if data.inside and data.fitted_of[k] in data.held_of:
             # The stretches held back lie within the run, and the motion passes through them.
-            place = evidence.held_of.index(evidence.fitted_of[k])
-            back = [_left(evidence.held[place], fit, place) for fit in held]
+            place = data.held_of.index(data.fitted_of[k])
+            back = [_left(data.held[place], fit, place) for fit in held]
             left = [np.where(np.isfinite(b), b, a) for a, b in zip(left, back, strict=True)]
         made.append(_drawn(run, left, run.name, w0))
-    if not evidence.inside:
-        for k, run in enumerate(evidence.held):
+    if not data.inside:
+        for k, run in enumerate(data.held):
             left = [_left(run, fit, k) for fit in held]
             made.append(_drawn(run, left, f"{run.name}, held out", w0))
     return made

@@ -64,7 +64,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
     latest = max(float(np.max(np.abs(one.time), initial=0.0)) for one in shown)
     if latest > columns.LATEST:
         raise InputError(
-            f"{found.evidence.experiment.path}: time is {latest:g} s: a recording holds up to "
+            f"{found.data.experiment.path}: time is {latest:g} s: a recording holds up to "
             f"{columns.LATEST:g} s"
         )
     larger = beside.magnified(shown)
@@ -162,7 +162,7 @@ def _forecasts(
 
 def _content(found: Discrepancy, shown: list[Beside]) -> str:
     """Return a name that tells what was recorded: other readings or models, another name."""
-    estimates = [(n, e.value) for n, e in found.best.trial.fit.estimates.items()]
+    estimates = [(n, e.value) for n, e in found.best.fitted.fit.estimates.items()]
     digest = hashlib.blake2b(repr((found.verdict, estimates)).encode(), digest_size=12)
     for one in shown:
         for column in (one.time, one.record, one.before, one.after):
@@ -172,7 +172,7 @@ def _content(found: Discrepancy, shown: list[Beside]) -> str:
 
 def _describe(stream: rr.RecordingStream, found: Discrepancy, larger: float) -> None:
     """Log the recording's name and, as properties, verdict, effects and gap."""
-    stream.send_recording_name(f"diagnosis of {Path(found.evidence.experiment.path).name}")
+    stream.send_recording_name(f"diagnosis of {Path(found.data.experiment.path).name}")
     gap = found.gap
     known: dict[str, float | str] = {
         "kind": "diagnosis",

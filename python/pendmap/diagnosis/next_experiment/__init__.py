@@ -1,1 +1,1 @@
-"""What to record next, and what it would decide."""
+"""Proposals of the next record, and the smallest effects that records would have shown."""

@@ -1,9 +1,9 @@
-"""What records say, and what further ones would say, about parameters and candidates.
+"""Fisher information of records, and of proposed ones, about parameters and candidates.
 
-The derivatives ``X`` of readings over their standard errors, without what initial states and phases
-that nobody knows can follow, make the information ``F = X' X``. That of independent runs adds up,
-so that a proposal's is computed once and added to the records'. What of some columns the others
-cannot follow is the Schur complement
+The derivatives ``X`` of readings over their standard errors, orthogonal to initial states and
+unknown phases, give the information ``F = X' X``. The information of independent runs adds up, so
+that of a proposal is computed once and added to that of the records. The information of some
+parameters with all others fitted is the Schur complement
 
 ``F_aa - F_ab F_bb^-1 F_ba``.
 """
@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.comparison.data import held_parts
-from pendmap.comparison.replay import Motion, replayed
-from pendmap.diagnosis.candidates import placed
+from pendmap.comparison.replay import Motion, run_forward
+from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.formatting import counted
 from pendmap.identification.parameters import PER_RUN
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.data import DataSplit
     from pendmap.comparison.further import Reasons
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.next_experiment.proposals import Planned, Proposal, Start
-    from pendmap.diagnosis.state import Found
+    from pendmap.diagnosis.state import ScoredModel
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.sensitivity import WindowSlopes
 
@@ -43,10 +43,19 @@ if TYPE_CHECKING:
     Windows = tuple[tuple[int, int, int, float, float], ...]
 
 FOLLOWED: Final = 1e-9
-"""Directions of the others whose information is less than this part of the greatest are none."""
+"""Information of a direction over the greatest, below which it is not determined."""
 
 ALL: Final = 2e-6
-"""Where less than this part of a column's information is its own, the others follow all of it."""
+"""Part of a column's information that remains with the others fitted, below which it is 0."""
+
+PER_SWING: Final = 25.0
+"""Most samples a small swing at which a proposal is computed; more readings have smaller errors."""
+
+MOVING: Final = 1e-9
+"""Velocity over ``w0`` below which a pendulum rests and its readings carry no information."""
+
+FEWEST: Final = 3
+"""Fewest readings of a run in a fit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,28 +68,22 @@ class Information:
         return Information(self.matrix + other.matrix)
 
     def own(self, columns: Sequence[int], others: Sequence[int]) -> Floats:
-        """Return what of some columns others cannot follow, shape (n, n)."""
+        """Return the information of columns with others fitted, shape (n, n)."""
         f = self.matrix
         kept, through = f[np.ix_(columns, columns)], f[np.ix_(columns, others)]
-        rest = kept - through @ self._inverse(others) @ through.T
-        # Below this it is rounding and the integrator's error.
-        shown = np.diag(rest) > ALL * np.diag(kept)
-        return np.where(np.outer(shown, shown), rest, 0.0)
+        own = kept - through @ self.covariance(others) @ through.T
+        # Less is rounding and the integrator's error.
+        shown = np.diag(own) > ALL * np.diag(kept)
+        return np.where(np.outer(shown, shown), own, 0.0)
 
     def followed(self, columns: Sequence[int], by: Sequence[int], beside: Sequence[int]) -> Floats:
-        """Return the coefficients by which columns come nearest to others, shape (n of by, n).
-
-        ``beside`` follow too; their coefficients are not returned.
-        """
+        """Return the coefficients of ``by`` that fit columns best beside others, (n of by, n)."""
         every = [*by, *beside]
-        found = self._inverse(every) @ self.matrix[np.ix_(every, columns)]
+        found = self.covariance(every) @ self.matrix[np.ix_(every, columns)]
         return np.asarray(found[: len(by)], np.float64)
 
     def covariance(self, columns: Sequence[int]) -> Floats:
         """Return the covariance of columns' coefficients, fitted together."""
-        return self._inverse(columns)
-
-    def _inverse(self, columns: Sequence[int]) -> Floats:
         part = self.matrix[np.ix_(columns, columns)]
         size = np.sqrt(np.diag(part))
         unit = np.where(size > 0, size, 1.0)
@@ -92,25 +95,20 @@ class Information:
 class Columns:
     """Derivatives at a fit, window by window."""
 
-    shared: tuple[str, ...]  # The fitted parameters that belong to no run alone; the first columns
-    # The columns of each further candidate: size, and phase if it has one.
-    places: dict[str, list[int]]
-    # Columns are those of ``shared`` and the candidates', then those of single runs.
-    windows: tuple[WindowSlopes, ...]
+    shared: tuple[str, ...]  # Fitted parameters of all runs, the first columns
+    places: dict[str, list[int]]  # Columns of each candidate: size, and phase if it has one
+    windows: tuple[WindowSlopes, ...]  # With columns shared, of candidates, and of single runs
 
     @property
     def count(self) -> int:
-        """How many columns belong to all runs."""
+        """Number of columns that belong to all runs."""
         return len(self.shared) + sum(len(own) for own in self.places.values())
 
     @classmethod
     def of(
         cls, fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[Candidate]
     ) -> Columns:
-        """Return the derivatives by a fit's parameters and by candidates'.
-
-        They are taken with the windows of the runs; an effect may be there in several shapes.
-        """
+        """Return the derivatives by the parameters of a fit and of candidates, in any shapes."""
         shared = tuple(dict.fromkeys(name for name in fit.names if not _of_one_run(name)))
         places: dict[str, list[int]] = {}
         first: list[WindowSlopes] = []
@@ -118,11 +116,11 @@ class Columns:
         by_name: dict[str, list[Candidate]] = {}
         for candidate in candidates:
             by_name.setdefault(candidate.name, []).append(candidate)
-        # Shapes of one effect are derived one after the other, those of several together.
+        # One shape of each effect at a time.
         for batch in itertools.zip_longest(*by_name.values()) if by_name else [()]:
             present = [candidate for candidate in batch if candidate is not None]
             further = [name for candidate in present for name in candidate.free]
-            names, windows = window_slopes(fit, runs, further, placed(fit.model, present))
+            names, windows = window_slopes(fit, runs, further, add_candidates(fit.model, present))
             wanted = [names.index(name) for name in further]
             if not first:
                 kept = [names.index(name) for name in shared]
@@ -145,7 +143,7 @@ class Columns:
     ) -> Information:
         """Return the information of all runs, or of the first samples of one.
 
-        ``hold``: stretches of it will be held back, as of records of which no whole run is.
+        ``hold``: without the stretches that would be held back.
         """
         total = np.zeros((self.count, self.count))
         rows: dict[int, list[Floats]] = {}
@@ -187,41 +185,33 @@ def _cut(window: WindowSlopes, samples: int, *, hold: bool) -> WindowSlopes | No
     )
 
 
-PER_SWING: Final = 25.0
-"""Samples a small swing at which a proposal is computed, if it would be read more often: fewer
-readings of an accordingly smaller error say the same."""
-
-MOVING: Final = 1e-9
-"""Velocity over ``w0`` below which a pendulum rests: its readings say no more than the first."""
-
-
-FEWEST: Final = 3
-"""Readings of a run that a fit has at least."""
-
-
 class Prospects:
-    """Proposals run through by the model found, and what they would say.
+    """Information of proposals, run by the model found.
 
-    A proposal in which the model is lost is left out; ``reasons`` has how many, and why.
+    Proposals in which the model diverges are left out, with their number and reason in ``reasons``.
     """
 
     def __init__(
         self,
-        evidence: Evidence,
-        found: Found,
+        data: DataSplit,
+        found: ScoredModel,
         menu: Sequence[Proposal],
         candidates: Sequence[Candidate],
         reasons: Reasons,
     ) -> None:
-        fit = found.trial.fit
+        fit = found.fitted.fit
         self.units = fit.model.units
-        self.now = Columns.of(fit, evidence.fitted, candidates)
+        self.now = Columns.of(fit, data.fitted, candidates)
         self.old = self.now.information()
-        self._hold = evidence.inside
+        self._hold = data.inside
         longest: dict[Start, float] = {}
         for planned in (run for proposal in menu for run in proposal.runs):
             longest[planned.start] = max(longest.get(planned.start, 0.0), planned.seconds)
-        self._starts, runs, windows = _simulated(evidence, found, longest, reasons)
+        read = float(np.median([np.median(np.diff(run.time)) for run in data.fitted]))
+        self._step = max(read, math.tau / fit.model.w0 / PER_SWING)
+        # Fewer samples have accordingly smaller errors.
+        scale = math.sqrt(read / self._step)
+        self._starts, runs, windows = _simulated(data, found, longest, self._step, scale, reasons)
         self.menu = [p for p in menu if all(start in self._starts for start in p.starts)]
         if menu and not self.menu:
             raise FitDiverged(f"of {counted(len(menu), 'proposal')} none: {reasons['proposals']}")
@@ -229,7 +219,6 @@ class Prospects:
             reasons["proposals"] = (
                 f"{len(menu) - len(self.menu)} of {len(menu)} left out: {reasons['proposals']}"
             )
-        self._step = _step(evidence, fit.model.w0)
         ahead = dataclasses.replace(
             fit,
             names=self.now.shared,
@@ -256,26 +245,19 @@ class Prospects:
         return self._known[planned]
 
 
-def _step(evidence: Evidence, w0: float) -> float:
-    """Return the time between the samples at which proposals are computed, s."""
-    return max(_reading_step(evidence), math.tau / w0 / PER_SWING)
-
-
-def _reading_step(evidence: Evidence) -> float:
-    return float(np.median([np.median(np.diff(run.time)) for run in evidence.fitted]))
-
-
-def _simulated(
-    evidence: Evidence, found: Found, longest: dict[Start, float], reasons: Reasons
+def _simulated(  # noqa: PLR0913, PLR0917 (the model, the runs, how they are read)
+    data: DataSplit,
+    found: ScoredModel,
+    longest: dict[Start, float],
+    step: float,
+    scale: float,
+    reasons: Reasons,
 ) -> tuple[list[Start], list[FitRun], Windows]:
-    """Return starts, runs and windows of what the model could be run through."""
-    motion, w0 = Motion.of(found.trial.fit), found.trial.fit.model.w0
-    step = _step(evidence, w0)
-    readings = [evidence.readings[k] for k in evidence.fitted_of]
+    """Return starts, runs and windows that the model could run, with errors times ``scale``."""
+    motion, w0 = Motion.of(found.fitted.fit), found.fitted.fit.model.w0
+    readings = [data.readings[k] for k in data.fitted_of]
     floor = float(np.median([reading.sigma for reading in readings]))
     late = float(np.median([0.0 if r.law is None else r.law.tau for r in readings]))
-    # Those that are computed take the part of those that are not.
-    scale = math.sqrt(_reading_step(evidence) / step)
     starts: list[Start] = []
     runs: list[FitRun] = []
     windows: list[tuple[int, int, int, float, float]] = []
@@ -310,26 +292,27 @@ def _curves(
     floor: float,
     reasons: Reasons,
 ) -> dict[Start, Floats]:
-    """Return angle and velocity of each start; without those that leave the range of numbers."""
+    """Return angle and velocity of each start, without those that diverge."""
     runs = {
         start: _run(start, round(seconds / step) + 1, step, floor)
         for start, seconds in longest.items()
     }
     states = {start: (start.theta, start.velocity) for start in runs}
     try:
-        every = replayed(motion, list(runs.values()), list(states.values()))
+        every = run_forward(motion, list(runs.values()), list(states.values()))
         return {start: curve for start, (_, curve) in zip(runs, every, strict=True)}
     except FitDiverged:
         found = {}
         for start, run in runs.items():
             try:
-                found[start] = replayed(motion, [run], [states[start]])[0][1]
+                found[start] = run_forward(motion, [run], [states[start]])[0][1]
             except FitDiverged as error:
                 reasons["proposals"] = str(error)
         return found
 
 
 def _run(start: Start, samples: int, step: float, sigma: float | Floats) -> FitRun:
+    """Return a proposed run without readings."""
     time = step * np.arange(samples, dtype=np.float64)
     drive = None if start.drive is None else dict(start.drive)
     return FitRun(time, np.zeros(samples), sigma, drive=drive, lab_time_s=start.lab_time_s)

@@ -1,4 +1,4 @@
-"""How small an effect could have been and still have been found."""
+"""Advice on the next record, and the smallest effects that records would have shown."""
 
 from __future__ import annotations
 
@@ -7,40 +7,61 @@ import functools
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.comparison.further import Reasons, attempted
-from pendmap.diagnosis.candidates import choices_of
-from pendmap.diagnosis.next_experiment.power import seen, separated, tightened
+from pendmap.comparison.further import Reasons, compute_part
+from pendmap.diagnosis.candidates import count_choices
+from pendmap.diagnosis.next_experiment.power import (
+    predict_interval,
+    predict_limits,
+    predict_separation,
+)
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.model.effects import Effect
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from pendmap.comparison.data import Evidence
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.next_experiment.power import Outlook, Prospect
     from pendmap.diagnosis.scores import Scores
-    from pendmap.diagnosis.state import Found
-    from pendmap.diagnosis.verdict import Judgement
+    from pendmap.diagnosis.state import ScoredModel
+    from pendmap.diagnosis.verdict import Assessment
     from pendmap.units import Units
 
 
 SURELY: Final = 0.95
-"""Probability with which an effect of the size of its limit is found."""
+"""Probability of finding an effect of the size of its limit."""
 
 HUGE: Final = 10.0
-"""What would have to be greater than so many times the greatest usual size is not visible."""
+"""Limit over the greatest typical size above which an effect is not visible."""
+
+NOTHING: Final = "No free decay or run under the drive adds to these records."
+
+MARGIN: Final = 1e-6
+"""Least probability that is given: no model is known better."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Limit:
-    """The smallest size of an effect that would have been found with 95 % probability."""
+    """Smallest size of an effect that would have been found with 95 % probability."""
 
-    # In SI, in the shape that shows it least of those that show it; infinite where none does.
-    size: float
+    size: float  # SI, in the visible shape that shows it least; infinite where none is visible
     candidate: Candidate  # The effect in that shape
-    # Shapes that the records do not show at all, where there are others that they do.
-    unseen: tuple[Candidate, ...] = ()
+    unseen: tuple[Candidate, ...] = ()  # Shapes that are not visible, where others are
+
+
+@dataclasses.dataclass(frozen=True)
+class Advice:
+    """What to record next."""
+
+    next_experiment: str | None  # In a sentence or two; None where it cannot be computed
+    limits: dict[str, Limit]  # Of each effect that was not found
+    outlook: Outlook | None  # Predicted outcomes; None where the model can run no proposal
+
+    @property
+    def best(self) -> Prospect | None:
+        """The proposal in ``next_experiment``."""
+        return None if self.outlook is None else self.outlook.best
 
 
 def detection_limits(
@@ -48,19 +69,21 @@ def detection_limits(
 ) -> dict[str, Limit]:
     """Return the smallest size of each effect that would have been found with 95 % probability.
 
-    Of a size ``a`` the expected gain is ``a^2`` times the information ``x' x`` (what of the
-    effect's own the fitted parameters and initial states cannot follow); the gain is then
-    distributed as noncentral chi-squared, and has to pass the search's threshold.
+    A size ``a`` has the expected gain ``a^2`` times the information ``x' x`` of the effect beside
+    the fitted parameters and initial states. The gain has a noncentral chi-squared distribution and
+    must exceed the threshold of the search.
     """
-    choices = choices_of([score.candidate for score in scores.scores])
+    from scipy.special import chdtri  # noqa: PLC0415 (where it is needed)
+
+    choices = count_choices([score.candidate for score in scores.scores])
     shapes: dict[str, list[tuple[float, Candidate]]] = {}
     for score in scores.scores:
         candidate = score.candidate
         if candidate.name in found:
             continue
-        wanted = needed(
-            _threshold(candidate, len(choices) * choices[candidate.name]), len(candidate.free)
-        )
+        among = len(choices) * choices[candidate.name]
+        threshold = float(chdtri(candidate.count, Thresholds().chance / among))
+        wanted = required_gain(threshold, len(candidate.free))
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         if size > HUGE * _greatest(candidate, units):
@@ -75,15 +98,8 @@ def detection_limits(
     return limits
 
 
-def _threshold(candidate: Candidate, among: int) -> float:
-    """Return the gain from which an effect is accepted that is chosen among several shapes."""
-    from scipy.special import chdtri  # noqa: PLC0415 (where it is needed)
-
-    return float(chdtri(candidate.count, Thresholds().chance / among))
-
-
 def _greatest(candidate: Candidate, units: Units) -> float:
-    """Return the greatest usual size of an effect, SI."""
+    """Return the greatest typical size of an effect, SI."""
     entry = candidate.definition["parameters"][0]
     bare = dict(candidate.shape) | {candidate.size: max(map(abs, entry["typical"]))}
     if candidate.phase is not None:
@@ -93,10 +109,10 @@ def _greatest(candidate: Candidate, units: Units) -> float:
 
 
 @functools.cache
-def needed(threshold: float, count: int) -> float:
-    """Return the expected gain with which a threshold is passed with 95 % probability.
+def required_gain(threshold: float, count: int) -> float:
+    """Return the expected gain that exceeds a threshold with 95 % probability.
 
-    ``count`` are the degrees of freedom: how many numbers are fitted.
+    ``count`` is the number of fitted parameters.
     """
     from scipy.optimize import brentq  # noqa: PLC0415 (where it is needed)
     from scipy.stats import ncx2  # noqa: PLC0415
@@ -107,99 +123,81 @@ def needed(threshold: float, count: int) -> float:
     )
 
 
-# What to record next, how much that would decide, and what these records would have shown.
-
-
-NOTHING: Final = "No free decay or run under the drive adds to these records."
-
-MARGIN: Final = 1e-6
-"""A chance below this is not told: no model is known so well."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Advice:
-    """What to record next."""
-
-    next_experiment: str | None  # In a sentence or two; none where it cannot be computed
-    # For each effect that was not found the smallest size that would have been found with 95 %
-    # probability.
-    limits: dict[str, Limit]
-    # What is wanted, and what each proposal would do for it; none where no proposal can be run
-    # through by the model.
-    outlook: Outlook | None
-
-    @property
-    def best(self) -> Prospect | None:
-        """The proposal of the sentence."""
-        return None if self.outlook is None else self.outlook.best
-
-
-def advice_of(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
-    evidence: Evidence,
-    best: Found,
-    nearest: Found,
-    judgement: Judgement,
+def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
+    data: DataSplit,
+    best: ScoredModel,
+    nearest: ScoredModel,
+    assessment: Assessment,
     scores: Scores,
     level: float,
     reasons: Reasons,
 ) -> Advice:
     """Return what to record next.
 
-    Names that are alike are to be told apart (``s G`` of 25), named or leading explanations of what
-    is unknown; of effects that are told apart the widest interval is to be halved; where nothing is
-    found, more is to be seen.
+    The aim is to tell equivalent names apart (``s G`` of 25), named or not; else to halve the
+    widest interval of named effects; else to show smaller effects.
     """
-    limits = detection_limits(scores, level, best.trial.names, best.trial.fit.model.units)
+    limits = detection_limits(scores, level, best.fitted.names, best.fitted.fit.model.units)
 
     def proposed() -> Outlook | None:
-        if any(len(standing.equivalent) > 1 for standing in judgement.standings):
-            return separated(evidence, nearest, judgement.standings, level, reasons)
-        if judgement.verdict == "named":
-            return tightened(evidence, best, level, reasons)
-        return seen(evidence, best, scores, reasons)
+        if any(len(each.equivalent) > 1 for each in assessment.identified):
+            return predict_separation(data, nearest, assessment.identified, level, reasons)
+        if assessment.verdict == "named":
+            return predict_interval(data, best, level, reasons)
+        return predict_limits(data, best, scores, reasons)
 
-    outlook = attempted(reasons, "proposals", proposed, None)
-    said = _sentences(judgement, outlook, evidence.forced)
+    outlook = compute_part(reasons, "proposals", proposed, None)
+    said = _sentences(assessment, outlook, driven=data.forced)
     if not said and "proposals" not in reasons:
         said = [NOTHING]
     return Advice(" ".join(said) or None, limits, outlook)
 
 
-def chance_said(chance: float) -> str:
-    """Return a chance, none of them impossible."""
-    return f"{chance:.1g}" if chance >= MARGIN else f"below {MARGIN:g}"
-
-
-def _sentences(judgement: Judgement, outlook: Outlook | None, driven: bool) -> list[str]:  # noqa: FBT001 (private)
+def _sentences(assessment: Assessment, outlook: Outlook | None, *, driven: bool) -> list[str]:
+    """Return the sentences of the advice."""
     said = []
-    if judgement.verdict in {"unknown", "partial"}:
+    if assessment.verdict in {"unknown", "partial"}:
         said.append(
             "Repeat one free decay several times over an hour: whether the rest repeats, and "
             "over what it changes, says what it is."
         )
     if outlook is None:
         return said
-    best = outlook.best
-    if best is not None:
-        say = {"separation": _separation, "interval": _interval, "limits": _limits}
-        said.append(say[outlook.aim](outlook, best))
+    if outlook.best is not None:
+        said.append(_recommendation(outlook, outlook.best))
     kinds = "free decay or run under the drive" if driven else "free decay"
     said += [
         f"No {kinds} tells {one} from {other}: {one} is shown by "
-        f"{_revealed(judgement, one)}; {other} by {_revealed(judgement, other)}."
+        f"{_revealed(assessment, one)}; {other} by {_revealed(assessment, other)}."
         for one, other in outlook.equals
     ]
     return said
 
 
-def _revealed(judgement: Judgement, name: str) -> str:
+def _revealed(assessment: Assessment, name: str) -> str:
+    """Return what reveals an effect, by the library."""
     every = (
-        c for s in judgement.standings for c in (s.candidate, *(r.candidate for r in s.rivals))
+        c
+        for s in assessment.identified
+        for c in (s.candidate, *(r.candidate for r in s.alternatives))
     )
     return str(next(c for c in every if c.name == name).definition["revealed_by"])
 
 
-def _separation(outlook: Outlook, best: Prospect) -> str:
+def _recommendation(outlook: Outlook, best: Prospect) -> str:
+    """Return the sentence that recommends a proposal."""
+    names, what = ", ".join(outlook.about), best.proposal.what
+    if outlook.aim == "interval":
+        return (
+            f"The least sure is {outlook.about[0]}, known to +- {100 * outlook.now:.2g} % (95 %): "
+            f"record {what}, for a predicted +- {100 * best.value:.2g} %."
+        )
+    if outlook.aim == "limits":
+        return (
+            f"To see smaller effects, record {what}: for half of the effects not found the "
+            f"smallest size that shows falls to {100 * best.value:.2g} % of what it is now, or "
+            f"further; most for {names}."
+        )
     names = ", ".join(outlook.about[:-1]) + f" and {outlook.about[-1]}"
     enough = ""
     if not outlook.reaches(best):
@@ -207,28 +205,10 @@ def _separation(outlook: Outlook, best: Prospect) -> str:
         part = (outlook.wanted - outlook.now) / (best.value - outlook.now)
         runs = math.ceil(len(best.proposal.runs) * part)
         enough = f"; about {runs} such runs are needed"
+    value, now = (f"{x:.0f}" if x >= 10 else f"{x:.2g}" for x in (best.value, outlook.now))  # noqa: PLR2004 (two digits)
+    wrong = best.wrong or 0.0
+    chance = f"{wrong:.1g}" if wrong >= MARGIN else f"below {MARGIN:g}"
     return (
-        f"To tell {names} apart, record {best.proposal.what}: predicted separation "
-        f"{_power(best.value)} (now {_power(outlook.now)}, {outlook.wanted:g} wanted{enough}), "
-        f"chance of a wrong name {chance_said(best.wrong or 0.0)}."
-    )
-
-
-def _power(value: float) -> str:
-    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"  # noqa: PLR2004 (two digits)
-
-
-def _interval(outlook: Outlook, best: Prospect) -> str:
-    return (
-        f"The least sure is {outlook.about[0]}, known to +- {100 * outlook.now:.2g} % (95 %): "
-        f"record {best.proposal.what}, for a predicted +- {100 * best.value:.2g} %."
-    )
-
-
-def _limits(outlook: Outlook, best: Prospect) -> str:
-    names = ", ".join(outlook.about)
-    return (
-        f"To see smaller effects, record {best.proposal.what}: for half of the effects not found "
-        f"the smallest size that shows falls to {100 * best.value:.2g} % of what it is now, or "
-        f"further; most for {names}."
+        f"To tell {names} apart, record {what}: predicted separation {value} (now {now}, "
+        f"{outlook.wanted:g} wanted{enough}), chance of a wrong name {chance}."
     )

@@ -1,0 +1,143 @@
+"""A fitted model evaluated on the records held back."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.comparison.data import counted
+from pendmap.diagnosis.fitted_model import FEW_STEPS, LITTLE
+from pendmap.errors import FitDiverged
+from pendmap.identification.fit import TrajectoryFit, fit_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.comparison.data import DataSplit
+    from pendmap.diagnosis.fitted_model import FittedModel, Windows
+    from pendmap.identification.runs import FitRun
+
+FOLDS: Final = 5
+"""Folds of stretches left out in turn; two fixed stretches alone depend on chance."""
+
+
+@dataclasses.dataclass(frozen=True)
+class HoldOut:
+    """A model on the records held back, with its parameters fixed."""
+
+    chi2: float  # Sum of squared residuals over standard errors, initial states fitted
+    degrees: int  # Samples less fitted numbers
+    fit: TrajectoryFit  # Curves and residuals
+
+
+def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
+    """Evaluate a model on the records held back.
+
+    Whole runs have new initial states; stretches within fitted runs are passed by the fitted
+    motion, without any step of a fit.
+    """
+    model = fitted.fit.model
+    known = {name: value for name, value in fitted.start.items() if "[" not in name}
+    if data.inside:
+        own = tuple(name for name in fitted.free if name in known)
+        places = {of: k for k, of in enumerate(data.held_of)}
+        windows = tuple((places[w[0]], *w[1:]) for w in fitted.fit.windows if w[0] in places)
+        fit = fit_runs(
+            data.held, model, own, start=known, windows=windows, profiled=(), hold=True, steps=0
+        )
+        return HoldOut(fit.chi2, max(fit.samples, 1), fit)
+    free = fitted.free
+    if not any(run.forced for run in data.held):
+        # Effects of the drive have no part in free decays.
+        drives = {e.name for e in model.effects if e.drives}
+        free = tuple(name for name in free if name.partition(".")[0] not in drives)
+    fit = fit_runs(
+        data.held,
+        model,
+        free,
+        start=known,
+        profiled=(),
+        hold=True,
+        steps=FEW_STEPS,
+        least_gain=LITTLE,
+    )
+    adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
+    return HoldOut(fit.chi2, max(fit.samples - adapted, 1), fit)
+
+
+def hold_out_losses(
+    data: DataSplit, fitted: FittedModel, held: HoldOut, level: float
+) -> tuple[float, ...]:
+    """Return the increase of the sum of squares by each held-out set, parameters fitted with it.
+
+    ``chi2(fitted and set) - chi2(fitted)``. The set is that of the runs held back; where stretches
+    are held back, the sum over five rotated folds of stretches, and the first and the last third of
+    the runs, which demand a forecast across amplitudes.
+    """
+    if not data.inside:
+        shifted = tuple((w[0] + len(data.fitted), *w[1:]) for w in held.fit.windows)
+        phases = {
+            f"phi[{int(n[4:-1]) + len(data.fitted)}]": e.value
+            for n, e in held.fit.estimates.items()
+            if n.startswith("phi[")
+        }
+        both = (*data.fitted, *data.held)
+        whole = _chi2(both, fitted, (*fitted.fit.windows, *shifted), level, phases)
+        return (whole - fitted.chi2,)
+    windows, back = fitted.fit.windows, dict(zip(data.held_of, data.held, strict=True))
+    runs = tuple(
+        dataclasses.replace(run, trusted=counted(run) | counted(back[of])) if of in back else run
+        for run, of in zip(data.fitted, data.fitted_of, strict=True)
+    )
+    whole = _chi2(runs, fitted, windows, level)
+    folds = [tuple(_less_a_fold(run, k) for run in runs) for k in range(FOLDS)]
+    thirds = [tuple(_less_a_third(run, first=first) for run in runs) for first in (True, False)]
+    lost = [whole - _chi2(part, fitted, windows, level) for part in (*folds, *thirds)]
+    return (sum(lost[:FOLDS]), *lost[FOLDS:])
+
+
+def _less_a_fold(run: FitRun, fold: int) -> FitRun:
+    """Return a free run without two of ten stretches of its readings, half the run apart."""
+    if run.forced:
+        return run
+    kept = counted(run).copy()
+    samples = np.flatnonzero(kept)
+    stretch = np.arange(samples.size) * 2 * FOLDS // max(samples.size, 1)
+    kept[samples[stretch % FOLDS == fold]] = False
+    return dataclasses.replace(run, trusted=kept)
+
+
+def _less_a_third(run: FitRun, *, first: bool) -> FitRun:
+    """Return a free run without the first or the last third of its readings."""
+    if run.forced:
+        return run
+    kept = counted(run).copy()
+    samples = np.flatnonzero(kept)
+    cut = int(samples[samples.size // 3 if first else -(samples.size // 3) - 1])
+    kept[slice(0, cut) if first else slice(cut, None)] = False
+    return dataclasses.replace(run, trusted=kept)
+
+
+def _chi2(
+    runs: Sequence[FitRun],
+    fitted: FittedModel,
+    windows: Windows,
+    level: float,
+    phases: dict[str, float] | None = None,
+) -> float:
+    """Return the least sum of squares of a model on other readings of the fitted motion."""
+    try:
+        return fit_runs(
+            runs,
+            fitted.fit.model,
+            fitted.free,
+            start=fitted.start | (phases or {}),
+            windows=windows,
+            profiled=(),
+            steps=FEW_STEPS,
+            least_gain=LITTLE * level,
+        ).chi2
+    except FitDiverged:
+        return np.inf
