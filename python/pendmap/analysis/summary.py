@@ -26,10 +26,7 @@ _STILL = 1e-12
 
 
 def of_model(model: Pendulum | Rig, what: str) -> list[str]:
-    """Say what a model is worth: that it misses its record, and what acts on its reading alone.
-
-    Where effects change the sensor's reading ``what`` is shown is the motion.
-    """
+    """Return lines on the model: it misses its record, or effects act on its reading alone."""
     ratio = misses(model.notes)
     lines = []
     if math.isfinite(ratio):
@@ -44,17 +41,7 @@ def of_model(model: Pendulum | Rig, what: str) -> list[str]:
 
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
-    """Return the findings of a basin map, a sentence a line.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
-    pendulum : Pendulum
-        The model without dimensions.
-    bound_was_chosen : bool
-        Whether the bound on periods is pendmap's own choice, not the caller's.
-    """
+    """Return the findings of a basin map, whose attributes are set, a sentence a line."""
     plane = dataset.attrs["plane"]
     unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
@@ -79,15 +66,22 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
     lines += of_model(pendulum, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
-        f"{counted(a['steps_per_period'], 'step')} a period, "
-        f"error reached {a['reached_error']:.1e}, "
-        f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')} ({a['simd']})."
+        f"{effort(a)}"
     )
     return "\n".join(lines)
 
 
+def effort(a: Mapping[Any, Any]) -> str:
+    """Return how a result was computed: steps, error, time."""
+    return (
+        f"{counted(a['steps_per_period'], 'step')} a period, error reached "
+        f"{a['reached_error']:.1e}, {a['seconds']:.2f} s on {counted(a['threads'], 'thread')} "
+        f"({a['simd']})."
+    )
+
+
 def unlimited_rotation(pendulum: Pendulum) -> list[str]:
-    """Say so where nothing limits the speed of a rotation, so that it settles on nothing.
+    """Return lines where nothing limits the speed of a rotation, so that it never settles.
 
     Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
     grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
@@ -111,11 +105,7 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
 
 
 def _sustained_rotation(pendulum: Pendulum) -> list[str]:
-    """Say what keeps starts undecided where dry friction alone damps a driven pendulum.
-
-    Friction of one sense is a constant torque, which keeps phase area: only where the motion turns
-    back does the area shrink.
-    """
+    """Return a line where dry friction alone damps: of one sense it keeps phase area."""
     dry = _dry(pendulum)
     if dry is None or dry[0] == 0 or pendulum.p == 0:
         return []
@@ -143,7 +133,7 @@ def _dry(pendulum: Pendulum) -> tuple[float, float] | None:
 
 
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
-    """Say after how many periods a start is undecided, and what can be done about it."""
+    """Return after how many periods a start is undecided, and what raises the bound."""
     undecided = dataset["label"] == 0
     if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
         return ": they stand exactly on an unstable rest, where nothing moves them"
@@ -154,7 +144,7 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
 
 
 def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
-    """Return which starts hang, or stand upside down, without moving: rest whatever the drive."""
+    """Return which starts are at rest, hanging or inverted, whatever the drive."""
     of = "start_" if "start_theta" in dataset else ""
     hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
     alone = dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]"
@@ -163,7 +153,7 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _window(dataset: xr.Dataset) -> str:
-    """Say which starts the numbers are of: a selection of the map keeps them."""
+    """Return the window of the map; a selection of the map keeps its numbers."""
     theta, velocity = (
         tuple(dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]) for name in ("theta", "velocity")
     )
@@ -172,10 +162,7 @@ def _window(dataset: xr.Dataset) -> str:
 
 
 def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Units) -> str:
-    """Return a window of starts in words, and whether it is the default one.
-
-    ``[-pi, pi] x [-3, 3]``, in SI ``[-pi, pi] x [-3 w0, 3 w0]``: the same motions either way.
-    """
+    """Return a window of starts in words, and whether it is the default one."""
     usual = (math.pi, units.given(FASTEST, VELOCITY))
     default = all(
         np.allclose(span, (-reach, reach), rtol=1e-12)
@@ -188,7 +175,7 @@ def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Un
 
 
 def box_said(attrs: Mapping[Any, Any]) -> str:
-    """Return in words where the starts of a search over many pendulums lie."""
+    """Return the box of the starts of a search over many pendulums in words."""
     theta, velocity = (
         (float(attrs[f"low_{name}"]), float(attrs[f"high_{name}"]))
         for name in ("theta", "velocity")
@@ -205,10 +192,10 @@ def _conservative(dataset: xr.Dataset) -> str:
 
 
 def most_missed(starts: int) -> float:
-    """Return the largest share of starts that ``starts`` drawn at random all miss, at 95 %.
+    """Return the largest share that ``starts`` random starts all miss, at 95 %.
 
-    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none out of
-    ``starts`` (Clopper & Pearson 1934, Biometrika 26, 404; one-sided).
+    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none (Clopper &
+    Pearson 1934, Biometrika 26, 404; one-sided).
     """
     return 1 - math.pow(0.05, 1 / starts)
 
@@ -268,7 +255,7 @@ def _own_period(attrs: Mapping[Any, Any]) -> str:
 
 
 def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
-    """Say how fractal the boundary is, as far as there is one."""
+    """Return lines on how fractal the boundary is."""
     lines = []
     if "boundary_basin_entropy" in attrs:
         value = attrs["boundary_basin_entropy"]

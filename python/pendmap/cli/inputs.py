@@ -1,4 +1,4 @@
-"""What a command reads is never written over."""
+"""A command never overwrites its inputs."""
 
 from __future__ import annotations
 
@@ -14,20 +14,7 @@ if TYPE_CHECKING:
 def keep_inputs(
     inputs: Iterable[Path | None], outputs: Mapping[str, Iterable[Path | None]]
 ) -> None:
-    """Refuse outputs that are inputs, before anything is computed.
-
-    Parameters
-    ----------
-    inputs : iterable of Path
-        What is read.
-    outputs : mapping of str to iterable of Path
-        What is written, by the option that says so.
-
-    Raises
-    ------
-    click.UsageError
-        If one is the other, whatever path leads there, or a folder that is replaced holds it.
-    """
+    """Refuse outputs, by their option, that are inputs, or folders that hold one."""
     read = [path for path in inputs if path is not None and path.exists()]
     for option, paths in outputs.items():
         for output in paths:
@@ -45,7 +32,7 @@ def _takes(output: Path, path: Path) -> bool:
 
 
 def report_files(report: Path | None) -> list[Path]:
-    """Return the files of a report, but for its figures: a folder holds one of either kind."""
+    """Return the files of a report without its figures; a folder holds one of either kind."""
     if report is None:
         return []
     in_folder = report.is_dir() or not report.suffix
