@@ -213,15 +213,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     choices = _choices(numerics, layer_periods, check=check)
     if draws is not None:
         several = drawn(pendulum, draws, seed)
-        same = partial(
-            basins,
-            grid=grid,
-            tol=tol,
-            max_periods=max_periods,
-            layer_periods=layer_periods,
-            threads=threads,
-            seed=seed,
-        )
+        same = partial(basins, grid=grid, layer_periods=layer_periods, **numerics.options)
         own = same(pendulum, check=check, progress=part(progress, 0, len(several) + 1))
         return basins_over(own, several, partial(same, check=False), progress)
     low, high, count = grid.velocity.as_tuple

@@ -178,14 +178,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError("both or none of theta and velocity must be given, got one")
     if draws is not None:
         several = drawn(model, draws, seed)
-        same = partial(
-            lifetime,
-            from_period=from_period,
-            max_periods=max_periods,
-            tol=tol,
-            threads=threads,
-            seed=seed,
-        )
+        same = partial(lifetime, from_period=from_period, **numerics.options)
         first = part(progress, 0, len(several) + 1)
         own = same(model, theta, velocity, starts=starts, progress=first)
         again = partial(same, theta=own["start_theta"], velocity=own["start_velocity"])
@@ -198,17 +191,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         velocity = draw.uniform(-reach, reach, starts)
         window = window_said((-math.pi, math.pi), (-reach, reach), units)
     angles, speeds = checked(theta, velocity)
-    found = basins_of(
-        model,
-        angles,
-        speeds,
-        tol=tol,
-        max_periods=max_periods,
-        threads=threads,
-        seed=seed,
-        check=False,
-        progress=progress,
-    )
+    found = basins_of(model, angles, speeds, check=False, progress=progress, **numerics.options)
     label = found["label"].values.astype(np.int64)
     settle = found["settle_periods"].values.astype(np.int64)
     times = settle[settle >= 0]

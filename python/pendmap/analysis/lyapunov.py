@@ -314,7 +314,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         if a["end"] == "chaotic" and a["stderr"] > aim:
             lines.append(f"THE PRECISION {a['precision']:g} WAS NOT REACHED: raise --max-periods.")
     elif math.isfinite(value):
-        exact = "exact, from the multipliers" if len(_pairs(dataset)) else "exactly"
+        pairs = dataset["multipliers"].values
+        exact = "exact, from the multipliers" if not np.isnan(pairs).all() else "exactly"
         lines.append(
             f"Largest Lyapunov exponent {value:.9g} {per}, {a['per_period']:.9g} per period: "
             f"{exact}."
@@ -322,12 +323,6 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if not (math.isfinite(value) and math.isnan(a["stderr"])):
         lines += _other(a, units)
     return [*lines, effort(a)]
-
-
-def _pairs(dataset: xr.Dataset) -> list[Any]:
-    if not dataset.sizes["attractor"]:
-        return []
-    return [pair for pair in dataset["multipliers"].values[0] if pair[0] == pair[0]]
 
 
 def _ended(dataset: xr.Dataset, name: str) -> list[str]:

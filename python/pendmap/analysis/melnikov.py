@@ -177,7 +177,10 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
     still = dataclasses.replace(pendulum, p=0.0)
     forward = separatrix()
     orbits = {"forward": forward, "backward": forward.mirrored()}
-    won = {name: _work(still, orbit, 0.0) for name, orbit in orbits.items()}
+    won = {
+        name: float((_power(still, orbit, np.zeros(1)) @ orbit.weight)[0])
+        for name, orbit in orbits.items()
+    }
     # A torque gives 2 pi times itself on one branch and takes it on the other.
     torque = (won["forward"] - won["backward"]) / (4 * math.pi)
     if abs(torque) >= 1 - _ROUNDING:
@@ -198,10 +201,6 @@ def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
     tau = (orbit.time + at[:, None]).ravel()
     acceleration = _core.acceleration(pendulum.parameters, tau, theta, speed)
     return (speed * (acceleration + np.sin(theta) - orbit.torque)).reshape(at.size, -1)
-
-
-def _work(pendulum: Pendulum, orbit: Orbit, at: float) -> float:
-    return float((_power(pendulum, orbit, np.array([at])) @ orbit.weight)[0])
 
 
 def _threshold(pendulum: Pendulum, omega: float, orbit: Orbit) -> float:

@@ -35,6 +35,15 @@ class Choices(TypedDict):
     seed: int
 
 
+class Options(TypedDict):
+    """Numerical choices as the analyses take them."""
+
+    tol: float
+    max_periods: int | None
+    threads: int | None
+    seed: int
+
+
 @dataclasses.dataclass(frozen=True)
 class Numerics:
     """Numerical choices of an analysis, checked as they are made."""
@@ -62,14 +71,19 @@ class Numerics:
         return self.threads or 0
 
     @property
-    def core(self) -> Choices:
-        """The choices as the core takes them."""
+    def options(self) -> Options:
+        """The choices as keyword arguments of another analysis."""
         return {
             "tol": self.tol,
             "max_periods": self.max_periods,
-            "threads": self.workers,
+            "threads": self.threads,
             "seed": self.seed,
         }
+
+    @property
+    def core(self) -> Choices:
+        """The choices as the core takes them."""
+        return {**self.options, "threads": self.workers}
 
     def provenance(self) -> dict[str, Any]:
         """Return the attributes that say how a result was computed, from ``began`` until now."""

@@ -171,16 +171,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     curves = check_flag("curves", curves)
     if draws is not None:
         several = drawn(model, draws, seed)
-        same = partial(
-            parameter_map,
-            ranges=ranges,
-            starts=starts,
-            box=search.within(units),
-            tol=tol,
-            max_periods=max_periods,
-            threads=threads,
-            seed=seed,
-        )
+        box = search.within(units)
+        same = partial(parameter_map, ranges=ranges, starts=starts, box=box, **numerics.options)
         own = same(model, curves=curves, progress=part(progress, 0, len(several) + 1))
         return regimes_over(own, several, same, progress)
     over = None

@@ -65,7 +65,7 @@ class Schema:
         dataset: xr.Dataset,
         model: Pendulum | Rig,
         values: Mapping[str, Any],
-        raw: Mapping[str, Any] | None = None,
+        raw: object = None,
     ) -> None:
         """Set the attributes of a dataset: values given, else those of the core's result."""
         values = {"section": model.units.section, **values}
@@ -74,7 +74,8 @@ class Schema:
             if field.name in values or field.read is not None:
                 value = values.get(field.name)
             else:
-                value = (raw or {}).get(field.core or field.name)
+                key = field.core or field.name
+                value = raw.get(key) if isinstance(raw, dict) else getattr(raw, key, None)
             if value is not None:
                 dataset.attrs[field.name] = value
 

@@ -42,23 +42,32 @@ def of_model(model: Pendulum | Rig, what: str) -> list[str]:
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
     """Return the findings of a basin map, whose attributes are set, a sentence a line."""
-    plane = dataset.attrs["plane"]
+    a, plane = dataset.attrs, dataset.attrs["plane"]
     unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
-        lines = [_conservative(dataset)]
+        line = (
+            "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
+            "and the finite-time exponent after "
+            f"{counted(a['layer_periods'], 'period')} are shown instead."
+        )
+        lines = [line]
     elif plane == "only_chaos":
         lines = [_only_chaos(dataset)]
     else:
         lines = [*_attractors(dataset), *_settling(dataset), *_texture(dataset)]
     for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
-        share = dataset.attrs[key]
+        share = a[key]
         if share > 0 and plane != "conservative":
             bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
             bound = bound.split(";")[0] if unlimited else bound  # no bound helps
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
-    a = dataset.attrs
     if "theta" in dataset.dims:
-        lines.insert(0, _window(dataset))
+        theta, velocity = (
+            tuple(dataset[f"{name}_bounds"].values[[0, -1], [0, 1]])
+            for name in ("theta", "velocity")
+        )
+        window = window_said(theta, velocity, Units.of(a))
+        lines.insert(0, f"{window}: {counted(a['cells'], 'start')}.")
     if plane != "conservative":
         lines += unlimited
         if not unlimited and a["undecided"] > 0:
@@ -152,15 +161,6 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
     return still
 
 
-def _window(dataset: xr.Dataset) -> str:
-    """Return the window of the map; a selection of the map keeps its numbers."""
-    theta, velocity = (
-        tuple(dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]) for name in ("theta", "velocity")
-    )
-    said = window_said(theta, velocity, Units.of(dataset.attrs))
-    return f"{said}: {counted(dataset.attrs['cells'], 'start')}."
-
-
 def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Units) -> str:
     """Return a window of starts in words, and whether it is the default one."""
     usual = (math.pi, units.given(FASTEST, VELOCITY))
@@ -181,14 +181,6 @@ def box_said(attrs: Mapping[Any, Any]) -> str:
         for name in ("theta", "velocity")
     )
     return f"in {window_said(theta, velocity, Units.of(attrs))}"
-
-
-def _conservative(dataset: xr.Dataset) -> str:
-    return (
-        "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
-        "and the finite-time exponent after "
-        f"{counted(dataset.attrs['layer_periods'], 'period')} are shown instead."
-    )
 
 
 def most_missed(starts: int) -> float:
@@ -242,16 +234,12 @@ def _settling(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     if a["longest_settle"] < 0:
         return []
-    own = (
-        "" if is_driven(a["p"], effects_of(a)) else f" (without drive a period is {_own_period(a)})"
-    )
+    own, units = "", Units.of(a)
+    if not is_driven(a["p"], effects_of(a)):
+        time = f" = {units.given(math.tau, TIME):.4g} s" if units.si else ""
+        own = f" (without drive a period is {units.own_period}{time})"
     times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
     return [f"Settling takes {times}{own}."]
-
-
-def _own_period(attrs: Mapping[Any, Any]) -> str:
-    units = Units.of(attrs)
-    return f"{units.own_period} = {units.given(math.tau, TIME):.4g} s" if units.si else "2 pi"
 
 
 def _boundary(attrs: Mapping[Any, Any]) -> list[str]:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import click
 
-from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
     json_option,
+    keep_inputs,
     plot_option,
     quiet_option,
     rate_option,

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.inputs import keep_inputs, report_files
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
     check_view,
     json_option,
+    keep_inputs,
     plot_option,
     quiet_option,
     rate_option,
@@ -129,7 +129,7 @@ def command(  # noqa: PLR0913 (an option each)
         {
             "--out": [outputs[0]],
             "--plot": [plot],
-            "--report": report_files(report),
+            "--report": _report_files(report),
             "--rerun": [rerun],
         },
     )
@@ -169,6 +169,14 @@ def _named(where: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def _report_files(report: Path | None) -> list[Path]:
+    """Return the files of a report without its figures; a folder holds one of either kind."""
+    if report is None:
+        return []
+    in_folder = report.is_dir() or not report.suffix
+    return [report / "report.html", report / "report.md"] if in_folder else [report]
 
 
 def _files(

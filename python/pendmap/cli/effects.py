@@ -106,12 +106,9 @@ def _parameter(parameter: EffectParameter) -> str:
 
 def _example(effect: EffectDefinition) -> dict[str, Any]:
     """Return an effect of usual size as a table of a model file."""
-    return {
-        "name": effect.name,
-        "parameters": {p.name: _usual(*p.typical) for p in effect.parameters},
-    }
-
-
-def _usual(low: float, high: float) -> float:
-    """Return a round value between two."""
-    return float(f"{math.sqrt(low * high) if low > 0 else high / 2:.1g}")
+    sizes = {}
+    for parameter in effect.parameters:
+        low, high = parameter.typical
+        middle = math.sqrt(low * high) if low > 0 else high / 2
+        sizes[parameter.name] = float(f"{middle:.1g}")
+    return {"name": effect.name, "parameters": sizes}

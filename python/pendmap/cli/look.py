@@ -8,8 +8,13 @@ from pathlib import Path
 
 import click
 
-from pendmap.cli.inputs import keep_inputs
-from pendmap.cli.options import json_option, plot_option, quiet_option, rate_option
+from pendmap.cli.options import (
+    json_option,
+    keep_inputs,
+    plot_option,
+    quiet_option,
+    rate_option,
+)
 from pendmap.cli.show import Written, progress_bar, write_all, write_json
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.types import (
     NUMBER,
     PICTURES,
@@ -22,7 +21,7 @@ from pendmap.errors import MOST_CELLS, MOST_DRAWS, MOST_PERIODS, MOST_SEED, MOST
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
     Command = Callable[..., Any]
@@ -205,3 +204,22 @@ class Outputs:
     def shows_progress(self) -> bool:
         """Whether stderr is a terminal and --quiet is not given."""
         return sys.stderr.isatty() and not self.quiet
+
+
+def keep_inputs(
+    inputs: Iterable[Path | None], outputs: Mapping[str, Iterable[Path | None]]
+) -> None:
+    """Refuse outputs, by their option, that are inputs, or folders that hold one."""
+
+    def lost(path: Path, output: Path) -> bool:
+        places = [path, *path.resolve().parents] if output.is_dir() else [path]
+        return any(output.samefile(place) for place in places)
+
+    read = [path for path in inputs if path is not None and path.exists()]
+    for option, paths in outputs.items():
+        for output in paths:
+            if output is not None and output.exists() and any(lost(path, output) for path in read):
+                raise click.UsageError(
+                    f"Invalid value for '{option}': {str(output)!r}: is an input, which would be "
+                    "lost: it must be another file"
+                )

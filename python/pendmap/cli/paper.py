@@ -86,13 +86,8 @@ def _files(
         if path.suffix != ".csv":
             yield functools.partial(figures.draw, key, seed=seed), path
         if key == figures.TABLE:
-            yield functools.partial(_write_table, seed), path.with_suffix(".csv")
-
-
-def _write_table(seed: int, path: Path) -> Path:
-    from pendmap.paper import figures
-
-    return figures.write_table(figures.report(seed), path)
+            table = path.with_suffix(".csv")
+            yield lambda to: figures.write_table(figures.report(seed), to), table
 
 
 def _say(found: IdentificationReport) -> None:
