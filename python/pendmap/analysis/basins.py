@@ -268,7 +268,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     Returns
     -------
     xarray.Dataset
-        As of :func:`basins`, with the dimension ``start`` instead of the grid; there is no basin
+        As for :func:`basins`, with the dimension ``start`` instead of the grid; there is no basin
         entropy.
 
     Raises
@@ -343,19 +343,17 @@ def _uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
     """Return counts of starts whose label changes nearby; none without a boundary."""
     if not raw["uncertainty_eps"].size:
         return {}
-    eps, uncertain, tried = (
-        raw[name] for name in ("uncertainty_eps", "uncertain", "uncertainty_tried")
-    )
+    what = "distance in sides of the window"
     return {
-        "uncertainty_eps": variable("distance", eps, "1", "distance in sides of the window"),
+        "uncertainty_eps": variable("distance", raw["uncertainty_eps"], "1", what),
         "uncertain": variable(
             "distance",
-            uncertain.astype(np.int64),
+            raw["uncertain"].astype(np.int64),
             long_name="starts with another label at this distance on one side or the other",
         ),
         "uncertainty_tried": variable(
             "distance",
-            tried.astype(np.int64),
+            raw["uncertainty_tried"].astype(np.int64),
             long_name="starts with known ends, drawn anew for each distance; where drawn by "
             "strata, as many drawn evenly as tell the share as precisely",
         ),

@@ -88,21 +88,21 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum : Pendulum or Rig
         The model; the parameter that varies replaces its own.
     ranges : mapping of str to (float, float, int)
-        One parameter with first value, last value (both included) and how many; names as of
+        One parameter with first value, last value (both included) and how many; names as for
         :func:`pendmap.parameter_map`.
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
     starts, box, tol, max_periods, threads, seed, progress
-        As of :func:`pendmap.parameter_map`.
+        As for :func:`pendmap.parameter_map`.
 
     Returns
     -------
     xarray.Dataset
         Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
-        ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
+        ``point_entry``; attractors over ``entry`` as for :func:`pendmap.parameter_map`, with
         ``entry_value`` and ``entry_branch``; ``undecided``, ``failed`` and ``chaos_periods`` over
-        the parameter as of that function; branches over ``branch``: ``branch_kind``,
+        the parameter as for that function; branches over ``branch``: ``branch_kind``,
         ``branch_w``, ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the
         entry that the sweep is on, -1 where that is none of them; its points there over ``loose``.
 

@@ -49,7 +49,7 @@ _MOST_LABELS: Final = 32_767
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class UncertaintyExponent(Readable):
-    """The exponent of ``f(eps) ~ eps^value``, and what it was found from.
+    """Exponent of ``f(eps) ~ eps^value``, and the counts that it was fitted to.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class UncertaintyExponent(Readable):
     unit : str
         ``"window"`` (sides of the window) or ``"cell"``.
     scales : int
-        The law was fitted to so many of the distances, the smallest ones.
+        Number of distances, the smallest ones, that the law was fitted to.
     """
 
     value: float

@@ -143,14 +143,14 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Number of models drawn from the model's ``[covariance]``, each computed too: the interval
         of the mean lifetime (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
     max_periods, tol, threads, progress
-        As of :func:`pendmap.basins`.
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
     xarray.Dataset
         ``captured`` over ``attractor`` and ``elapsed``: the number that each attractor has captured
-        within so many periods. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, what the mean
-        would be from other beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
+        up to a period. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, the mean from other
+        beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
         never) and ``label`` over ``start``. Attributes ``mean_periods``, ``stderr``,
         ``from_period``, ``persistent`` (1 where every start ends on chaos; ``exponent`` is that of
         the most chaotic attractor then), ``transient_chaos``, ``escape_rate`` and ``entropy`` per

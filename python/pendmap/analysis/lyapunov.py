@@ -119,7 +119,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed : int
         Chooses the trajectories on a chaotic attractor.
     tol, threads, progress
-        As of :func:`pendmap.basins`.
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         start's own trajectory. Of chaos ``running_exponent`` and ``running_stderr`` over
         ``averaged``, the periods that each trajectory has been averaged for, and
         ``finite_time_exponent`` over ``trajectory`` and ``window``. The attractor with its points,
-        as of :func:`pendmap.basins`. Attributes ``exponent``, ``stderr`` (0 where the exponent is
+        as for :func:`pendmap.basins`. Attributes ``exponent``, ``stderr`` (0 where the exponent is
         exact, nan for regular motion without damping), ``regular`` (what such
         motion has over the same time), ``per_period``, ``end``
         (``captured``, ``chaotic``, ``undamped``, ``undecided`` or ``failed``),

@@ -120,7 +120,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         how far orbits move, and in how many draws they exist and are stable
         (:func:`pendmap.analysis.draws.orbits.orbits_over`).
     threads, seed, progress
-        As of :func:`pendmap.basins`.
+        As for :func:`pendmap.basins`.
 
     Returns
     -------

@@ -120,7 +120,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     box : Grid, optional
         Where they lie; by default that of :func:`pendmap.basins`.
     tol : float
-        As of :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
+        As for :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
         with the period and the drive's pull.
     max_periods : int, optional
         Periods after which trajectories begin to be watched; by default until damping would have
@@ -135,7 +135,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         probability of each regime in each cell
         (:func:`pendmap.analysis.draws.parameter_map.regimes_over`).
     threads, progress
-        As of :func:`pendmap.basins`.
+        As for :func:`pendmap.basins`.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a result says of itself: attributes of the dataset and keys of the JSON, from one table."""
+"""Schema of a result: attributes of its dataset and keys of its JSON object, from one table."""
 
 from __future__ import annotations
 
@@ -106,12 +106,12 @@ def variable(
 
 
 def none_below_0(value: float) -> float | None:
-    """Return a number, None where it is -1: what never happened."""
+    """Return a number, None where it is -1: an event that never happened."""
     return None if value < 0 else value
 
 
 def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
-    """Return the JSON key ``draws``: how many models were drawn, and what they say; else null."""
+    """Return the JSON key ``draws``: the drawn models and their results, null without draws."""
 
     def read(dataset: xr.Dataset) -> dict[str, Any] | None:
         a = dataset.attrs
@@ -149,7 +149,7 @@ OWN: Final = (
 )
 RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
 UNSAID: Final = (VERSION.hidden, FORMAT.hidden)
-"""Versions of kinds whose JSON object leaves them out."""
+"""Versions as attributes alone."""
 SUMMARY: Final = Field(
     "summary", "", "findings, a sentence a line", convert=lambda text: text.split("\n")
 )

@@ -1,4 +1,4 @@
-"""What a basin map says, in a few lines of text."""
+"""Summary of a basin map, and lines that several summaries share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A parameter that varies: which of the model's it is, and its values."""
+"""Parameters that vary, and the search for attractors at each of their values."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Varied:
     """A parameter and the values that it takes: ascending, evenly spaced."""
 
     name: str
-    """As of :func:`pendmap.parameter_map`."""
+    """As for :func:`pendmap.parameter_map`."""
     values: NDArray[np.float64]
     """In the parameter's own units."""
     index: int

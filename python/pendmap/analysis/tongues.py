@@ -156,7 +156,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         the band of each critical amplitude
         (:func:`pendmap.analysis.draws.tongues.tongues_over`).
     threads, seed, progress
-        As of :func:`pendmap.basins`.
+        As for :func:`pendmap.basins`.
 
     Returns
     -------

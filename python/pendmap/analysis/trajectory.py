@@ -366,7 +366,7 @@ def advance(  # noqa: PLR0913
     steps_per_period : int, optional
         Steps a period; by default as ``tol`` asks.
     tol, threads, progress
-        As of :func:`pendmap.basins`.
+        As for :func:`pendmap.basins`.
 
     Returns
     -------

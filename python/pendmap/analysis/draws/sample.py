@@ -1,4 +1,4 @@
-"""Models drawn from the covariance that a model file holds."""
+"""Models drawn from the covariance of a model file."""
 
 from __future__ import annotations
 
