@@ -13,131 +13,130 @@ TYPE_CHECKING = False  # importing typing takes most of the time that this file 
 if TYPE_CHECKING:
     from typing import Any
 
-    from pendmap.analysis.basins import basins, basins_of
-    from pendmap.analysis.bifurcation import bifurcation
-    from pendmap.analysis.fractality import (
-        BasinEntropy,
-        UncertaintyExponent,
-        basin_entropy,
-        uncertainty_exponent,
-    )
-    from pendmap.analysis.grid import Axis, Grid
-    from pendmap.analysis.lifetime import lifetime
-    from pendmap.analysis.lyapunov import lyapunov
-    from pendmap.analysis.melnikov import melnikov
-    from pendmap.analysis.orbits import orbit
-    from pendmap.analysis.parameter_map import parameter_map
-    from pendmap.analysis.tongues import tongues
-    from pendmap.analysis.trajectory import advance, simulate
-    from pendmap.errors import FitDiverged, InputError
-    from pendmap.files.dataset import load, save
-    from pendmap.model import (
-        PRESETS,
-        Effect,
-        Formula,
-        Pendulum,
-        Rig,
-        load_formulas,
-        load_model,
-        save_model,
-    )
-    from pendmap.model.library import EffectDefinition, EffectParameter, effects
-    from pendmap.records import (
-        Experiment,
-        Finding,
-        NoiseFloor,
-        Run,
-        Segment,
-        noise_floor,
-        read_experiment,
-    )
+    from pendmap.analysis.basins import basins as basins
+    from pendmap.analysis.basins import basins_of as basins_of
+    from pendmap.analysis.bifurcation import bifurcation as bifurcation
+    from pendmap.analysis.fractality import BasinEntropy as BasinEntropy
+    from pendmap.analysis.fractality import UncertaintyExponent as UncertaintyExponent
+    from pendmap.analysis.fractality import basin_entropy as basin_entropy
+    from pendmap.analysis.fractality import uncertainty_exponent as uncertainty_exponent
+    from pendmap.analysis.grid import Axis as Axis
+    from pendmap.analysis.grid import Grid as Grid
+    from pendmap.analysis.lifetime import lifetime as lifetime
+    from pendmap.analysis.lyapunov import lyapunov as lyapunov
+    from pendmap.analysis.melnikov import melnikov as melnikov
+    from pendmap.analysis.orbits import orbit as orbit
+    from pendmap.analysis.parameter_map import parameter_map as parameter_map
+    from pendmap.analysis.tongues import tongues as tongues
+    from pendmap.analysis.trajectory import advance as advance
+    from pendmap.analysis.trajectory import simulate as simulate
+    from pendmap.errors import FitDiverged as FitDiverged
+    from pendmap.errors import InputError as InputError
+    from pendmap.files.dataset import load as load
+    from pendmap.files.dataset import save as save
+    from pendmap.model import PRESETS as PRESETS
+    from pendmap.model import Effect as Effect
+    from pendmap.model import Formula as Formula
+    from pendmap.model import Pendulum as Pendulum
+    from pendmap.model import Rig as Rig
+    from pendmap.model import load_formulas as load_formulas
+    from pendmap.model import load_model as load_model
+    from pendmap.model import save_model as save_model
+    from pendmap.model.library import EffectDefinition as EffectDefinition
+    from pendmap.model.library import EffectParameter as EffectParameter
+    from pendmap.model.library import effects as effects
+    from pendmap.records import Experiment as Experiment
+    from pendmap.records import Finding as Finding
+    from pendmap.records import NoiseFloor as NoiseFloor
+    from pendmap.records import Run as Run
+    from pendmap.records import Segment as Segment
+    from pendmap.records import noise_floor as noise_floor
+    from pendmap.records import read_experiment as read_experiment
 
     __version__: str
 
-__all__ = [
-    "PRESETS",
-    "Axis",
-    "BasinEntropy",
-    "Effect",
-    "EffectDefinition",
-    "EffectParameter",
-    "Experiment",
-    "Finding",
-    "FitDiverged",
-    "Formula",
-    "Grid",
-    "InputError",
-    "NoiseFloor",
-    "Pendulum",
-    "Rig",
-    "Run",
-    "Segment",
-    "UncertaintyExponent",
-    "__version__",
-    "advance",
-    "basin_entropy",
-    "basins",
-    "basins_of",
-    "bifurcation",
-    "effects",
-    "lifetime",
-    "load",
-    "load_formulas",
-    "load_model",
-    "lyapunov",
-    "melnikov",
-    "noise_floor",
-    "orbit",
-    "parameter_map",
-    "read_experiment",
-    "save",
-    "save_model",
-    "simulate",
-    "tongues",
-    "uncertainty_exponent",
-]
-
-_HOMES = {
-    "Axis": "analysis.grid",
-    "BasinEntropy": "analysis.fractality",
-    "Effect": "model",
-    "EffectDefinition": "model.library",
-    "EffectParameter": "model.library",
-    "Experiment": "records",
-    "Finding": "records",
-    "Formula": "model",
-    "Grid": "analysis.grid",
-    "FitDiverged": "errors",
-    "InputError": "errors",
-    "NoiseFloor": "records",
-    "PRESETS": "model",
-    "Pendulum": "model",
-    "Rig": "model",
-    "Run": "records",
-    "Segment": "records",
-    "UncertaintyExponent": "analysis.fractality",
-    "advance": "analysis.trajectory",
-    "basin_entropy": "analysis.fractality",
-    "basins": "analysis.basins",
-    "basins_of": "analysis.basins",
-    "bifurcation": "analysis.bifurcation",
-    "effects": "model.library",
-    "lifetime": "analysis.lifetime",
-    "load": "files.dataset",
-    "load_formulas": "model",
-    "load_model": "model",
-    "lyapunov": "analysis.lyapunov",
-    "melnikov": "analysis.melnikov",
-    "noise_floor": "records",
-    "orbit": "analysis.orbits",
-    "parameter_map": "analysis.parameter_map",
-    "read_experiment": "records",
-    "save": "files.dataset",
-    "save_model": "model",
-    "simulate": "analysis.trajectory",
-    "tongues": "analysis.tongues",
-    "uncertainty_exponent": "analysis.fractality",
+ANALYSES = {
+    "trajectory": (
+        "simulate",
+        ["simulate"],
+        "Integrate one trajectory: time history, phase plane, Poincaré section.",
+    ),
+    "basins": ("basins", ["basins", "basins_of"], "Map the basins of attraction."),
+    "parameter_map": (
+        "map",
+        ["parameter_map"],
+        "Map which attractors exist over two parameters.",
+    ),
+    "bifurcation": (
+        "bifurcation",
+        ["bifurcation"],
+        "Draw stroboscopic points against a parameter, with hysteresis.",
+    ),
+    "orbits": (
+        "orbit",
+        ["orbit"],
+        "Find all periodic orbits of one period and winding, stable and unstable.",
+    ),
+    "lyapunov": (
+        "lyapunov",
+        ["lyapunov"],
+        "Find the largest Lyapunov exponent of the attractor that a start reaches.",
+    ),
+    "lifetime": (
+        "lifetime",
+        ["lifetime"],
+        "Measure how long transient chaos lives, or find that it persists.",
+    ),
+    "tongues": (
+        "tongues",
+        ["tongues"],
+        "Find where rest loses its stability: critical curves in two planes.",
+    ),
+    "melnikov": (
+        "melnikov",
+        ["melnikov"],
+        "Compute the homoclinic threshold by Melnikov's criterion.",
+    ),
 }
+"""Kind of result, the name of its module too: command, functions that return it, what it does."""
+
+_OTHERS = {
+    "analysis.fractality": [
+        "BasinEntropy",
+        "UncertaintyExponent",
+        "basin_entropy",
+        "uncertainty_exponent",
+    ],
+    "analysis.grid": ["Axis", "Grid"],
+    "analysis.trajectory": ["advance"],
+    "errors": ["FitDiverged", "InputError"],
+    "files.dataset": ["load", "save"],
+    "model": [
+        "PRESETS",
+        "Effect",
+        "Formula",
+        "Pendulum",
+        "Rig",
+        "load_formulas",
+        "load_model",
+        "save_model",
+    ],
+    "model.library": ["EffectDefinition", "EffectParameter", "effects"],
+    "records": [
+        "Experiment",
+        "Finding",
+        "NoiseFloor",
+        "Run",
+        "Segment",
+        "noise_floor",
+        "read_experiment",
+    ],
+}
+_HOMES = {
+    **{name: home for home, names in _OTHERS.items() for name in names},
+    **{name: f"analysis.{kind}" for kind, (_, names, _) in ANALYSES.items() for name in names},
+}
+__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (a list)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)

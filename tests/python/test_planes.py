@@ -13,9 +13,8 @@ import xarray as xr
 import pendmap
 from drawn import made, named, titles
 from pendmap import Effect, Grid, Pendulum, Rig, figures
-from pendmap.analysis.parameter_map import undecided_cells
 from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.sweep import spread
+from pendmap.analysis.sweep import spread, undecided_cells
 from pendmap.charts import parameter_map as drawn
 from recordings import recorded
 

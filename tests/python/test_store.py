@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING
 
 import pytest
@@ -96,3 +97,10 @@ def test_every_kind_of_result_has_its_functions_its_figure_and_its_recording() -
         for name in functions:
             assert callable(getattr(pendmap, name))
             assert f" {name}" in str(refused.value)
+
+
+@pytest.mark.parametrize("kind", pendmap.ANALYSES)
+def test_an_analysis_has_one_name_in_module_dataset_and_command(kind: str) -> None:
+    command, *_ = pendmap.ANALYSES[kind]
+    assert importlib.import_module(f"pendmap.analysis.{kind}").SCHEMA.kind == kind
+    assert importlib.import_module(f"pendmap.cli.{command}").command.name == command

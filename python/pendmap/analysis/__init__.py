@@ -1,1 +1,1 @@
-"""Analyses of one pendulum: one module a command."""
+"""Analyses of a pendulum, one a module: :data:`pendmap.ANALYSES` lists them."""

@@ -1,48 +1,116 @@
-"""Maps of whole planes as labelled datasets."""
+"""Basins of attraction: which attractor each initial condition of a plane, or a list, reaches."""
 
 from __future__ import annotations
 
 import math
-import time
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import orbit_table
+from pendmap.analysis import orbit_table, result
 from pendmap.analysis.draws import drawn, part
 from pendmap.analysis.draws.basins import basins_over
+from pendmap.analysis.draws.basins import fields as drawn_fields
 from pendmap.analysis.fractality import fitted_map, passes_log2
 from pendmap.analysis.grid import Grid, coordinate, starts
+from pendmap.analysis.numerics import Numerics, optional_whole
+from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, variable
 from pendmap.analysis.summary import summarise
-from pendmap.errors import (
-    MOST_PERIODS,
-    MOST_SEED,
-    MOST_THREADS,
-    check_callable,
-    check_flag,
-    check_number,
-    check_whole,
-    core_errors,
-)
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.errors import MOST_PERIODS, check_flag, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike
 
+    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
-
-    Progress = Callable[[int, int], object]
 
 
 DEFAULT_CELLS = 1000
-"""Cells on each side of a map where nothing is said."""
+"""Cells on each side of a map where nothing is given."""
+RELIABLE: Final = 0.05
+"""Share of labels changed by half the step or mirroring above which labels are not reliable."""
+_LAYERS: Final = {
+    "basins": "labels",
+    "only_chaos": "finite_time",
+    "conservative": "finite_time",
+}
+
+
+def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the attractors with their shares for the JSON object."""
+    return [
+        orbit_table.row(dataset, "attractor", k)
+        | {name: float(dataset[name].values[k]) for name in ("fraction", "stderr")}
+        for k in range(dataset.sizes["attractor"])
+    ]
+
+
+def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
+    """Return the uncertainty exponent of the boundary for the JSON object."""
+    a = dataset.attrs
+    if "uncertainty_exponent" not in a:
+        return None
+    value = a["uncertainty_exponent"]
+    low, high = (a[f"uncertainty_exponent_{end}"] for end in ("low", "high"))
+    return {
+        "value": value,
+        "stderr": a["uncertainty_exponent_stderr"],
+        "ci95": [low, high],
+        "dimension": 2 - value,
+        "dimension_ci95": [2 - high, 2 - low],
+        "eps": [a["uncertainty_eps_low"], a["uncertainty_eps_high"]],
+    }
+
+
+SCHEMA = Schema(
+    "basins",
+    result.UNITS,
+    Field("attractors", "", "attractors with their shares of the starts", read=_attractors),
+    Field("undecided", "1", "share of the starts that nothing captured within the bound"),
+    Field("failed", "1", "share of the starts that failed or diverged"),
+    Field("cells", "1", "starts"),
+    Field("mean_periods", "periods", "periods computed for a start, on average"),
+    result.SECONDS,
+    result.REACHED,
+    Field("basin_entropy", "nat", "mean entropy of the labels in boxes of 5 x 5 cells"),
+    Field("boundary_basin_entropy", "nat", "the same, of boxes with more than one label"),
+    Field("boundary_basin_entropy_stderr", "nat", "its standard error over those boxes"),
+    Field("unreliable", "1", "share of sampled labels that half the step or mirroring changes"),
+    Field("labels_sampled", "1", "labels checked so"),
+    Field("unreliable_half_step", "1", "share that half the step changes"),
+    Field("unreliable_mirror", "1", "share that mirroring changes; absent without the symmetry"),
+    Field("neighbours_agree", "1", "share of neighbouring cells with the same label"),
+    Field("neighbours_chance", "1", "share that would agree by chance", "chance"),
+    result.CHAOS_BOUND,
+    Field("searched_starts", "1", "starts of the search for attractors"),
+    Field("plane", "", "basins, only_chaos or conservative"),
+    Field("layer_periods", "periods", "length of the finite-time layers"),
+    result.STEPS,
+    result.BOUND,
+    result.TOL,
+    *result.RUN[1:],
+    Field("log2_criterion", "", "1 where the log 2 criterion is met: fractal", convert=bool),
+    Field("uncertainty_exponent", "1", "exponent of the uncertain share", read=_uncertainty),
+    Field("mean_settle", "periods", "mean time of capture; -1: none", convert=none_below_0),
+    Field("longest_settle", "periods", "longest time of capture; -1: none", convert=none_below_0),
+    *result.END,
+    drawn_field(drawn_fields),
+    result.SECTION,
+    Field("layers", "", "labels or finite_time: which layers tell the plane", json=False),
+    Field("boundary_boxes", "1", "boxes with more than one label", json=False),
+    Field("labels_reliable", "", "1 where labels of single cells are reliable", json=False),
+    Field("uncertainty_exponent_stderr", "1", "its standard error", json=False),
+    Field("uncertainty_exponent_low", "1", "lower end of its 95 % interval", json=False),
+    Field("uncertainty_exponent_high", "1", "upper end of its 95 % interval", json=False),
+    Field("uncertainty_eps_low", "1", "least distance, in sides of the window", json=False),
+    Field("uncertainty_eps_high", "1", "greatest distance that was fitted", json=False),
+)
 
 
 def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
@@ -95,11 +163,11 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         Whether to measure what takes further starts: labels of a sample with half the step and
         mirrored, and the share of starts whose label changes nearby.
     draws : int, optional
-        How many models are drawn from the model's ``[covariance]``, each mapped too: how probable
-        each end is in each cell, and what of the doubt is the parameters'
-        (:mod:`pendmap.analysis.draws.basins`). ``seed`` draws them.
+        Number of models drawn from the model's ``[covariance]`` with ``seed``, each mapped too:
+        the probability of each end in each cell, and the doubt that the parameters cause
+        (:mod:`pendmap.analysis.draws.basins`).
     progress : callable, optional
-        Called now and then with the number of cells done and in all.
+        Called now and then with the number of units of work done, and in all.
 
     Returns
     -------
@@ -139,23 +207,24 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     --------
     basins_of : the same for a list of starts.
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
-    check_callable("progress", progress)
-    choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
-    several = None if draws is None else drawn(model, draws, seed)
-    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
-    began = time.perf_counter()
+    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    choices = _choices(numerics, layer_periods, check=check)
+    if draws is not None:
+        several = drawn(pendulum, draws, seed)
+        same = partial(basins, grid=grid, layer_periods=layer_periods, **numerics.options)
+        own = same(pendulum, check=check, progress=part(progress, 0, len(several) + 1))
+        return basins_over(own, several, partial(same, check=False), progress)
     low, high, count = grid.velocity.as_tuple
-    slow, fast = units.bare(low, VELOCITY), units.bare(high, VELOCITY)
-    axes = grid.theta.as_tuple, (slow, fast, count)
-    raw = _call(_core.basins_grid, pendulum.parameters, *axes, choices, progress)
-    seconds = time.perf_counter() - began
-    shape = (grid.velocity.count, grid.theta.count)
-    dims = ("velocity", "theta")
+    axes = grid.theta.as_tuple, (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
+    with core_errors():
+        raw = _core.basins_grid(bare.parameters, *axes, choices, progress)
     dataset = xr.Dataset(
-        cells(raw, dims, shape, units),
+        {
+            **_cells(raw, ("velocity", "theta"), (count, grid.theta.count), units),
+            **_uncertain_starts(raw),
+        },
         coords=coordinate(
             "theta",
             grid.theta.centres,
@@ -169,17 +238,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
             {"units": units.of_velocity, "long_name": f"initial velocity {units.derivative}"},
         ),
     )
-    dataset = dataset.assign(uncertain_starts(raw))
-    dataset = complete(dataset, raw, model, choices, seconds)
-    if several is None:
-        return dataset
-
-    def again(one: Pendulum | Rig, report: Progress | None) -> xr.Dataset:
-        bounds = {"max_periods": max_periods, "layer_periods": layer_periods}
-        shared = {"tol": tol, "threads": threads, "seed": seed, "check": False}
-        return basins(one, grid, **bounds, **shared, progress=report)  # type: ignore[arg-type]
-
-    return basins_over(dataset, several, again, whole)
+    return _complete(dataset, raw, pendulum, numerics)
 
 
 def basins_of(  # noqa: PLR0913 (as for basins)
@@ -209,7 +268,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     Returns
     -------
     xarray.Dataset
-        As of :func:`basins`, with the dimension ``start`` instead of the grid; there is no basin
+        As for :func:`basins`, with the dimension ``start`` instead of the grid; there is no basin
         entropy.
 
     Raises
@@ -217,66 +276,30 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     InputError
         If the lengths differ, a start is not finite, or a value is outside its range.
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
-    check_callable("progress", progress)
+    bare, units = without_dimensions(pendulum)
+    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    choices = _choices(numerics, layer_periods, check=check)
     angles, speeds = starts(theta, velocity)
-    bare = units.bare(speeds, VELOCITY)
-    choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
-    began = time.perf_counter()
-    raw = _call(_core.basins_list, pendulum.parameters, angles, bare, choices, progress)
-    seconds = time.perf_counter() - began
+    with core_errors():
+        raw = _core.basins_list(
+            bare.parameters, angles, units.bare(speeds, VELOCITY), choices, progress
+        )
     dataset = xr.Dataset(
-        cells(raw, ("start",), angles.shape, units)
-        | {
+        {
+            **_cells(raw, ("start",), angles.shape, units),
             "start_theta": ("start", angles, {"units": "rad"}),
             "start_velocity": ("start", speeds, {"units": units.of_velocity}),
         }
     )
-    return complete(dataset, raw, model, choices, seconds)
+    return _complete(dataset, raw, pendulum, numerics)
 
 
-def _choices(  # noqa: PLR0913
-    tol: float,
-    max_periods: int | None,
-    layer_periods: int | None,
-    threads: int | None,
-    seed: int,
-    *,
-    check: bool,
-) -> _core._Choices:
-    def periods(name: str, value: int | None) -> int | None:
-        return None if value is None else check_whole(name, value, 1, MOST_PERIODS)
-
-    return {
-        "tol": check_number("tol", tol),
-        "max_periods": periods("max_periods", max_periods),
-        "layer_periods": periods("layer_periods", layer_periods),
-        "threads": 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS),
-        "seed": check_whole("seed", seed, 0, MOST_SEED),
-        "check": check_flag("check", check),
-    }
+def _choices(numerics: Numerics, layer_periods: int | None, *, check: bool) -> _core._Choices:
+    layers = optional_whole("layer_periods", layer_periods, 1, MOST_PERIODS)
+    return {**numerics.core, "layer_periods": layers, "check": check_flag("check", check)}
 
 
-def _call(function: Callable[..., dict[str, Any]], *arguments: object) -> dict[str, Any]:
-    with core_errors():
-        return function(*arguments)
-
-
-# The labelled dataset of a basin map: cells, table of attractors, attributes.
-
-
-RELIABLE: Final = 0.05
-"""Labels of which a larger share changes under half the step or mirroring are not reliable."""
-
-_LAYERS: Final = {
-    "basins": "labels",
-    "only_chaos": "finite_time",
-    "conservative": "finite_time",
-}
-
-
-def cells(
+def _cells(
     raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...], units: Units
 ) -> dict[str, Any]:
     """Return the variables with one value a start, over ``dims`` of ``shape``."""
@@ -286,147 +309,103 @@ def cells(
         when = f"after {counted(raw['layer_periods'], 'period')}"
     elif not (raw["settle"] >= 0).any():
         when = f"after {counted(raw['bound'], 'period')}"
-    label = {
-        "long_name": "attractor",
-        "comment": "number of the attractor; 0 undecided within the bound, -1 failed or diverged",
-    }
     cells: dict[str, Any] = {
-        "label": (dims, raw["label"].reshape(shape), label),
-        "settle_periods": (
+        "label": variable(
+            dims,
+            raw["label"].reshape(shape),
+            long_name="attractor",
+            comment="number of the attractor; 0 undecided within the bound, -1 failed or diverged",
+        ),
+        "settle_periods": variable(
             dims,
             raw["settle"].reshape(shape),
-            {
-                "long_name": "periods until an attractor's trap holds the trajectory",
-                "units": "1",
-                "comment": "-1 where no attractor captured it",
-            },
+            "1",
+            "periods until an attractor's trap holds the trajectory",
+            "-1 where no attractor captured it",
         ),
-        "net_turns": (
+        "net_turns": variable(
             dims,
             raw["turns"].reshape(shape),
-            {
-                "long_name": f"net turns {when}",
-                "units": "1",
-                "comment": "the angle's displacement over 2 pi, rounded",
-            },
+            "1",
+            f"net turns {when}",
+            "the angle's displacement over 2 pi, rounded",
         ),
     }
     exponent = raw["finite_time_exponent"]
     if exponent is not None:
-        attributes = {"long_name": f"finite-time Lyapunov exponent {when}", "units": units.of_rate}
         values = units.given(exponent, RATE).reshape(shape)
-        cells["finite_time_exponent"] = (dims, values, attributes)
+        name = f"finite-time Lyapunov exponent {when}"
+        cells["finite_time_exponent"] = variable(dims, values, units.of_rate, name)
     return cells
 
 
-def uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
-    """Counts of starts whose label changes nearby, over ``distance``; none without a boundary."""
+def _uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
+    """Return counts of starts whose label changes nearby; none without a boundary."""
     if not raw["uncertainty_eps"].size:
         return {}
     what = "distance in sides of the window"
     return {
-        "uncertainty_eps": ("distance", raw["uncertainty_eps"], {"units": "1", "long_name": what}),
-        "uncertain": (
+        "uncertainty_eps": variable("distance", raw["uncertainty_eps"], "1", what),
+        "uncertain": variable(
             "distance",
             raw["uncertain"].astype(np.int64),
-            {"long_name": "starts with another label at this distance on one side or the other"},
+            long_name="starts with another label at this distance on one side or the other",
         ),
-        "uncertainty_tried": (
+        "uncertainty_tried": variable(
             "distance",
             raw["uncertainty_tried"].astype(np.int64),
-            {
-                "long_name": "starts with known ends, drawn anew for each distance; where drawn by "
-                "strata, as many drawn evenly as tell the share as precisely"
-            },
+            long_name="starts with known ends, drawn anew for each distance; where drawn by "
+            "strata, as many drawn evenly as tell the share as precisely",
         ),
     }
 
 
-def complete(
-    dataset: xr.Dataset,
-    raw: dict[str, Any],
-    model: Pendulum | Rig,
-    choices: _core._Choices,
-    seconds: float,
+def _complete(
+    dataset: xr.Dataset, raw: dict[str, Any], model: Pendulum | Rig, numerics: Numerics
 ) -> xr.Dataset:
     """Add the table of attractors, all attributes and the summary to the cells."""
-    count = dataset["label"].size
-    dataset = dataset.assign(table(raw["attractors"], count, model.units)).assign_coords(
-        attractor=("attractor", np.array([a["name"] for a in raw["attractors"]], dtype=str)),
-    )
+    count, attractors = dataset["label"].size, raw["attractors"]
+    fraction = np.array([a["fraction"] for a in attractors], dtype=float)
+    stderr = np.sqrt(fraction * (1 - fraction) / max(count, 1))
+    dataset = dataset.assign(
+        {
+            **orbit_table.table(attractors, model.units, "attractor"),
+            "fraction": ("attractor", fraction),
+            "stderr": ("attractor", stderr),
+        }
+    ).assign_coords(attractor=("attractor", np.array([a["name"] for a in attractors], dtype=str)))
     settle = dataset["settle_periods"].values
     settled = settle[settle >= 0]
-    mirror = raw["unreliable_mirror"]
-    dataset.attrs = {
-        "kind": "basins",
-        "title": model.title,
-        **model.attributes,
-        "section": model.units.section,
-        "tol": choices["tol"],
-        "reached_error": raw["reached_error"],
-        "steps_per_period": raw["steps_per_period"],
-        "max_periods": raw["bound"],
-        "chaos_bound": raw["chaos_bound"],
-        "searched_starts": raw["searched_starts"],
-        "plane": raw["plane"],
+    values = {
+        **numerics.provenance(),
+        **_boundary(dataset, raw),
         "layers": _LAYERS[raw["plane"]],
-        "layer_periods": raw["layer_periods"],
         "cells": count,
-        "undecided": raw["undecided"],
-        "failed": raw["failed"],
-        "mean_periods": raw["mean_periods"],
         "mean_settle": float(settled.mean()) if settled.size else -1.0,
         "longest_settle": int(settled.max()) if settled.size else -1,
-        "basin_entropy": raw["basin_entropy"],
-        **_boundary(dataset, raw),
-        "neighbours_agree": raw["neighbours_agree"],
-        "neighbours_chance": raw["chance"],
-        "unreliable": raw["unreliable"],
-        "unreliable_half_step": raw["unreliable_half_step"],
-        **({} if mirror is None else {"unreliable_mirror": mirror}),
-        "labels_sampled": raw["labels_sampled"],
         "labels_reliable": int(raw["unreliable"] <= RELIABLE),
-        "seconds": seconds,
-        "simd": raw["simd"],
-        "threads": choices["threads"] or _core.default_threads(),
-        "seed": choices["seed"],
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    chosen = choices["max_periods"] is None
+    SCHEMA.complete(dataset, model, values, raw)
     pendulum, _ = without_dimensions(model)
+    chosen = numerics.max_periods is None
     dataset.attrs["summary"] = summarise(dataset, pendulum, bound_was_chosen=chosen)
     return dataset
 
 
-def _boundary(dataset: xr.Dataset, raw: dict[str, Any]) -> dict[str, float]:
-    """What tells how fractal the boundary is, as far as there is one."""
-    found: dict[str, float] = {}
+def _boundary(dataset: xr.Dataset, raw: dict[str, Any]) -> dict[str, float | None]:
+    """Return the measures of a fractal boundary; None or nothing where there is no boundary."""
+    found: dict[str, float | None] = {"boundary_basin_entropy": None, "boundary_boxes": None}
     if raw["boundary_boxes"]:
-        found["boundary_basin_entropy"] = raw["boundary_basin_entropy"]
+        entropy, stderr = raw["boundary_basin_entropy"], raw["boundary_stderr"]
+        found["boundary_basin_entropy"] = entropy
         found["boundary_boxes"] = raw["boundary_boxes"]
-        if math.isfinite(raw["boundary_stderr"]):
-            found["boundary_basin_entropy_stderr"] = raw["boundary_stderr"]
-        found["log2_criterion"] = int(
-            passes_log2(raw["boundary_basin_entropy"], raw["boundary_stderr"])
-        )
-    if "uncertainty_eps" in dataset:
-        law = fitted_map(dataset)
-        if law is not None:
-            found["uncertainty_exponent"] = law.value
-            found["uncertainty_exponent_stderr"] = law.stderr
-            found["uncertainty_exponent_low"], found["uncertainty_exponent_high"] = law.ci95
-            found["uncertainty_eps_low"] = float(law.eps[0])
-            found["uncertainty_eps_high"] = float(law.eps[law.scales - 1])
+        found["boundary_basin_entropy_stderr"] = stderr if math.isfinite(stderr) else None
+        found["log2_criterion"] = int(passes_log2(entropy, stderr))
+    law = fitted_map(dataset) if "uncertainty_eps" in dataset else None
+    if law is not None:
+        found["uncertainty_exponent"] = law.value
+        found["uncertainty_exponent_stderr"] = law.stderr
+        found["uncertainty_exponent_low"], found["uncertainty_exponent_high"] = law.ci95
+        found["uncertainty_eps_low"] = float(law.eps[0])
+        found["uncertainty_eps_high"] = float(law.eps[law.scales - 1])
     return found
-
-
-def table(attractors: list[dict[str, Any]], count: int, units: Units) -> dict[str, Any]:
-    """The attractors with their shares of ``count`` starts, and their points, as variables."""
-    one = "attractor"
-    fraction = np.array([a["fraction"] for a in attractors], dtype=float)
-    return {
-        **orbit_table.table(attractors, units, one),
-        "fraction": (one, fraction),
-        "stderr": (one, np.sqrt(fraction * (1 - fraction) / max(count, 1))),
-    }

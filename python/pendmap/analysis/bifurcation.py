@@ -2,39 +2,62 @@
 
 from __future__ import annotations
 
-import dataclasses
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from pendmap import _core
+from pendmap.analysis import result
+from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, undecided
 from pendmap.analysis.regimes import kind_of
-from pendmap.analysis.summary import box_said, of_model
-from pendmap.analysis.sweep import STARTS, CellSearch, title, varied, without_damping
-from pendmap.errors import check_callable, check_number, core_errors
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.summary import box_said
+from pendmap.analysis.sweep import SEARCH, STARTS, CellSearch, title, varied, without_damping
+from pendmap.errors import check_number, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
     from pendmap.analysis.grid import Grid
+    from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
 
 
 _SAME = 1e-4
-"""Points of orbits that are so near, in rad and in units of velocity, are one."""
-
+"""Distance, in rad and in units of velocity, below which points of orbits are one."""
+_NEAR = 0.3
+"""Distance, likewise, below which neighbouring attractors may belong to one branch."""
 _LISTED = 12
+"""Branches that a summary lists."""
+
+
+def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the branches for the JSON object."""
+    kinds = dataset["kind"].values
+    names = ("branch_kind", "branch_w", "branch_first", "branch_last")
+    return [
+        {"kind": str(kinds[kind]), "w": int(w), "first": float(first), "last": float(last)}
+        for kind, w, first, last in zip(*(dataset[name].values for name in names), strict=True)
+    ]
+
+
+SCHEMA = Schema(
+    "bifurcation",
+    result.UNITS,
+    Field("varied", "", "parameter that varies"),
+    Field("branches", "", "attractors followed along the parameter", read=_branches),
+    Field("points", "1", "stroboscopic points"),
+    *SEARCH,
+)
 
 
 def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -48,7 +71,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     max_periods: int | None = None,
     threads: int | None = None,
     seed: int = 0,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Stroboscopic points of the attractors against one parameter.
 
@@ -65,21 +88,21 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum : Pendulum or Rig
         The model; the parameter that varies replaces its own.
     ranges : mapping of str to (float, float, int)
-        One parameter with first value, last value (both included) and how many; names as of
+        One parameter with first value, last value (both included) and how many; names as for
         :func:`pendmap.parameter_map`.
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
     starts, box, tol, max_periods, threads, seed, progress
-        As of :func:`pendmap.parameter_map`.
+        As for :func:`pendmap.parameter_map`.
 
     Returns
     -------
     xarray.Dataset
         Points over ``point``: ``point_value``, ``point_theta``, ``point_velocity``,
-        ``point_entry``; attractors over ``entry`` as of :func:`pendmap.parameter_map`, with
+        ``point_entry``; attractors over ``entry`` as for :func:`pendmap.parameter_map`, with
         ``entry_value`` and ``entry_branch``; ``undecided``, ``failed`` and ``chaos_periods`` over
-        the parameter as of that function; branches over ``branch``: ``branch_kind``,
+        the parameter as for that function; branches over ``branch``: ``branch_kind``,
         ``branch_w``, ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the
         entry that the sweep is on, -1 where that is none of them; its points there over ``loose``.
 
@@ -96,46 +119,33 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     model = pendulum
     pendulum, units = without_dimensions(model)
     (axis,) = varied(model, ranges, 1)
-    check_callable("progress", progress)
-    search = CellSearch(starts, box, tol, max_periods, threads, seed)
-    theta, velocity = search.initial(units)
+    search = CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
     first = None
     if start is not None:
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
-    began = time.perf_counter()
     with core_errors():
         raw = _core.bifurcation(
             pendulum.parameters,
             axis.kernel,
-            theta,
-            velocity,
+            *search.initial(units),
             starts,
             first,
-            tol,
-            max_periods,
-            search.workers,
+            search.numerics.tol,
+            search.numerics.max_periods,
+            search.numerics.workers,
             progress,
         )
     dataset = _dataset(raw, axis, units)
-    dataset.attrs = {
-        "kind": "bifurcation",
-        "title": title(model, axis),
-        **model.attributes,
-        "section": model.units.section,
+    values = {
+        **search.attributes(raw, units),
         "varied": axis.name,
         "points": dataset.sizes["point"],
-        **search.attributes(raw, units),
-        "seconds": time.perf_counter() - began,
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    lines = [
-        *_summary(dataset),
-        *without_damping(model, axis),
-        *of_model(model, "attractors are"),
-    ]
-    dataset.attrs["summary"] = "\n".join(lines)
+    SCHEMA.complete(dataset, model, values, raw)
+    dataset.attrs["title"] = title(model, axis)
+    lines = [*_summary(dataset), *without_damping(model, axis)]
+    summarised(dataset, lines, model, "attractors are")
     return dataset
 
 
@@ -146,11 +156,11 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
     ]
     kinds = sorted(set(names))
     which = np.array([kinds.index(name) for name in names], dtype=np.intp)
-    found = branches(raw, axis.values.size)
+    of_entry, members = _linked(raw, axis.values.size)
     owner = raw["point_entry"]
     value = axis.values[raw["cell"]] if raw["cell"].size else np.empty(0)
     speed = {"units": units.of_velocity}
-    ends = np.array([[own[0], own[-1]] for own in found.members], dtype=np.intp).reshape(-1, 2)
+    ends = np.array([[own[0], own[-1]] for own in members], dtype=np.intp).reshape(-1, 2)
     loose = {
         key: np.concatenate([raw[f"up_{key}"], raw[f"down_{key}"]])
         for key in ("value", "theta", "velocity")
@@ -158,7 +168,7 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
     data: dict[str, Any] = {
         **entries(raw, which, units),
         "entry_value": ("entry", value, axis.attributes),
-        "entry_branch": ("entry", found.of_entry),
+        "entry_branch": ("entry", of_entry),
         "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
         "branch_w": ("branch", raw["w"][ends[:, 0]]),
         "branch_first": ("branch", value[ends[:, 0]], axis.attributes),
@@ -263,43 +273,8 @@ def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:
     return bool(apart.min() < _SAME)
 
 
-# Branches: attractors at neighbouring values of a parameter that are one and the same.
-
-
-_NEAR = 0.3
-"""Nearest points of neighbouring attractors of one branch are nearer than this, in rad and 1."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Branches:
-    """Which branch each attractor belongs to.
-
-    Attributes
-    ----------
-    of_entry : ndarray
-        Branch of each entry, from 0.
-    members : list of list of int
-        Entries of each branch, value by value.
-    """
-
-    of_entry: NDArray[np.int32]
-    members: list[list[int]]
-
-
-def branches(raw: dict[str, Any], values: int) -> Branches:
-    """Link attractors at neighbouring values.
-
-    Two are linked where kind, period and winding agree and their points are nearest to one another,
-    and near; chaos of one kind and sense is linked whatever its points.
-
-    Parameters
-    ----------
-    raw : dict
-        ``cell``, ``kind``, ``n``, ``w`` of the entries, and ``point_entry``, ``point_theta``,
-        ``point_velocity``, as the core gives them.
-    values : int
-        How many values the parameter has.
-    """
+def _linked(raw: dict[str, Any], values: int) -> tuple[NDArray[np.int32], list[list[int]]]:
+    """Return the branch of each entry, and the entries of each branch, value by value."""
     cell = raw["cell"]
     bounds = np.searchsorted(cell, np.arange(values + 1))
     first = np.searchsorted(raw["point_entry"], np.arange(cell.size + 1))
@@ -329,7 +304,7 @@ def branches(raw: dict[str, Any], values: int) -> Branches:
             if of_entry[b] < 0:
                 of_entry[b] = len(members)
                 members.append([b])
-    return Branches(of_entry, members)
+    return of_entry, members
 
 
 def _apart(

@@ -1,4 +1,15 @@
-"""Where critical curves need more frequencies: they turn, end or bend between two of them."""
+"""Critical curves of rest: more frequencies where they need them, and curves by perturbation.
+
+For the damped Mathieu equation ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` a periodic
+solution is written with few harmonics, and those that are not resonant are eliminated, their
+damping left out: the methods of Struble, of averaging and of multiple scales agree to this order.
+First tongue, about ``omega = 2``, ``a = 1 - omega^2/4``, ``c = gamma omega/2``: to first order
+``a^2 + c^2 = p^2/4``; the third harmonic, ``C = (p/2) A / (9 omega^2/4 - 1)``, adds ``k p^2``,
+``k = 1/(9 omega^2 - 4)``, to ``a``. Second tongue, about ``omega = 1``, ``a = 1 - omega^2``,
+``c = gamma omega``: the constant ``-(p/2) A`` takes ``p^2/2`` off the stiffness of the cosine, the
+second harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
+``(a - (1/2 - s) p^2)(a + s p^2) + c^2 = 0``.
+"""
 
 from __future__ import annotations
 
@@ -25,15 +36,21 @@ _STRIP = 1e-6
 """A stable strip narrower than this is a line, and rounding decides whether its edges are found."""
 
 _STEP = 1 / 1000
+"""Width of an interval, in parts of the picture's, below which bends are not resolved further."""
 _NOSE = 1e-6
-"""Bends and turns are resolved down to these parts of the picture's width: at a turn the height
-goes with the root of the distance."""
+"""The same for turns, where the height goes with the root of the distance."""
 
 _GRADED = 4.5
-"""An interval is at most this many times as long as its neighbours."""
+"""Largest ratio of an interval to its neighbours."""
 
 _ROUNDS = 24
+"""Halvings of an interval at most."""
 _IN_VIEW = 1.05
+"""Height, in parts of the picture's, up to which curves matter."""
+PLANES = ("omega-p", "e-alpha2")
+"""Eq. 1.2's ``(omega, p)``, and eq. 1.4's ``(alpha^2, e) = (1/omega^2, p/omega^2)``."""
+_HIGHEST = 2.6
+"""Largest ``e`` of a picture in the plane of eq. 1.4, if it was computed."""
 
 
 def denser(
@@ -43,26 +60,11 @@ def denser(
     curves: Callable[[Any], list[tuple[Floats, Floats]]],
     views: Sequence[Callable[[Floats, Floats], tuple[Floats, Floats]]],
 ) -> tuple[Floats, list[Any]]:
-    """Return frequencies with others between them, and what is found at each.
+    """Return frequencies with more where curves end, turn or bend in view, and what is found there.
 
-    Parameters
-    ----------
-    frequencies : ndarray
-        Ascending, two or more.
-    found : list
-        What was found at each of them; stays as it is.
-    solve : callable
-        Returns what is found at each of some others.
-    curves : callable
-        Takes what was found at one of them: amplitudes, ascending, and multipliers, for each model;
-        the last amplitude is the largest that was looked for.
-    views : sequence of callable
-        Take frequencies and amplitudes into a picture that is [0, 1] wide and high.
-
-    Notes
-    -----
-    Intervals are halved in which a curve begins or ends, and beside a place where it bends, as long
-    as that is in view. Which, does not depend on anything but the model and the frequencies.
+    ``solve`` returns what is found at further frequencies; ``curves`` takes what was found at one
+    to amplitudes, ascending, the last the largest looked for, and multipliers, for each model;
+    ``views`` take frequencies and amplitudes into a picture that is [0, 1] wide and high.
     """
     found = list(found)
     for _ in range(_ROUNDS):
@@ -129,11 +131,7 @@ def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
 
 
 def _seen_to_end(a: _Column, b: _Column) -> bool:
-    """Whether curves that go no further in one of two columns are seen to end.
-
-    They are those neighbours in the longer one that leave the rest nearest to the shorter one. A
-    curve ends where it turns back, beside its other side, or at the largest amplitude.
-    """
+    """Whether curves that one of two columns lacks are seen to end: they turn, or leave."""
     short, long = sorted((a, b), key=lambda one: one.heights.size)
     extra = long.heights.size - short.heights.size
 
@@ -164,16 +162,6 @@ def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
         wanted = wanted | longer
 
 
-# The planes in which critical curves are drawn, and what a picture of each shows.
-
-
-PLANES = ("omega-p", "e-alpha2")
-"""Eq. 1.2's ``(omega, p)``, and eq. 1.4's ``(alpha^2, e) = (1/omega^2, p/omega^2)``."""
-
-_HIGHEST = 2.6
-"""Largest ``e`` of a picture in the plane of eq. 1.4, if so much was computed."""
-
-
 def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
     """Return points given by frequency and amplitude in one of :data:`PLANES`."""
     if plane == PLANES[0]:
@@ -183,10 +171,7 @@ def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
 
 
 def window(omega: Floats, p_max: float, plane: str) -> tuple[tuple[float, float], float]:
-    """Return from where to where a picture is wide, and up to where it is high from 0.
-
-    A single frequency stands in the middle.
-    """
+    """Return the ends of a picture's abscissa, and its height above 0."""
     low, high = float(omega[0]), float(omega[-1])
     if plane == PLANES[0]:
         aside = 0.0 if low < high else 0.05 * low
@@ -197,7 +182,7 @@ def window(omega: Floats, p_max: float, plane: str) -> tuple[tuple[float, float]
 def in_picture(
     omega: Floats, p_max: float, plane: str
 ) -> Callable[[Floats, Floats], tuple[Floats, Floats]]:
-    """Return the map from frequency and amplitude into a picture that is [0, 1] wide and high."""
+    """Return the map from frequency and amplitude into a picture [0, 1] wide and high."""
     (left, right), top = window(omega, p_max, plane)
 
     def to(at: Floats, p: Floats) -> tuple[Floats, Floats]:
@@ -205,34 +190,6 @@ def in_picture(
         return (x - left) / (right - left), y / top
 
     return to
-
-
-# Critical curves of the damped Mathieu equation by perturbation, beside the exact ones.
-#
-# For ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` a periodic solution is written with the
-# few harmonics that matter, and those which are not resonant are eliminated: what the methods of
-# Struble, of averaging and of multiple scales give at the same order.
-#
-# **First tongue**, about ``omega = 2``: ``th = A cos(omega tau/2) + B sin(omega tau/2)`` alone
-# gives
-#
-# ``a^2 + c^2 = p^2/4``, ``a = 1 - omega^2/4``, ``c = gamma omega/2``: first order.
-#
-# The third harmonic answers with ``C = (p/2) A / (9 omega^2/4 - 1)`` and acts back with ``(p/2)
-# C``,
-# which adds ``k p^2``, ``k = 1/(9 omega^2 - 4)``, to ``a``: second order,
-#
-# ``(a + k p^2)^2 + c^2 = p^2/4``.
-#
-# **Second tongue**, about ``omega = 1``: ``th = C0 + A cos(omega tau) + B sin(omega tau)`` and the
-# second harmonic. ``C0 = -(p/2) A`` takes ``p^2/2`` off the stiffness of the cosine alone, the
-# second
-# harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
-#
-# ``(a - (1/2 - s) p^2)(a + s p^2) + c^2 = 0``, ``a = 1 - omega^2``, ``c = gamma omega``: second
-# order.
-#
-# Damping of the harmonics that are eliminated is left out: it is of the next order.
 
 
 def first_tongue(omega: Floats, gamma: float) -> Floats:
@@ -272,4 +229,4 @@ CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {
     "tongue 1, second order": (-1, first_tongue_second_order),
     "tongue 2, second order": (1, second_tongue),
 }
-"""What each is called, the multiplier on it, and its formula."""
+"""Name of each curve, the multiplier on it, and its formula."""

@@ -1,4 +1,4 @@
-"""How the share of starts whose end is uncertain falls with the error of a start."""
+"""Fractality of basin boundaries: uncertainty exponent and basin entropy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _LEAST_SCALES: Final = 3
-"""Distances that a power law is fitted to at least."""
+"""Least number of distances that a power law is fitted to."""
 _TELLING: Final = 5.0
 """Variance of a count above which its deviation is normal enough to judge the law by."""
 _UNLIKELY: Final = 0.01
@@ -34,16 +34,22 @@ _UNLIKELY: Final = 0.01
 _PART: Final = 16
 """Distances on a grid reach up to this part of its shorter side."""
 _STRIPS: Final = 16
-"""Strips of a grid that are left out one by one to see what the exponent owes to each."""
+"""Strips of a grid that the jackknife leaves out one by one."""
 _ROUNDS: Final = 100
+"""Steps of Fisher's scoring at most."""
 _TIMES: Final = 1.96
-"""Standard errors in half an interval."""
+"""Standard errors in half a 95 % interval."""
 _EPS: Final = 1e-12
+"""Change of the exponent at which its fit has converged; least share."""
+BOX: Final = 5
+"""Side of a box of the basin entropy in cells, as in the core."""
+_MOST_LABELS: Final = 32_767
+"""Labels that a map may have."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class UncertaintyExponent(Readable):
-    """The exponent of ``f(eps) ~ eps^value``, and what it was found from.
+    """Exponent of ``f(eps) ~ eps^value``, and the counts that it was fitted to.
 
     Attributes
     ----------
@@ -60,7 +66,7 @@ class UncertaintyExponent(Readable):
     unit : str
         ``"window"`` (sides of the window) or ``"cell"``.
     scales : int
-        The law was fitted to so many of the distances, the smallest ones.
+        Number of distances, the smallest ones, that the law was fitted to.
     """
 
     value: float
@@ -174,10 +180,7 @@ def uncertainty_exponent(
 def fitted(
     eps: npt.ArrayLike, uncertain: npt.ArrayLike, tried: npt.ArrayLike, unit: str = "window"
 ) -> UncertaintyExponent | None:
-    """Fit ``f ~ eps^alpha`` to independent binomial counts, shapes (N,).
-
-    None where fewer than three distances have uncertain starts.
-    """
+    """Fit ``f ~ eps^alpha`` to independent binomial counts; None with fewer than 3 distances."""
     far, hit, all_ = (np.asarray(values, dtype=float) for values in (eps, uncertain, tried))
     order = np.argsort(far)
     far, hit, all_ = (values[order] for values in (far, hit, all_))
@@ -205,7 +208,7 @@ def fitted(
 
 
 def _law(eps: Floats, hit: Floats, tried: Floats) -> tuple[float, float, float, int]:
-    """Exponent, its error, Pearson's misfit and its degrees of freedom, by maximum likelihood."""
+    """Return exponent, error, Pearson's misfit, degrees of freedom by maximum likelihood."""
     log = np.log(eps)
     terms = np.stack([np.ones_like(log), log - log.mean()], axis=1)
     weight = np.sqrt(hit + 0.25)
@@ -227,10 +230,7 @@ def _law(eps: Floats, hit: Floats, tried: Floats) -> tuple[float, float, float, 
 
 
 def _spread(hit: Floats, tried: Floats) -> Floats:
-    """Variance of each share from strip to strip over the binomial one, 1 at least.
-
-    Counts have the shape (distances, strips); strips are left out one by one (jackknife).
-    """
+    """Return the jackknife variance of shares over the binomial one, 1 at least."""
     count = hit.shape[1]
     whole = np.maximum(tried.sum(axis=1), 1.0)
     share = hit.sum(axis=1) / whole
@@ -243,10 +243,7 @@ def _spread(hit: Floats, tried: Floats) -> Floats:
 
 
 def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats, Floats]:
-    """Distances in cells, and counts of uncertain and of all cells in strips both ways.
-
-    Counts have the shape (distances, rows of strips, columns of strips).
-    """
+    """Return distances in cells, and counts of uncertain and of all cells by strips."""
     shorter = min(cells.shape)
     powers = 2 ** np.arange(max(1, int(math.log2(max(shorter, 2)))))
     steps = np.unique(np.concatenate([powers, 3 * powers[:-1]]))
@@ -273,7 +270,7 @@ def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats
 
 
 def fitted_map(dataset: xr.Dataset) -> UncertaintyExponent | None:
-    """The law of a map that has counts; None where they are too few."""
+    """Return the law of a map that has counts; None where they are too few."""
     eps, uncertain, tried = (
         dataset[name].values for name in ("uncertainty_eps", "uncertain", "uncertainty_tried")
     )
@@ -296,15 +293,6 @@ def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
     if found is None:
         raise InputError("too few starts of this map are uncertain: there is no exponent")
     return found
-
-
-# How finely basins are interwoven, box by box.
-
-
-BOX: Final = 5
-"""Side of a box in cells, as in the core."""
-_SURE: Final = 1.96
-_MOST_LABELS: Final = 32_767
 
 
 @dataclasses.dataclass(frozen=True)
@@ -382,17 +370,11 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
 
 def passes_log2(boundary: float, stderr: float) -> bool:
     """Whether a boundary basin entropy is above ln 2 by more than twice its standard error."""
-    return boundary - _SURE * stderr > math.log(2)
+    return boundary - _TIMES * stderr > math.log(2)
 
 
 def numbered(labels: npt.ArrayLike) -> tuple[Labels, npt.NDArray[np.int64]]:
-    """Return labels of a plane as small numbers, 0 where the end is not known, and what they were.
-
-    Raises
-    ------
-    InputError
-        If these are no whole numbers in a plane.
-    """
+    """Return labels of a plane as numbers from 1, 0 where unknown; and what they were."""
     given = np.asarray(labels)
     if given.ndim != 2 or not given.size:  # noqa: PLR2004 (a plane)
         raise InputError(f"labels must have the shape (M, N), both above 0, got {given.shape}")

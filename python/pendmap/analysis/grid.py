@@ -102,27 +102,22 @@ class Grid:
 
     @classmethod
     def of(cls, given: object, count: int, w0: float) -> Grid:
-        """Return a grid as given, or the default window with so many cells on each side.
-
-        Parameters
-        ----------
-        given : Grid, int or None
-            A number is that of the cells on each side.
-        count : int
-            Cells on each side where nothing is given.
-        w0 : float
-            As of :meth:`square`.
-
-        Raises
-        ------
-        InputError
-            If it is something else.
-        """
+        """Return a grid as given, or the default window with ``count`` cells on each side."""
         if given is None or (isinstance(given, numbers.Integral) and not isinstance(given, bool)):
             return cls.square(count if given is None else int(given), w0)
         example = "100, Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
         check_type("grid", given, cls, example)
         return given  # type: ignore[return-value]
+
+    @property
+    def attributes(self) -> dict[str, float]:
+        """Bounds of the box as attributes of a dataset."""
+        return {
+            "low_theta": self.theta.low,
+            "high_theta": self.theta.high,
+            "low_velocity": self.velocity.low,
+            "high_velocity": self.velocity.high,
+        }
 
     @property
     def cells(self) -> int:
@@ -136,21 +131,7 @@ def coordinate(
     edges: NDArray[np.float64],
     attributes: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Return a coordinate of cells and, by the CF conventions, the bounds of each cell.
-
-    Bounds are a coordinate of their own: a selection of cells takes along those of its cells.
-
-    Parameters
-    ----------
-    name : str
-        Name of the axis and of its dimension.
-    centres : ndarray, shape (N,)
-        Its values.
-    edges : ndarray, shape (N + 1,)
-        Edges of its cells.
-    attributes : mapping
-        Units and long name.
-    """
+    """Return a coordinate of cells and, by the CF conventions, the bounds of each cell."""
     bounds = f"{name}_bounds"
     pairs = np.stack([edges[:-1], edges[1:]], axis=1)
     return {
@@ -160,13 +141,7 @@ def coordinate(
 
 
 def frequencies(values: ArrayLike) -> NDArray[np.float64]:
-    """Return frequencies ``Omega/w0`` of the drive as an array, shape (N,).
-
-    Raises
-    ------
-    InputError
-        If they are no numbers above 0, in ascending order.
-    """
+    """Return frequencies ``Omega/w0`` of the drive, above 0 and ascending, as an array."""
     try:
         array = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError, OverflowError):
@@ -182,13 +157,7 @@ def frequencies(values: ArrayLike) -> NDArray[np.float64]:
 def starts(
     theta: ArrayLike, velocity: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return angles and velocities of a list of starts as two arrays, shape (N,).
-
-    Raises
-    ------
-    InputError
-        If they are no numbers, not of one dimension, not as many, or not finite.
-    """
+    """Return angles and velocities of a list of starts as two arrays of one length."""
     arrays = []
     for name, given in (("theta", theta), ("velocity", velocity)):
         try:

@@ -1,45 +1,100 @@
-"""Transient chaos: how long it lives before an attractor captures it."""
+"""Transient chaos: the time that it lives before an attractor captures it."""
 
 from __future__ import annotations
 
 import math
-import time
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import xarray as xr
 
-from pendmap import _core
-from pendmap.analysis import survival
+from pendmap.analysis import result, survival
 from pendmap.analysis.basins import basins_of
 from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.lifetime import fields as drawn_fields
 from pendmap.analysis.draws.lifetime import lifetime_over
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
-from pendmap.analysis.summary import of_model, window_said
-from pendmap.analysis.survival import growth_on_saddle
-from pendmap.errors import MOST_PERIODS, MOST_SEED, InputError, check_whole
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.analysis.numerics import Numerics, optional_whole
+from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, summarised
+from pendmap.analysis.summary import effort, window_said
+from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
     Floats = NDArray[np.float64]
 
 
 _STARTS: Final = 40_000
+"""Starts drawn where no number is given."""
 _MOST_STARTS: Final = 10_000_000
+"""Starts that may be drawn."""
 _SURE: Final = 3.0
-"""Standard errors by which the exponent must exceed the rate of escape."""
+"""Standard errors by which the exponent must exceed the rate of escape for transient chaos."""
 _DRAWN: Final = 4000
 """Periods of a survival curve that are kept."""
+
+
+def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the attractors with their captures for the JSON object."""
+    rows = zip(
+        dataset["attractor"].values,
+        dataset["fraction"].values,
+        dataset["captured"].values[:, -1],
+        strict=True,
+    )
+    return [
+        {"name": str(name), "fraction": float(share), "captured": int(count)}
+        for name, share, count in rows
+    ]
+
+
+SCHEMA = Schema(
+    "lifetime",
+    result.UNITS,
+    Field("mean_periods", "periods", "mean lifetime of transient chaos"),
+    Field("stderr", "periods", "its standard error"),
+    Field("persistent", "", "1 where every start ends on chaos", convert=bool),
+    Field("transient_chaos", "", "1 where there is transient chaos", convert=bool),
+    Field("from_period", "periods", "beginning of the tail; -1: none", convert=none_below_0),
+    Field("mean_time", result.OF_TIME, "mean lifetime as a time"),
+    Field("mean_time_stderr", result.OF_TIME, "its standard error"),
+    Field("escape_rate", "1/period", "rate at which starts leave the saddle"),
+    Field("exponent", result.OF_RATE, "Lyapunov exponent on the saddle, or of lasting chaos"),
+    Field("exponent_stderr", result.OF_RATE, "its standard error"),
+    Field("exponent_per_period", "1/period", "the exponent per forcing period"),
+    Field("entropy", "1/period", "metric entropy of the saddle"),
+    Field("saddle_dimension", "1", "dimension of the saddle"),
+    Field("tail_captured", "1", "captures in the tail"),
+    Field("tail_weibull", "1", "chance of an exponential tail by a score test of the shape"),
+    Field("tail_steady", "1", "chance of an exponential tail by chi squared of its rates"),
+    Field("tail_mean_periods", "periods", "mean time of the tail, whatever it is"),
+    Field("starts", "1", "starts"),
+    Field("captured", "1", "starts that an attractor captured"),
+    Field("censored", "1", "starts alive at the bound"),
+    Field("failed", "1", "starts that failed or diverged"),
+    Field("chaotic_share", "1", "share of the starts that end on a chaotic attractor"),
+    result.BOUND,
+    result.CHAOS_BOUND,
+    result.TOL,
+    result.REACHED,
+    result.STEPS,
+    *result.RUN,
+    Field("attractors", "", "attractors with the starts that each captured", read=_attractors),
+    *result.END,
+    drawn_field(drawn_fields),
+    result.SECTION,
+    Field("from_period_given", "", "1 where the caller chose the beginning", json=False),
+    Field("exponent_trajectories", "1", "trajectories the exponent was measured on", json=False),
+)
 
 
 def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -54,7 +109,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     threads: int | None = None,
     seed: int = 0,
     draws: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Mean lifetime of transient chaos: the exponential tail of the times until capture.
 
@@ -82,27 +137,20 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     from_period : int, optional
         Where the tail begins. By default where the data say so: twice the earliest period from
         which two tests (of a Weibull shape, and of a rate that changes) find it exponential.
-    max_periods : int, optional
-        The bound after which a start is given up, as for :func:`pendmap.basins`.
-    tol : float
-        As for :func:`pendmap.basins`.
-    threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
     seed : int
-        Draws the starts.
+        Draws the starts, and the models of ``draws``.
     draws : int, optional
-        How many models are drawn from the model's ``[covariance]``, each computed too: the
-        interval of the mean lifetime (``analysis.draws.lifetime``). ``seed``
-        draws them.
-    progress : callable, optional
-        Called now and then with what is done and in all.
+        Number of models drawn from the model's ``[covariance]``, each computed too: the interval
+        of the mean lifetime (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
+    max_periods, tol, threads, progress
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
     xarray.Dataset
         ``captured`` over ``attractor`` and ``elapsed``: the number that each attractor has captured
-        within so many periods. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, what the mean
-        would be from other beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
+        up to a period. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, the mean from other
+        beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
         never) and ``label`` over ``start``. Attributes ``mean_periods``, ``stderr``,
         ``from_period``, ``persistent`` (1 where every start ends on chaos; ``exponent`` is that of
         the most chaotic attractor then), ``transient_chaos``, ``escape_rate`` and ``entropy`` per
@@ -124,33 +172,26 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     model = pendulum
     pendulum, units = without_dimensions(model)
     starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
-    if from_period is not None:
-        from_period = check_whole("from_period", from_period, 0, MOST_PERIODS)
-    seed = check_whole("seed", seed, 0, MOST_SEED)
+    from_period = optional_whole("from_period", from_period, 0, MOST_PERIODS)
+    numerics = Numerics(tol, max_periods, threads, seed, progress)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")
+    if draws is not None:
+        several = drawn(model, draws, seed)
+        same = partial(lifetime, from_period=from_period, **numerics.options)
+        first = part(progress, 0, len(several) + 1)
+        own = same(model, theta, velocity, starts=starts, progress=first)
+        again = partial(same, theta=own["start_theta"], velocity=own["start_velocity"])
+        return lifetime_over(own, several, again, progress)
     window = ""
     if theta is None or velocity is None:
-        draw = np.random.default_rng(seed)
+        draw = np.random.default_rng(numerics.seed)
         reach = units.given(FASTEST, VELOCITY)
         theta = draw.uniform(-math.pi, math.pi, starts)
         velocity = draw.uniform(-reach, reach, starts)
         window = window_said((-math.pi, math.pi), (-reach, reach), units)
     angles, speeds = checked(theta, velocity)
-    several = None if draws is None else drawn(model, draws, seed)
-    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
-    began = time.perf_counter()
-    found = basins_of(
-        model,
-        angles,
-        speeds,
-        tol=tol,
-        max_periods=max_periods,
-        threads=threads,
-        seed=seed,
-        check=False,
-        progress=progress,
-    )
+    found = basins_of(model, angles, speeds, check=False, progress=progress, **numerics.options)
     label = found["label"].values.astype(np.int64)
     settle = found["settle_periods"].values.astype(np.int64)
     times = settle[settle >= 0]
@@ -162,7 +203,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         elif from_period < bound:
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
-    saddle = growth_on_saddle(found, fitted, pendulum, threads)
+    saddle = survival.growth_on_saddle(found, fitted, pendulum, threads)
     dataset = xr.Dataset(
         {
             **{
@@ -178,56 +219,27 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         },
         coords={"attractor": found["attractor"]},
     )
-    dataset.attrs = {
-        "kind": "lifetime",
-        "title": model.title,
-        **model.attributes,
-        "section": model.units.section,
-        **_attributes(found, fitted, saddle, pendulum, units),
+    values = {
+        **found.attrs,
+        **numerics.provenance(),
+        **_measures(found, fitted, saddle, pendulum, units),
         "starts": angles.size,
         "captured": int(times.size),
         "censored": censored,
         "failed": int((label < 0).sum()),
         "chaotic_share": _chaotic(found),
-        "max_periods": bound,
-        "chaos_bound": found.attrs["chaos_bound"],
         "from_period_given": int(from_period is not None),
-        "tol": found.attrs["tol"],
-        "reached_error": found.attrs["reached_error"],
-        "steps_per_period": found.attrs["steps_per_period"],
-        "seconds": time.perf_counter() - began,
-        "simd": found.attrs["simd"],
-        "threads": found.attrs["threads"],
-        "seed": seed,
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    lines = summary(dataset, found)
+    SCHEMA.complete(dataset, model, values)
+    lines = _summary(dataset, found)
     if window:
         lines.append(f"Starts are drawn in {window}.")
-    lines += [*of_model(model, "these lifetimes are")]
-    dataset.attrs["summary"] = "\n".join(lines)
-    if several is None:
-        return dataset
-
-    def again(one: Pendulum | Rig, report: Callable[[int, int], object] | None) -> xr.Dataset:
-        return lifetime(
-            one,
-            angles,
-            speeds,
-            from_period=from_period,
-            max_periods=max_periods,
-            tol=tol,
-            threads=threads,
-            seed=seed,
-            progress=report,
-        )
-
-    return lifetime_over(dataset, several, again, whole)
+    summarised(dataset, lines, model, "these lifetimes are")
+    return dataset
 
 
 def _chaotic(found: xr.Dataset) -> float:
-    """Share of the starts that end on a chaotic attractor."""
+    """Return the share of the starts that end on a chaotic attractor."""
     chaos = np.array([str(kind).endswith("chaos") for kind in found["kind"].values], dtype=bool)
     return float(found["fraction"].values[chaos].sum())
 
@@ -235,7 +247,7 @@ def _chaotic(found: xr.Dataset) -> float:
 def _curves(
     found: xr.Dataset, times: NDArray[np.int64], censored: int, bound: int
 ) -> dict[str, Any]:
-    """Captures up to each period by each attractor; tails from all beginnings."""
+    """Return captures up to each period by each attractor, and tails from all beginnings."""
     label, settle = found["label"].values, found["settle_periods"].values
     last = bound if censored else int(times.max(initial=0)) + 1
     elapsed = np.unique(np.linspace(0, last, min(last, _DRAWN) + 1).round().astype(np.int64))
@@ -271,13 +283,14 @@ def _curves(
     }
 
 
-def _attributes(
+def _measures(
     found: xr.Dataset,
     fitted: survival.Tail | None,
     saddle: tuple[float, float, int],
     pendulum: Pendulum,
     units: Units,
 ) -> dict[str, Any]:
+    """Return what the tail, the saddle or lasting chaos tell, as attributes."""
     period = pendulum.period
     growth, error, followed = saddle
     persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)
@@ -317,17 +330,14 @@ def _attributes(
     }
 
 
-# What a lifetime of transient chaos says of itself.
-
-
-def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
+def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     """Return the lines about the lifetimes ``dataset`` of the starts of the map ``found``."""
     a, units = dataset.attrs, Units.of(dataset.attrs)
     lines: list[str] = []
     exponent = f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
         lines.append(
-            f"Persistent: {shares(found)}; largest exponent {exponent}; nothing captured any of "
+            f"Persistent: {_shares(found)}; largest exponent {exponent}; nothing captured any of "
             f"the trajectories watched within {a['chaos_bound']} periods."
         )
     elif found.attrs["plane"] == "conservative":
@@ -352,16 +362,11 @@ def summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
             f"{counted(a['max_periods'], 'period')}."
         )
     if a["captured"]:
-        lines.append(f"Ended on {shares(found)}.")
-    lines.append(
-        f"{counted(a['starts'], 'start')}, {counted(a['steps_per_period'], 'step')} a period, "
-        f"error reached {a['reached_error']:.1e}, {a['seconds']:.2f} s on "
-        f"{counted(a['threads'], 'thread')} ({a['simd']})."
-    )
-    return lines
+        lines.append(f"Ended on {_shares(found)}.")
+    return [*lines, f"{counted(a['starts'], 'start')}, {effort(a)}"]
 
 
-def shares(found: xr.Dataset) -> str:
+def _shares(found: xr.Dataset) -> str:
     """Return the attractors with the share of the starts that each takes."""
     rows = zip(found["attractor"].values, found["fraction"].values, strict=True)
     return ", ".join(f"{name} {100 * float(share):.2f} %" for name, share in rows)

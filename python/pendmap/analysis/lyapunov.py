@@ -3,46 +3,79 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis.orbit_table import table
-from pendmap.analysis.summary import of_model
-from pendmap.errors import (
-    MOST_PERIODS,
-    MOST_SEED,
-    MOST_THREADS,
-    InputError,
-    check_callable,
-    check_number,
-    check_whole,
-    core_errors,
-)
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.analysis import orbit_table, result
+from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.result import Field, Schema, none_below_0, summarised
+from pendmap.analysis.summary import effort
+from pendmap.errors import InputError, check_number, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
+    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
     Floats = NDArray[np.float64]
 
 
 _CLEAR = 3.0
-"""Without damping an exponent below so many times that of deviations growing as tau is that of
-regular motion, and the spread of trajectories no error of it."""
+"""Without damping, multiple of the exponent of deviations that grow as tau below which motion is
+regular: the spread of trajectories is no error then."""
 
 _MOST_PRECISION = 0.5
-"""A standard error of half the exponent says its sign, and little else."""
+"""Largest relative standard error that may be asked for: it leaves the exponent's sign alone."""
+
+_BY_ROUNDING = math.log(1e10)
+"""Growth of a deviation, as a logarithm, from which rounding decides the result."""
+
+
+def _attractor(dataset: xr.Dataset) -> dict[str, Any] | None:
+    """Return the attractor for the JSON object."""
+    return orbit_table.row(dataset, "attractor", 0) if dataset.sizes["attractor"] else None
+
+
+SCHEMA = Schema(
+    "lyapunov",
+    result.UNITS,
+    Field("exponent", result.OF_RATE, "largest Lyapunov exponent"),
+    Field("stderr", result.OF_RATE, "its standard error; 0 where it is exact"),
+    Field("per_period", "1/period", "the exponent per forcing period"),
+    Field("per_period_stderr", "1/period", "its standard error"),
+    Field("second_exponent", result.OF_RATE, "the other exponent"),
+    Field("exponent_sum", result.OF_RATE, "sum of both exponents"),
+    Field("kaplan_yorke_dimension", "1", "dimension of the stroboscopic map's attractor"),
+    Field("end", "", "captured, chaotic, undamped, undecided or failed"),
+    Field("attractor", "", "the attractor that was reached", read=_attractor),
+    Field("transient_periods", "periods", "time of capture; -1: none", convert=none_below_0),
+    Field("trajectories", "1", "trajectories of the ensemble"),
+    Field("periods", "periods", "length of each of them"),
+    Field("dropped_periods", "periods", "periods of each dropped before"),
+    Field("lost", "1", "trajectories that settled elsewhere"),
+    Field("precision", "1", "relative standard error that was asked for"),
+    result.TOL,
+    result.REACHED,
+    result.STEPS,
+    result.BOUND,
+    result.CHAOS_BOUND,
+    *result.RUN,
+    *result.END,
+    result.SECTION,
+    Field("forcing_period", result.OF_TIME, "forcing period", json=False),
+    Field("theta0", "rad", "angle at the start", json=False),
+    Field("velocity0", result.OF_VELOCITY, "velocity at the start", json=False),
+    Field("regular", result.OF_RATE, "exponent of regular motion over this time", json=False),
+    Field("exponent_sum_stderr", result.OF_RATE, "standard error of the sum", json=False),
+    Field("window", "periods", "length of a window of finite_time_exponent", json=False),
+)
 
 
 def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -55,7 +88,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     max_periods: int | None = None,
     threads: int | None = None,
     seed: int = 0,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Largest Lyapunov exponent of the attractor that a start reaches.
 
@@ -79,18 +112,14 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         Where the start is at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
     precision : float
         Standard error over exponent that chaos is averaged for; above 0, up to 0.5.
-    tol : float
-        As for :func:`pendmap.basins`.
     max_periods : int, optional
         Periods within which an attractor must capture the start, by default as for
         :func:`pendmap.basins`, and that each trajectory of an ensemble is followed for at the most,
         20,000 (without damping 2000).
-    threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
     seed : int
         Chooses the trajectories on a chaotic attractor.
-    progress : callable, optional
-        Called now and then with what is done and in all.
+    tol, threads, progress
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
@@ -99,7 +128,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         start's own trajectory. Of chaos ``running_exponent`` and ``running_stderr`` over
         ``averaged``, the periods that each trajectory has been averaged for, and
         ``finite_time_exponent`` over ``trajectory`` and ``window``. The attractor with its points,
-        as of :func:`pendmap.basins`. Attributes ``exponent``, ``stderr`` (0 where the exponent is
+        as for :func:`pendmap.basins`. Attributes ``exponent``, ``stderr`` (0 where the exponent is
         exact, nan for regular motion without damping), ``regular`` (what such
         motion has over the same time), ``per_period``, ``end``
         (``captured``, ``chaotic``, ``undamped``, ``undecided`` or ``failed``),
@@ -128,17 +157,8 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(
             f"precision must be a number above 0, up to {_MOST_PRECISION}, got {precision:g}"
         )
-    check_callable("progress", progress)
-    choices: _core._ExponentChoices = {
-        "precision": precision,
-        "tol": check_number("tol", tol),
-        "max_periods": None
-        if max_periods is None
-        else check_whole("max_periods", max_periods, 1, MOST_PERIODS),
-        "threads": 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS),
-        "seed": check_whole("seed", seed, 0, MOST_SEED),
-    }
-    began = time.perf_counter()
+    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    choices: _core._ExponentChoices = {"precision": precision, **numerics.core}
     with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
         raw = _core.lyapunov(pendulum.parameters, start, choices, progress)
@@ -152,17 +172,16 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     attractors = [] if found is None else [found | {"twin": None}]
     dataset = xr.Dataset(
         {
-            **table(attractors, units, "attractor"),
+            **orbit_table.table(attractors, units, "attractor"),
             **_course(raw),
             **_ensemble(raw, pendulum.period, units),
         },
         coords={"attractor": ("attractor", np.array([a["name"] for a in attractors], dtype=str))},
     )
-    dataset.attrs = {
-        "kind": "lyapunov",
-        "title": model.title,
-        **model.attributes,
-        "section": model.units.section,
+    growth = np.empty((0, 0)) if raw["growth"] is None else raw["growth"]
+    values = {
+        **numerics.provenance(),
+        **_second(raw, exponent, pendulum, units),
         "forcing_period": units.given(pendulum.period, TIME),
         "theta0": theta,
         "velocity0": velocity,
@@ -171,34 +190,19 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         "regular": units.given(regular, RATE),
         "per_period": exponent * pendulum.period,
         "per_period_stderr": stderr * pendulum.period,
-        **_second(raw, exponent, pendulum, units),
-        "end": raw["end"],
         "transient_periods": -1 if raw["transient"] is None else raw["transient"],
-        "trajectories": 0 if raw["growth"] is None else raw["growth"].shape[0],
-        "window": raw["window"],
-        "periods": 0 if raw["growth"] is None else raw["growth"].shape[1] * raw["window"],
+        "trajectories": growth.shape[0],
+        "periods": growth.shape[1] * raw["window"],
         "dropped_periods": raw["dropped"] or 0,
-        "lost": raw["lost"],
         "precision": precision,
-        "tol": choices["tol"],
-        "reached_error": raw["reached_error"],
-        "steps_per_period": raw["steps_per_period"],
-        "max_periods": raw["bound"],
-        "chaos_bound": raw["chaos_bound"],
-        "seconds": time.perf_counter() - began,
-        "simd": raw["simd"],
-        "threads": choices["threads"] or _core.default_threads(),
-        "seed": choices["seed"],
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    lines = [*summary(dataset), *of_model(model, "this exponent is")]
-    dataset.attrs["summary"] = "\n".join(lines)
+    SCHEMA.complete(dataset, model, values, raw)
+    summarised(dataset, _summary(dataset), model, "this exponent is")
     return dataset
 
 
 def _value(raw: dict[str, Any]) -> tuple[float, float]:
-    """The exponent per unit of tau and its standard error; nan where there is none."""
+    """Return the exponent per unit of tau and its standard error; nan where there is none."""
     if raw["end"] in {"chaotic", "undamped"}:
         exponent, stderr = raw["exponent"]
         return float(exponent), float(stderr)
@@ -209,7 +213,7 @@ def _value(raw: dict[str, Any]) -> tuple[float, float]:
 
 
 def _regular(raw: dict[str, Any], period: float) -> float:
-    """The exponent of regular motion over the same periods: deviations grow as tau; else nan."""
+    """Return the exponent of regular undamped motion, whose deviations grow as tau; else nan."""
     if raw["end"] != "undamped":
         return math.nan
     averaged = float(raw["growth"].shape[1] * raw["window"])
@@ -219,7 +223,7 @@ def _regular(raw: dict[str, Any], period: float) -> float:
 def _second(
     raw: dict[str, Any], exponent: float, pendulum: Pendulum, units: Units
 ) -> dict[str, Any]:
-    """The other exponent, the sum of both, the dimension that they give."""
+    """Return the other exponent, the sum of both, and the dimension that they give."""
     own = raw["attractor"]
     if raw["end"] in {"chaotic", "undamped"}:
         total, error = raw["sum"]
@@ -256,7 +260,7 @@ def _course(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _ensemble(raw: dict[str, Any], period: float, units: Units) -> dict[str, Any]:
-    """The running mean over all trajectories, and the exponents of all windows."""
+    """Return the running mean over all trajectories, and the exponents of all windows."""
     growth = np.empty((0, 0)) if raw["growth"] is None else raw["growth"]
     count, windows = growth.shape
     time = raw["window"] * period
@@ -281,15 +285,7 @@ def _ensemble(raw: dict[str, Any], period: float, units: Units) -> dict[str, Any
     }
 
 
-# What a Lyapunov exponent says of itself.
-
-
-_BY_ROUNDING = math.log(1e10)
-"""A deviation of rounding that grows by so much is seen in the result."""
-
-
-def summary(dataset: xr.Dataset) -> list[str]:
-    """Return the lines about an exponent."""
+def _summary(dataset: xr.Dataset) -> list[str]:
     a, units = dataset.attrs, Units.of(dataset.attrs)
     name = str(dataset["attractor"].values[0]) if dataset.sizes["attractor"] else ""
     lines = [*_ended(dataset, name)]
@@ -318,29 +314,19 @@ def summary(dataset: xr.Dataset) -> list[str]:
         if a["end"] == "chaotic" and a["stderr"] > aim:
             lines.append(f"THE PRECISION {a['precision']:g} WAS NOT REACHED: raise --max-periods.")
     elif math.isfinite(value):
-        exact = "exact, from the multipliers" if len(_pairs(dataset)) else "exactly"
+        pairs = dataset["multipliers"].values
+        exact = "exact, from the multipliers" if not np.isnan(pairs).all() else "exactly"
         lines.append(
             f"Largest Lyapunov exponent {value:.9g} {per}, {a['per_period']:.9g} per period: "
             f"{exact}."
         )
     if not (math.isfinite(value) and math.isnan(a["stderr"])):
         lines += _other(a, units)
-    lines.append(
-        f"{counted(a['steps_per_period'], 'step')} a period, error reached "
-        f"{a['reached_error']:.1e}, {a['seconds']:.2f} s on {counted(a['threads'], 'thread')} "
-        f"({a['simd']})."
-    )
-    return lines
-
-
-def _pairs(dataset: xr.Dataset) -> list[Any]:
-    if not dataset.sizes["attractor"]:
-        return []
-    return [pair for pair in dataset["multipliers"].values[0] if pair[0] == pair[0]]
+    return [*lines, effort(a)]
 
 
 def _ended(dataset: xr.Dataset, name: str) -> list[str]:
-    """What became of the start."""
+    """Return lines on what became of the start."""
     a, units = dataset.attrs, Units.of(dataset.attrs)
     speed = units.spoken(format(a["velocity0"], "g"))
     start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"

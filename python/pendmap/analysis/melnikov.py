@@ -12,10 +12,10 @@ import xarray as xr
 from numpy.polynomial import legendre
 
 from pendmap import _core
-from pendmap.analysis import grid
-from pendmap.analysis.summary import of_model
-from pendmap.errors import InputError, core_errors, instruction_set
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.analysis import grid, result
+from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
     Floats = NDArray[np.float64]
-    from numpy.typing import NDArray
 
 
 _PHASES, _FINE = (8, 16, 32, 64), 4096
@@ -39,10 +38,34 @@ _RANGE = (0.2, 4.0, 191)
 """Frequencies of the curve in the figure, where none are given."""
 
 _ROUNDING = 1e-13
-"""A threshold below this is that of a motion that loses nothing, a torque below this is none."""
+"""Work, and torque, below which there is none."""
 _LINEAR = 1e-9
+"""Relative deviation above which the drive's work is not proportional to p."""
 _RESOLVED = 1e-9
-"""The drive's work is told from rounding where it is more than this part of its absolute power."""
+"""Part of the drive's absolute power above which its work is told from rounding."""
+_REACH, _SPACING = 42.0, 0.1
+"""Times along the separatrix: the trapezoidal rule on an analytic integrand without ends errs by
+``exp(-pi^2/spacing)``; friction's integrand falls as ``exp(-|t|)`` alone."""
+_NODES = 16
+"""Gauss's nodes on a panel of the loop."""
+_HALVED, _WIDTH, _END = 12, 0.5, 20.0
+"""Panels of the loop's parameter: halved so often toward the turning point, beside which a small
+torque leaves the other upright rest; then of this width; to where the angle is rounding."""
+
+
+SCHEMA = Schema(
+    "melnikov",
+    result.UNITS,
+    Field("p_melnikov", "1", "threshold at the model's frequency; 0 without losses"),
+    Field("p_tangency", "1", "amplitude of the tangency itself; not computed"),
+    Field("p_forward", "1", "threshold on the separatrix, forward"),
+    Field("p_backward", "1", "threshold on the separatrix, backward"),
+    Field("p_loop", "1", "threshold on the loop that a torque makes"),
+    result.SIMD,
+    *result.END,
+    *result.OWN,
+    *result.UNSAID,
+)
 
 
 def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dataset:
@@ -134,10 +157,8 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
             "branch": ("branch", np.array(list(orbits))),
         },
     )
-    dataset.attrs = {
-        "kind": "melnikov",
-        "title": model.title,
-        **model.attributes,
+    values = {
+        **Numerics().provenance(),
         "own_p": pendulum.p,
         "own_omega": pendulum.omega,
         "p_melnikov": first,
@@ -145,12 +166,9 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         "p_backward": at["backward"],
         "p_loop": at.get("loop", math.nan),
         "p_tangency": math.nan,
-        "simd": instruction_set(),
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(pendulum, at, first, sense), *of_model(model, "the threshold is")]
-    dataset.attrs["summary"] = "\n".join(lines)
+    SCHEMA.complete(dataset, model, values)
+    summarised(dataset, _summary(pendulum, at, first, sense), model, "the threshold is")
     return dataset
 
 
@@ -159,7 +177,10 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
     still = dataclasses.replace(pendulum, p=0.0)
     forward = separatrix()
     orbits = {"forward": forward, "backward": forward.mirrored()}
-    won = {name: _work(still, orbit, 0.0) for name, orbit in orbits.items()}
+    won = {
+        name: float((_power(still, orbit, np.zeros(1)) @ orbit.weight)[0])
+        for name, orbit in orbits.items()
+    }
     # A torque gives 2 pi times itself on one branch and takes it on the other.
     torque = (won["forward"] - won["backward"]) / (4 * math.pi)
     if abs(torque) >= 1 - _ROUNDING:
@@ -175,15 +196,11 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
 
 
 def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
-    """Return the power of all that the orbit's own equation lacks: a row for each of the phases."""
+    """Return the power of all that the orbit's own equation lacks: a row for each phase."""
     theta, speed = (np.tile(column, at.size) for column in (orbit.theta, orbit.speed))
     tau = (orbit.time + at[:, None]).ravel()
     acceleration = _core.acceleration(pendulum.parameters, tau, theta, speed)
     return (speed * (acceleration + np.sin(theta) - orbit.torque)).reshape(at.size, -1)
-
-
-def _work(pendulum: Pendulum, orbit: Orbit, at: float) -> float:
-    return float((_power(pendulum, orbit, np.array([at])) @ orbit.weight)[0])
 
 
 def _threshold(pendulum: Pendulum, omega: float, orbit: Orbit) -> float:
@@ -271,41 +288,18 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
     return lines
 
 
-# Orbits of the pendulum without losses that leave its upright rest and come back to it.
-
-
-_REACH, _SPACING = 42.0, 0.1
-"""Times along the separatrix: the trapezoidal rule on an analytic integrand without ends errs by
-``exp(-pi^2/spacing)``; friction's integrand falls as ``exp(-|t|)`` alone."""
-
-_NODES = 16
-"""Gauss's nodes on a panel of the loop."""
-
-_HALVED, _WIDTH, _END = 12, 0.5, 20.0
-"""Panels of the loop's parameter: halved so often toward the turning point, beside which a small
-torque leaves the other upright rest; then of this width; to where the angle is rounding."""
-
-
 @dataclass(frozen=True)
 class Orbit:
-    """Places along an orbit of ``th'' + sin th = torque``, with weights that integrate over time.
-
-    Attributes
-    ----------
-    time, theta, speed, weight : ndarray
-        One value a place.
-    torque : float
-        Of the equation that the orbit solves.
-    rate : float
-        At which deviations from upright rest grow there.
-    """
+    """Places along an orbit of ``th'' + sin th = torque``, with weights that integrate."""
 
     time: Floats
     theta: Floats
     speed: Floats
     weight: Floats
     torque: float = 0.0
+    """Of the equation that the orbit solves."""
     rate: float = 1.0
+    """Rate at which deviations from upright rest grow there."""
 
     def mirrored(self) -> Orbit:
         """Return the image under ``th -> -th``, an orbit of the opposite torque."""
@@ -321,20 +315,10 @@ def separatrix() -> Orbit:
 def loop(torque: float) -> Orbit:
     """Return the orbit that leaves upright rest ``pi - asin(torque)`` and comes back to it.
 
-    At a distance ``u`` from there ``th'^2 / 2 = G(u) = c (1 - cos u) - torque (u - sin u)``,
-    ``c = sqrt(1 - torque^2)``, up to its zero ``u_t``, where the orbit turns. With ``u = u_t /
+    At a distance ``u`` from there ``th'^2 / 2 = G(u) = c (1 - cos u) - torque (u - sin u)``, ``c =
+    sqrt(1 - torque^2)``, up to its zero ``u_t``, where the orbit turns. With ``u = u_t /
     cosh(y)^2`` time is ``dt / dy = 2 / sqrt(2 h)``, ``h = G / (u tanh y)^2``, which is smooth and
     positive from the turning point, ``y = 0``, on to upright rest.
-
-    Parameters
-    ----------
-    torque : float
-        Above -1 and below 1, not 0.
-
-    Returns
-    -------
-    Orbit
-        The way there, at negative times, and the way back.
     """
     if torque < 0:
         return loop(-torque).mirrored()

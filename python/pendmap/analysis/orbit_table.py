@@ -1,4 +1,4 @@
-"""Closed orbits and attractors as columns: what they are, multipliers, stroboscopic points."""
+"""Closed orbits and attractors as columns: kind, multipliers, stroboscopic points."""
 
 from __future__ import annotations
 
@@ -11,21 +11,12 @@ from pendmap.units import RATE, TIME, VELOCITY, Units
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import xarray as xr
     from numpy.typing import NDArray
 
 
 def table(orbits: Sequence[dict[str, Any]], units: Units, one: str) -> dict[str, Any]:
-    """Return orbits as variables over the dimension ``one``, their points over ``point``.
-
-    Parameters
-    ----------
-    orbits : sequence of dict
-        As the core gives them.
-    units : Units
-        What the numbers are to be counted in.
-    one : str
-        The dimension: ``attractor`` or ``orbit``.
-    """
+    """Return orbits as variables over the dimension ``one``, their points over ``point``."""
 
     def column(key: str, none: float) -> list[float]:
         return [none if a[key] is None else a[key] for a in orbits]
@@ -66,18 +57,8 @@ def table(orbits: Sequence[dict[str, Any]], units: Units, one: str) -> dict[str,
     }
 
 
-def row(dataset: Any, one: str, k: int) -> dict[str, Any]:  # noqa: ANN401 (xarray takes a while)
-    """Return one orbit of a dataset as the JSON object says it.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        With a :func:`table` over the dimension ``one``.
-    one : str
-        ``attractor`` or ``orbit``.
-    k : int
-        Which.
-    """
+def row(dataset: xr.Dataset, one: str, k: int) -> dict[str, Any]:
+    """Return one orbit of a :func:`table` over ``one`` for the JSON object."""
     own = dataset.isel({one: k})
     n = int(own["n"])
     closed = n > 0

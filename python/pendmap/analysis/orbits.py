@@ -3,66 +3,74 @@
 from __future__ import annotations
 
 import math
-import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from pendmap import _core
+from pendmap.analysis import orbit_table, result
 from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.orbits import fields as drawn_fields
 from pendmap.analysis.draws.orbits import orbits_over
 from pendmap.analysis.grid import Axis, Grid
-from pendmap.analysis.orbit_table import table
-from pendmap.analysis.summary import of_model
-from pendmap.errors import (
-    MOST_CELLS,
-    MOST_THREADS,
-    check_callable,
-    check_type,
-    check_whole,
-    core_errors,
-    instruction_set,
-)
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.result import Field, Schema, drawn_field, summarised
+from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
+    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
 
 LONGEST = 64
-"""The longest period that is looked for, in forcing periods."""
-
+"""Longest period of an orbit, in forcing periods."""
 _CELLS, _FINER = 200, 4
-"""Cells on each side of the box for a period, and up to how many periods they grow with it."""
-
+"""Cells on each side of the box for each period, up to how many periods."""
 _SAMPLES = 128
-"""Samples a period of an orbit's path."""
-
+"""Samples in a forcing period of an orbit's path."""
 _TOLERANCE = 1e-9
-"""The error of a path after a period: it is a picture."""
-
+"""Error of a path after a period: it is a picture."""
 _LISTED = 12
-"""Orbits that the summary lists."""
+"""Orbits that a summary lists."""
+
+
+def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the orbits for the JSON object."""
+    return [
+        orbit_table.row(dataset, "orbit", k)
+        | {"stable": bool(dataset["stable"][k]), "residual": float(dataset["residual"][k])}
+        for k in range(dataset.sizes["orbit"])
+    ]
+
+
+SCHEMA = Schema(
+    "orbits",
+    result.UNITS,
+    Field("orbits", "", "closed orbits, stable and unstable", read=_orbits),
+    Field("n", "periods", "smallest period"),
+    Field("w", "turns", "net turns over it"),
+    Field("cells", "1", "cells of the box"),
+    Field("begun", "1", "places from which Newton's method began"),
+    result.SECONDS,
+    result.SIMD,
+    result.THREADS,
+    *result.END,
+    drawn_field(drawn_fields),
+    result.SECTION,
+    *result.BOX,
+    *result.UNSAID,
+)
 
 
 def window(pendulum: Pendulum | Rig, n: int, w: int) -> Grid:
-    """Return the box in which orbits are looked for where none is given.
+    """Return the default box: velocities to ``v = |w| omega / n + 2 sqrt(1 + |p|)``.
 
-    Velocities reach from ``-v`` to ``v``, ``v = |w| omega / n + 2 sqrt(1 + |p|)``: the mean speed
-    of the turns, and that of a fall from the top under the greatest pull of the drive.
-
-    Parameters
-    ----------
-    pendulum : Pendulum or Rig
-        The model; with a rig the box is in rad/s.
-    n, w : int
-        Period and net turns.
+    The mean speed of the turns, and that of a fall from the top under the drive's greatest pull.
     """
     bare, units = without_dimensions(pendulum)
     fastest = abs(w) / n * 2 * math.pi / bare.period + 2 * math.sqrt(1 + abs(bare.p))
@@ -80,7 +88,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     threads: int | None = None,
     draws: int | None = None,
     seed: int = 0,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """All periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
 
@@ -107,16 +115,12 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         Net turns over that period, forward positive.
     grid : Grid, optional
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
-    threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
     draws : int, optional
-        How many models are drawn from the model's ``[covariance]``, each computed too: how far
-        orbits move, and in how many draws they are there and stable
+        Number of models drawn from the model's ``[covariance]`` with ``seed``, each computed too:
+        how far orbits move, and in how many draws they exist and are stable
         (:func:`pendmap.analysis.draws.orbits.orbits_over`).
-    seed : int
-        Draws them.
-    progress : callable, optional
-        Called now and then with what is done and in all.
+    threads, seed, progress
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
@@ -139,58 +143,41 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum, units = without_dimensions(model)
     n = check_whole("n", n, 1, LONGEST)
     w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
-    check_callable("progress", progress)
-    workers = 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS)
+    numerics = Numerics(threads=threads, seed=seed, progress=progress)
     grid = window(model, n, w) if grid is None else grid
     check_type("grid", grid, Grid, "Grid.square(200)")
-    several = None if draws is None else drawn(model, draws, seed)
-    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
-    began = time.perf_counter()
+    if draws is not None:
+        several = drawn(model, draws, seed)
+        same = partial(orbit, n=n, w=w, grid=grid, threads=threads)
+        own = same(model, progress=part(progress, 0, len(several) + 1))
+        return orbits_over(own, several, same, progress)
     low, high, count = grid.velocity.as_tuple
     box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.orbits(pendulum.parameters, (n, w), grid.theta.as_tuple, box, workers, progress)
+        raw = _core.orbits(
+            pendulum.parameters, (n, w), grid.theta.as_tuple, box, numerics.workers, progress
+        )
         paths = _paths(pendulum, raw["orbits"], units)
     found = raw["orbits"]
     dataset = xr.Dataset(
         {
-            **table(found, units, "orbit"),
+            **orbit_table.table(found, units, "orbit"),
             "stable": ("orbit", np.array([o["stable"] for o in found], dtype=np.int8)),
             "residual": ("orbit", np.array([o["residual"] for o in found], dtype=float)),
             **paths,
         },
         coords={"orbit": ("orbit", np.array([o["name"] for o in found], dtype=str))},
     )
-    dataset.attrs = {
-        "kind": "orbits",
-        "title": model.title,
-        **model.attributes,
-        "section": model.units.section,
+    values = {
+        **numerics.provenance(),
+        **grid.attributes,
         "n": n,
         "w": w,
-        "low_theta": grid.theta.low,
-        "high_theta": grid.theta.high,
-        "low_velocity": low,
-        "high_velocity": high,
         "cells": grid.cells,
-        "begun": raw["begun"],
-        "seconds": time.perf_counter() - began,
-        "simd": instruction_set(),
-        "threads": workers or _core.default_threads(),
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(dataset, pendulum, friction=raw["friction"])]
-    lines += of_model(model, "orbits are")
-    dataset.attrs["summary"] = "\n".join(lines)
-    if several is None:
-        return dataset
-    return orbits_over(
-        dataset,
-        several,
-        lambda one, report: orbit(one, n, w, grid, threads=threads, progress=report),
-        whole,
-    )
+    SCHEMA.complete(dataset, model, values, {"begun": raw["begun"]})
+    summarised(dataset, _summary(dataset, pendulum, friction=raw["friction"]), model, "orbits are")
+    return dataset
 
 
 def _paths(pendulum: Pendulum, found: list[dict[str, Any]], units: Units) -> dict[str, Any]:

@@ -3,48 +3,76 @@
 from __future__ import annotations
 
 import json
-import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from scipy.ndimage import find_objects, label
 
 from pendmap import _core
+from pendmap.analysis import result
 from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.parameter_map import fields as drawn_fields
 from pendmap.analysis.draws.parameter_map import regimes_over
+from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.summary import box_said, of_model
-from pendmap.analysis.sweep import STARTS, CellSearch, title, varied, without_damping
+from pendmap.analysis.result import Field, Schema, drawn_field, summarised
+from pendmap.analysis.summary import box_said
+from pendmap.analysis.sweep import (
+    SEARCH,
+    STARTS,
+    CellSearch,
+    title,
+    undecided_cells,
+    varied,
+    without_damping,
+)
 from pendmap.analysis.tongues import MOST_P, tongues
-from pendmap.errors import InputError, check_callable, check_flag, core_errors
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.errors import InputError, check_flag, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
     from pendmap.analysis.grid import Grid
+    from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
-
-    Progress = Callable[[int, int], object]
 
 
 CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
 """Comment of the variable ``chaos_periods``."""
 _LISTED = 10
+"""Regimes that a summary lists."""
 _PLACES = 3
-"""Groups of cells with undecided starts that a summary names."""
-
+"""Groups of cells with undecided starts that a summary lists."""
 _FREQUENCIES = 81
+"""Frequencies at which the critical curves over a map begin."""
 _STEPS = 10_000
-"""Parts of a computation that are told apart where two parts are one."""
+"""Steps of the progress that two parts of a computation share."""
+
+
+def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the regimes with their shares of the cells for the JSON object."""
+    rows = zip(dataset["regime_kinds"].values, dataset["regime_share"].values, strict=True)
+    return [{"kinds": json.loads(str(kinds)), "share": float(share)} for kinds, share in rows]
+
+
+SCHEMA = Schema(
+    "parameter_map",
+    result.UNITS,
+    Field("columns", "", "parameter that varies along columns"),
+    Field("rows", "", "parameter that varies along rows"),
+    Field("regimes", "", "sets of attractors with their shares of the cells", read=_regimes),
+    Field("cells", "1", "cells of the plane"),
+    *SEARCH,
+    drawn_field(drawn_fields),
+)
 
 
 def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -92,24 +120,22 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     box : Grid, optional
         Where they lie; by default that of :func:`pendmap.basins`.
     tol : float
-        As of :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
+        As for :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
         with the period and the drive's pull.
     max_periods : int, optional
         Periods after which trajectories begin to be watched; by default until damping would have
         shrunk a free motion by exp(-40), 64 at least.
-    threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
     seed : int
-        Shifts the initial conditions.
+        Shifts the initial conditions, and draws the models of ``draws``.
     curves : bool
         Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
-        How many models are drawn from the model's ``[covariance]``, each computed too: how
-        probable each regime is in each cell (``analysis.draws.parameter_map``). ``seed``
-        draws them.
-    progress : callable, optional
-        Called now and then with the number of cells done and in all.
+        Number of models drawn from the model's ``[covariance]``, each computed too: the
+        probability of each regime in each cell
+        (:func:`pendmap.analysis.draws.parameter_map.regimes_over`).
+    threads, progress
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
@@ -140,67 +166,42 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     model = pendulum
     pendulum, units = without_dimensions(model)
     columns, rows = varied(model, ranges, 2)
-    check_callable("progress", progress)
-    search = CellSearch(starts, box, tol, max_periods, threads, seed)
-    theta, velocity = search.initial(units)
-    several = None if draws is None else drawn(model, draws, search.seed)
-    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
+    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    search = CellSearch(starts, box, numerics)
+    curves = check_flag("curves", curves)
+    if draws is not None:
+        several = drawn(model, draws, seed)
+        box = search.within(units)
+        same = partial(parameter_map, ranges=ranges, starts=starts, box=box, **numerics.options)
+        own = same(model, curves=curves, progress=part(progress, 0, len(several) + 1))
+        return regimes_over(own, several, same, progress)
     over = None
-    if check_flag("curves", curves):
+    if curves:
         first, progress = _halves(progress)
         over = _curves(model, columns, rows, first)
-    began = time.perf_counter()
     with core_errors():
         raw = _core.parameter_map(
             pendulum.parameters,
             (columns.kernel, rows.kernel),
-            theta,
-            velocity,
+            *search.initial(units),
             starts,
-            tol,
-            max_periods,
-            search.workers,
+            numerics.tol,
+            numerics.max_periods,
+            numerics.workers,
             progress,
         )
-    dataset = _dataset(raw, (columns, rows), units)
-    if over is not None:
-        dataset = dataset.assign(over)
-    dataset.attrs = {
-        "kind": "parameter_map",
-        "title": title(model, columns, rows),
-        **model.attributes,
-        "section": model.units.section,
+    dataset = _dataset(raw, (columns, rows), units).assign(over or {})
+    values = {
+        **search.attributes(raw, units),
         "columns": columns.name,
         "rows": rows.name,
         "cells": columns.values.size * rows.values.size,
-        **search.attributes(raw, units),
-        "seconds": time.perf_counter() - began,
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    lines = [
-        *_summary(dataset),
-        *without_damping(model, columns, rows),
-        *of_model(model, "attractors are"),
-    ]
-    dataset.attrs["summary"] = "\n".join(lines)
-    if several is None:
-        return dataset
-
-    def again(one: Pendulum | Rig, report: Progress | None) -> xr.Dataset:
-        return parameter_map(
-            one,
-            ranges,
-            starts=starts,
-            box=search.within(units),
-            tol=tol,
-            max_periods=max_periods,
-            threads=threads,
-            seed=seed,
-            progress=report,
-        )
-
-    return regimes_over(dataset, several, again, whole)
+    SCHEMA.complete(dataset, model, values, raw)
+    dataset.attrs["title"] = title(model, columns, rows)
+    lines = [*_summary(dataset), *without_damping(model, columns, rows)]
+    summarised(dataset, lines, model, "attractors are")
+    return dataset
 
 
 def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
@@ -258,10 +259,7 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
 
 
 def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
-    """Return what two parts of a computation report to; the first may begin again, and waits then.
-
-    Each part counts as half of all.
-    """
+    """Return the progress of two halves of a computation; the first may begin again."""
     if progress is None:
         return None, None
     furthest = 0.0
@@ -280,7 +278,7 @@ def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None
 def _curves(
     model: Pendulum | Rig, columns: Varied, rows: Varied, progress: Progress | None
 ) -> dict[str, Any]:
-    """Return the critical curves between the ends of the axes, before anything else is computed."""
+    """Return the critical curves between the ends of the axes."""
     axes = (columns, rows)
     by_name = {axis.name.lower(): axis for axis in axes}
     if set(by_name) != {"p", "omega"}:
@@ -308,17 +306,7 @@ def _curves(
 
 
 def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[str, Any]:
-    """Return all attractors of all cells as variables over ``entry``.
-
-    Parameters
-    ----------
-    raw : dict
-        As the core gives them.
-    kind : ndarray
-        Place of each one's kind in the dataset's list.
-    units : Units
-        What the numbers are to be counted in.
-    """
+    """Return all attractors, each with the index of its kind, over ``entry``."""
     rate = {"units": units.of_rate}
     speed = {"units": units.of_velocity}
     return {
@@ -335,7 +323,7 @@ def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[s
 
 
 def chaos(attributes: Mapping[str, Any]) -> list[str]:
-    """Return for how long chaos was watched, where there is any."""
+    """Return a line on how long chaos was watched, where there is any."""
     periods = attributes["chaos_periods"]
     if not periods:
         return []
@@ -347,7 +335,7 @@ def chaos(attributes: Mapping[str, Any]) -> list[str]:
 
 
 def undecided(attributes: Mapping[str, Any]) -> list[str]:
-    """Return what a summary says of starts that end nowhere."""
+    """Return lines on the shares of undecided and failed starts."""
     return [
         f"{100 * attributes[key]:.3g} % of the starts {word}."
         for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
@@ -355,36 +343,8 @@ def undecided(attributes: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return where a result has undecided starts: groups of cells that touch, the largest first.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A map over two parameters, or a bifurcation diagram.
-
-    Returns
-    -------
-    list of dict
-        ``ranges``, the first and the last value of each parameter, by its name; ``cells``, how
-        many have undecided starts; ``undecided``, their share of the starts of these.
-    """
-    share = dataset["undecided"]
-    groups, _ = label(share.values > 0, structure=np.ones((3,) * share.ndim))
-    found = []
-    for number, box in enumerate(find_objects(groups), 1):
-        mine = groups == number
-        ranges = {
-            str(name): (float(dataset[name].values[at][0]), float(dataset[name].values[at][-1]))
-            for name, at in zip(reversed(share.dims), reversed(box), strict=True)
-        }
-        mean = float(share.values[mine].mean())
-        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
-    return sorted(found, key=lambda one: -one["cells"])
-
-
 def _said(place: dict[str, Any]) -> str:
-    """Say where a group of cells is, and of how many."""
+    """Return the ranges of a group of cells, and its size, in words."""
     spans = [
         f"{name} = {low:.4g}" + (f" to {high:.4g}" if high > low else "")
         for name, (low, high) in place["ranges"].items()

@@ -1,4 +1,4 @@
-"""Regimes: what kinds of attractor a pendulum has, in words, and how often over a plane."""
+"""Regimes: the sets of kinds of attractor over a plane, by name, and their shares."""
 
 from __future__ import annotations
 
@@ -31,18 +31,7 @@ _ORDER = (
 
 
 def kind_of(kind: str, n: int, w: int) -> str:
-    """Return the name of a kind of attractor: mirror images have one.
-
-    ``rest``, ``inverted rest``, ``oscillation period n``, ``rotation n:w``,
-    ``quasiperiodic rotation``, ``libration chaos``, ``rotating chaos``, ``tumbling chaos``.
-
-    Parameters
-    ----------
-    kind : str
-        ``rest``, ``inverted_rest``, ``oscillation``, ``rotation``, ...
-    n, w : int
-        Period in forcing periods and net turns over it.
-    """
+    """Return the name of a kind of attractor, like ``rotation 1:2``; mirror images have one."""
     if kind == "oscillation":
         return f"oscillation period {n}"
     if kind == "rotation":
@@ -51,7 +40,7 @@ def kind_of(kind: str, n: int, w: int) -> str:
 
 
 def order(name: str) -> tuple[int, int, int]:
-    """Return where a kind stands in a list: rest first, chaos last, short periods before long."""
+    """Return the rank of a kind: rest first, chaos last, short periods before long."""
     place = next(k for k, word in enumerate(_ORDER) if name.startswith(word))
     digits = name.rsplit(" ", 1)[-1]
     n, _, w = digits.partition(":")
@@ -61,26 +50,7 @@ def order(name: str) -> tuple[int, int, int]:
 def regimes(
     names: Sequence[str], cell: NDArray[np.int32], cells: int
 ) -> tuple[list[tuple[str, ...]], NDArray[np.int16], NDArray[np.float64]]:
-    """Return the sets of kinds that occur, which of them each cell has, and their shares.
-
-    Parameters
-    ----------
-    names : sequence of str
-        The kind of each attractor.
-    cell : ndarray
-        The cell of each, ascending.
-    cells : int
-        How many cells there are.
-
-    Returns
-    -------
-    sets : list of tuple of str
-        The most frequent first.
-    regime : ndarray, shape (cells,)
-        Index into it.
-    share : ndarray, shape (len(sets),)
-        Share of the cells.
-    """
+    """Return the sets of kinds, the most frequent first; the set of each cell; their shares."""
     bounds = np.searchsorted(cell, np.arange(cells + 1))
     own = [
         tuple(sorted(set(names[low:high]), key=order)) or (UNDECIDED,)

@@ -1,4 +1,4 @@
-"""What a basin map says, in a few lines of text."""
+"""Summary of a basin map, and lines that several summaries share."""
 
 from __future__ import annotations
 
@@ -26,10 +26,7 @@ _STILL = 1e-12
 
 
 def of_model(model: Pendulum | Rig, what: str) -> list[str]:
-    """Say what a model is worth: that it misses its record, and what acts on its reading alone.
-
-    Where effects change the sensor's reading ``what`` is shown is the motion.
-    """
+    """Return lines on the model: it misses its record, or effects act on its reading alone."""
     ratio = misses(model.notes)
     lines = []
     if math.isfinite(ratio):
@@ -44,34 +41,33 @@ def of_model(model: Pendulum | Rig, what: str) -> list[str]:
 
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
-    """Return the findings of a basin map, a sentence a line.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As made by :func:`pendmap.basins`, all attributes but ``summary`` set.
-    pendulum : Pendulum
-        The model without dimensions.
-    bound_was_chosen : bool
-        Whether the bound on periods is pendmap's own choice, not the caller's.
-    """
-    plane = dataset.attrs["plane"]
+    """Return the findings of a basin map, whose attributes are set, a sentence a line."""
+    a, plane = dataset.attrs, dataset.attrs["plane"]
     unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
-        lines = [_conservative(dataset)]
+        line = (
+            "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
+            "and the finite-time exponent after "
+            f"{counted(a['layer_periods'], 'period')} are shown instead."
+        )
+        lines = [line]
     elif plane == "only_chaos":
         lines = [_only_chaos(dataset)]
     else:
         lines = [*_attractors(dataset), *_settling(dataset), *_texture(dataset)]
     for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
-        share = dataset.attrs[key]
+        share = a[key]
         if share > 0 and plane != "conservative":
             bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
             bound = bound.split(";")[0] if unlimited else bound  # no bound helps
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
-    a = dataset.attrs
     if "theta" in dataset.dims:
-        lines.insert(0, _window(dataset))
+        theta, velocity = (
+            tuple(dataset[f"{name}_bounds"].values[[0, -1], [0, 1]])
+            for name in ("theta", "velocity")
+        )
+        window = window_said(theta, velocity, Units.of(a))
+        lines.insert(0, f"{window}: {counted(a['cells'], 'start')}.")
     if plane != "conservative":
         lines += unlimited
         if not unlimited and a["undecided"] > 0:
@@ -79,15 +75,22 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
     lines += of_model(pendulum, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
-        f"{counted(a['steps_per_period'], 'step')} a period, "
-        f"error reached {a['reached_error']:.1e}, "
-        f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')} ({a['simd']})."
+        f"{effort(a)}"
     )
     return "\n".join(lines)
 
 
+def effort(a: Mapping[Any, Any]) -> str:
+    """Return how a result was computed: steps, error, time."""
+    return (
+        f"{counted(a['steps_per_period'], 'step')} a period, error reached "
+        f"{a['reached_error']:.1e}, {a['seconds']:.2f} s on {counted(a['threads'], 'thread')} "
+        f"({a['simd']})."
+    )
+
+
 def unlimited_rotation(pendulum: Pendulum) -> list[str]:
-    """Say so where nothing limits the speed of a rotation, so that it settles on nothing.
+    """Return lines where nothing limits the speed of a rotation, so that it never settles.
 
     Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
     grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
@@ -111,11 +114,7 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
 
 
 def _sustained_rotation(pendulum: Pendulum) -> list[str]:
-    """Say what keeps starts undecided where dry friction alone damps a driven pendulum.
-
-    Friction of one sense is a constant torque, which keeps phase area: only where the motion turns
-    back does the area shrink.
-    """
+    """Return a line where dry friction alone damps: of one sense it keeps phase area."""
     dry = _dry(pendulum)
     if dry is None or dry[0] == 0 or pendulum.p == 0:
         return []
@@ -143,7 +142,7 @@ def _dry(pendulum: Pendulum) -> tuple[float, float] | None:
 
 
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
-    """Say after how many periods a start is undecided, and what can be done about it."""
+    """Return after how many periods a start is undecided, and what raises the bound."""
     undecided = dataset["label"] == 0
     if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
         return ": they stand exactly on an unstable rest, where nothing moves them"
@@ -154,7 +153,7 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
 
 
 def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
-    """Return which starts hang, or stand upside down, without moving: rest whatever the drive."""
+    """Return which starts are at rest, hanging or inverted, whatever the drive."""
     of = "start_" if "start_theta" in dataset else ""
     hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
     alone = dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]"
@@ -162,20 +161,8 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
     return still
 
 
-def _window(dataset: xr.Dataset) -> str:
-    """Say which starts the numbers are of: a selection of the map keeps them."""
-    theta, velocity = (
-        tuple(dataset[f"{name}_bounds"].values[[0, -1], [0, 1]]) for name in ("theta", "velocity")
-    )
-    said = window_said(theta, velocity, Units.of(dataset.attrs))
-    return f"{said}: {counted(dataset.attrs['cells'], 'start')}."
-
-
 def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Units) -> str:
-    """Return a window of starts in words, and whether it is the default one.
-
-    ``[-pi, pi] x [-3, 3]``, in SI ``[-pi, pi] x [-3 w0, 3 w0]``: the same motions either way.
-    """
+    """Return a window of starts in words, and whether it is the default one."""
     usual = (math.pi, units.given(FASTEST, VELOCITY))
     default = all(
         np.allclose(span, (-reach, reach), rtol=1e-12)
@@ -188,7 +175,7 @@ def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Un
 
 
 def box_said(attrs: Mapping[Any, Any]) -> str:
-    """Return in words where the starts of a search over many pendulums lie."""
+    """Return the box of the starts of a search over many pendulums in words."""
     theta, velocity = (
         (float(attrs[f"low_{name}"]), float(attrs[f"high_{name}"]))
         for name in ("theta", "velocity")
@@ -196,19 +183,11 @@ def box_said(attrs: Mapping[Any, Any]) -> str:
     return f"in {window_said(theta, velocity, Units.of(attrs))}"
 
 
-def _conservative(dataset: xr.Dataset) -> str:
-    return (
-        "Without damping (gamma = 0) phase area is kept and there are no attractors: net turns "
-        "and the finite-time exponent after "
-        f"{counted(dataset.attrs['layer_periods'], 'period')} are shown instead."
-    )
-
-
 def most_missed(starts: int) -> float:
-    """Return the largest share of starts that ``starts`` drawn at random all miss, at 95 %.
+    """Return the largest share that ``starts`` random starts all miss, at 95 %.
 
-    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none out of
-    ``starts`` (Clopper & Pearson 1934, Biometrika 26, 404; one-sided).
+    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none (Clopper &
+    Pearson 1934, Biometrika 26, 404; one-sided).
     """
     return 1 - math.pow(0.05, 1 / starts)
 
@@ -255,20 +234,16 @@ def _settling(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     if a["longest_settle"] < 0:
         return []
-    own = (
-        "" if is_driven(a["p"], effects_of(a)) else f" (without drive a period is {_own_period(a)})"
-    )
+    own, units = "", Units.of(a)
+    if not is_driven(a["p"], effects_of(a)):
+        time = f" = {units.given(math.tau, TIME):.4g} s" if units.si else ""
+        own = f" (without drive a period is {units.own_period}{time})"
     times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
     return [f"Settling takes {times}{own}."]
 
 
-def _own_period(attrs: Mapping[Any, Any]) -> str:
-    units = Units.of(attrs)
-    return f"{units.own_period} = {units.given(math.tau, TIME):.4g} s" if units.si else "2 pi"
-
-
 def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
-    """Say how fractal the boundary is, as far as there is one."""
+    """Return lines on how fractal the boundary is."""
     lines = []
     if "boundary_basin_entropy" in attrs:
         value = attrs["boundary_basin_entropy"]

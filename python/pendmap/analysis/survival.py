@@ -1,4 +1,4 @@
-"""Lifetimes: the exponential tail of times until something happens, some of them cut off."""
+"""Survival: the exponential tail of censored capture times, and growth on the chaotic saddle."""
 
 from __future__ import annotations
 
@@ -25,72 +25,59 @@ if TYPE_CHECKING:
 Times = npt.NDArray[np.int64]
 
 LEAST: Final = 100
-"""Captures without which nothing is said of a tail."""
+"""Captures below which no tail is fitted."""
 
 LEVEL: Final = 0.05
-"""Chance at which times of an exponential tail are taken for something else."""
+"""Level of the tests of a tail: a lower chance rejects the exponential."""
 
 _BINS: Final = 8
-"""Stretches of the tail whose rates are compared, each with as many captures to be expected."""
+"""Stretches of the tail, of equal expected captures, whose rates are compared."""
 
 _GROWTH: Final = 1.1
-"""Each beginning that is tried over the one before."""
+"""Ratio of successive beginnings that are tried."""
 
 _AGREEING: Final = 3
 """Beginnings in a row that must be exponential."""
+_FOLLOWED: Final = 400
+"""Trajectories whose deviations are followed at most."""
+_LONGEST: Final = 400
+"""Periods for which they are followed at most."""
+_LEAST_FOLLOWED: Final = 20
+"""Trajectories without which no growth is given."""
+_SETTLING: Final = 4.0
+"""Power of e by which a trajectory nears an attractor before it counts as captured."""
+_LEAST_SETTLING, _MOST_SETTLING = 10, 500
+"""Bounds of the settling time, periods."""
+_ALIGNED: Final = 5
+"""Periods in which a deviation turns into the direction of growth."""
 
 
 @dataclass(frozen=True)
 class Tail:
-    """What lives beyond ``begin`` periods.
-
-    Attributes
-    ----------
-    begin : int
-        Periods.
-    mean, stderr : float
-        Mean time that is left, in periods, and its standard error ``mean / sqrt(captured)``.
-    captured, censored : int
-        Captures after ``begin``, and trajectories alive at the bound.
-    weibull, steady : float
-        Chances of a shape as unlike an exponential's in a sample of one: by the score test for
-        the shape of a Weibull distribution, and by chi squared of the rates in eight stretches.
-    """
+    """Exponential fit to the times beyond ``begin`` periods."""
 
     begin: int
     mean: float
     stderr: float
+    """Standard error ``mean / sqrt(captured)``, in periods."""
     captured: int
     censored: int
     weibull: float
+    """Chance of an exponential tail by the score test for the shape of a Weibull distribution."""
     steady: float
+    """Chance of an exponential tail by chi squared of the rates in eight stretches."""
 
     @property
     def is_exponential(self) -> bool:
-        """Whether neither test speaks against it."""
+        """Whether neither test rejects it."""
         return min(self.weibull, self.steady) > LEVEL
 
 
 def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
-    """Fit an exponential to what lives beyond ``start`` periods.
+    """Fit an exponential to times beyond ``start``; ``censored`` starts are alive at ``bound``.
 
-    The maximum of the likelihood is at the sum of all times beyond ``start``, those cut off at
-    ``bound`` included, over the number of captures.
-
-    Parameters
-    ----------
-    times : ndarray of int, shape (N,)
-        Periods until capture.
-    censored : int
-        Trajectories alive at ``bound``.
-    bound : int
-        Where these were given up.
-    start : int
-        Where the tail begins.
-
-    References
-    ----------
-    Cox & Oakes (1984), Analysis of Survival Data, sections 3.2 and 3.3.
+    Maximum likelihood: the mean is the sum of all times beyond ``start``, those cut off included,
+    over the number of captures (Cox & Oakes 1984, Analysis of Survival Data, sections 3.2 and 3.3).
     """
     own = times[times > start] - start
     count, left = own.size, bound - start
@@ -112,13 +99,8 @@ def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
 def begin(times: Times, censored: int, bound: int) -> Tail | None:
     """Return the tail from where it is exponential, None where it is so nowhere.
 
-    Twice the earliest beginning of which both tests, and those of the next two tried, do not say
-    otherwise: just there what is not yet exponential hides in the noise, and would bias the mean.
-
-    Parameters
-    ----------
-    times, censored, bound
-        As of :func:`tail`.
+    It begins at twice the earliest period from which the tests of three beginnings in a row pass:
+    what is not yet exponential just there hides in the noise, and would bias the mean.
     """
     row: list[Tail] = []
     for start in _beginnings(times):
@@ -133,10 +115,7 @@ def begin(times: Times, censored: int, bound: int) -> Tail | None:
 
 
 def residual(times: Times, censored: int, bound: int) -> list[Tail]:
-    """Return the tails from all beginnings that are tried, as long as any is left.
-
-    Their means over their beginnings are level where the tail is exponential.
-    """
+    """Return tails from all beginnings: their means are level where the tail is exponential."""
     tails = (tail(times, censored, bound, start) for start in _beginnings(times))
     return [each for each in tails if each.captured >= LEAST // 4]
 
@@ -149,7 +128,7 @@ def _beginnings(times: Times) -> Iterator[int]:
 
 
 def _weibull(own: Times, censored: int, left: int) -> float:
-    """Chance of a score as large for the shape k in ``exp(-(x/a)^k)``, were k = 1."""
+    """Return the chance of a score as large for the shape k in ``exp(-(x/a)^k)``, were k = 1."""
     x = own - 0.5  # a time in whole periods is over half a period before, on average
     logs = np.log(x)
     end, log_end = float(left), math.log(max(left, 1))
@@ -163,7 +142,7 @@ def _weibull(own: Times, censored: int, left: int) -> float:
 
 
 def _steady(own: Times, censored: int, left: int, rate: float) -> float:
-    """Chance of rates as different in stretches of the tail, were they all one."""
+    """Return the chance of rates as different in stretches of the tail, were they equal."""
     from scipy.special import chdtrc  # noqa: PLC0415 (scipy takes a while)
 
     last = math.exp(-rate * left) if censored else 0.0
@@ -180,31 +159,13 @@ def _steady(own: Times, censored: int, left: int, rate: float) -> float:
     return float(chdtrc(max(edges.size - 2, 1), squares))
 
 
-# The chaotic saddle: how deviations grow while trajectories are not yet captured.
-
-
-_FOLLOWED: Final = 400
-"""Trajectories whose deviations are followed, and ..."""
-_LONGEST: Final = 400
-"""... for so many periods at the most."""
-_LEAST_FOLLOWED: Final = 20
-_SETTLING: Final = 4.0
-"""A trajectory comes nearer to an attractor by this power of e before it counts as captured."""
-_LEAST_SETTLING, _MOST_SETTLING = 10, 500
-_ALIGNED: Final = 5
-"""Periods in which a deviation turns into the direction of growth."""
-
-
 def growth_on_saddle(
     found: xr.Dataset,
     fitted: Tail | None,
     pendulum: Pendulum,
     threads: int | None,
 ) -> tuple[float, float, int]:
-    """Return the exponent per period while trajectories live, its standard error, and of how many.
-
-    From ``_ALIGNED`` periods on until the settling begins that ends in capture.
-    """
+    """Return the exponent per period of starts not yet captured, its error, and of how many."""
     none = math.nan, math.nan, 0
     if fitted is None:
         return none

@@ -1,4 +1,4 @@
-"""A parameter that varies: which of the model's it is, and its values."""
+"""Parameters that vary, and the search for attractors at each of their values."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import find_objects, label
 
 from pendmap import _core
-from pendmap.analysis.grid import FASTEST, Axis, Grid, coordinate
+from pendmap.analysis import result
+from pendmap.analysis.grid import Grid, coordinate
+from pendmap.analysis.result import Field
 from pendmap.errors import (
     MOST_CELLS,
-    MOST_PERIODS,
-    MOST_SEED,
-    MOST_THREADS,
     InputError,
     check_number,
     check_type,
@@ -29,8 +29,10 @@ from pendmap.units import VELOCITY
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import xarray as xr
     from numpy.typing import NDArray
 
+    from pendmap.analysis.numerics import Numerics
     from pendmap.model import Effect, Pendulum
     from pendmap.units import Units
 
@@ -41,45 +43,32 @@ _UNITS |= {"stroke_mm": "mm", "frequency_hz": "Hz"}
 
 @dataclasses.dataclass(frozen=True)
 class Varied:
-    """A parameter and the values that it takes.
-
-    Attributes
-    ----------
-    name : str
-        ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque`` or ``phase``, without dimensions; of a
-        :class:`pendmap.Rig` also ``Omega``, ``c_over_m``, ``Tr`` and ``phi`` in SI,
-        ``frequency_hz = Omega / 2 pi`` with ``p`` kept, and ``stroke_mm``, the amplitude ``Y`` of
-        ``p = Y Omega^2 / g`` with ``Omega`` kept; or ``EFFECT.PARAMETER``, in the model's own
-        units.
-    values : ndarray, shape (N,)
-        Ascending, evenly spaced, in those units.
-    index : int
-        Its place in the core's list of parameters.
-    bare : ndarray, shape (N,)
-        The values without dimensions.
-    unit : str
-        The unit of ``values``; empty where they have none.
-    """
+    """A parameter and the values that it takes: ascending, evenly spaced."""
 
     name: str
+    """As for :func:`pendmap.parameter_map`."""
     values: NDArray[np.float64]
+    """In the parameter's own units."""
     index: int
+    """Place in the core's list of parameters."""
     bare: NDArray[np.float64]
+    """The values without dimensions."""
     unit: str
+    """Unit of the values; empty where they have none."""
 
     @property
     def kernel(self) -> tuple[int, list[float]]:
-        """It as the core takes it."""
+        """Index and values as the core takes them."""
         return self.index, self.bare.tolist()
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of a quantity that takes its values."""
+        """Attributes of a quantity with these values."""
         return {"units": self.unit or "1", "long_name": self.name}
 
     @property
     def coordinates(self) -> dict[str, Any]:
-        """It as the coordinate of a dataset; with more values than one, with their bounds."""
+        """Coordinate of a dataset; with more than one value also their bounds."""
         x = self.values
         if x.size == 1:
             return {self.name: (self.name, x, self.attributes)}
@@ -96,29 +85,13 @@ _SYMBOLS = {
     "torque": ("torque",),
     "theta_r": ("\N{GREEK SMALL LETTER THETA}r", "Tr"),
 }
-"""What titles call parameters, without dimensions and in SI."""
+"""Symbols of parameters in titles, without dimensions and in SI."""
 
 
 def varied(
     model: Pendulum | Rig, ranges: Mapping[str, Sequence[float]], count: int
 ) -> tuple[Varied, ...]:
-    """Return the parameters that vary, each with its values.
-
-    Parameters
-    ----------
-    model : Pendulum or Rig
-        Whose they are.
-    ranges : mapping of str to (float, float, int)
-        First and last value, both included, and how many values.
-    count : int
-        How many parameters there must be.
-
-    Raises
-    ------
-    InputError
-        If there are more or fewer, the model has none of that name, or a value is outside its
-        range.
-    """
+    """Return the ``count`` parameters that vary: first and last value, how many values."""
     if not isinstance(ranges, dict) or len(ranges) != count:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
@@ -210,7 +183,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
 
 
 def _laboratory(rig: Rig) -> dict[str, tuple[str, float]]:
-    """Return which of a rig's numbers the laboratory's are, and what they are times to be it."""
+    """Return the laboratory's numbers: the rig's number that each changes, and by which factor."""
     known = {"frequency_hz": ("Omega", math.tau)}
     if rig.Omega > 0:  # without a frequency no stroke is an acceleration
         known["stroke_mm"] = ("p", 1e-3 * rig.Omega**2 / rig.gravity)
@@ -248,35 +221,18 @@ def _set(effect: Effect, parameter: str, value: float) -> Effect:
     return dataclasses.replace(effect, parameters={**effect.parameters, parameter: value}, ci95={})
 
 
-# How each of many pendulums is searched for attractors: from which starts, how long, how well.
-
-
 STARTS = 9
-"""Initial conditions of a cell where nothing is said."""
+"""Initial conditions of a cell where no number is given."""
 _SPREAD = 1000
+"""Cells on each side of the default box; they decide nothing."""
 _PLASTIC = 1.324717957244746
+"""Plastic number, whose powers make the recurrence in two dimensions even."""
 _CELLS = 61
-"""After so many cells initial conditions come again: a prime, so that columns differ too."""
+"""Cells after which initial conditions come again: a prime, so that columns differ too."""
 
 
 def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
-    """Return initial conditions that cover a box evenly: an additive recurrence.
-
-    No two of them are mirror images of one another, so that none is wasted on a symmetric pendulum.
-
-    Parameters
-    ----------
-    grid : Grid
-        The box; its cells do not matter.
-    count : int
-        How many.
-    seed : int
-        Shifts them.
-
-    Returns
-    -------
-    theta, velocity : ndarray, shape (count,)
-    """
+    """Return angles and velocities that cover a box evenly; no two are mirror images."""
     shift = 0.5 + (seed * 0.6180339887498949) % 1.0
     # Not the box's centre, where a pendulum hangs at rest and stays however unstable that is.
     k = 1 + np.arange(count)
@@ -288,74 +244,70 @@ def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], 
 
 @dataclasses.dataclass(frozen=True)
 class CellSearch:
-    """What a user chose, checked.
-
-    Parameters
-    ----------
-    starts : int
-        Initial conditions of each pendulum.
-    box : Grid or None
-        Where they lie; None: the box of :func:`pendmap.basins`.
-    tol, max_periods, threads, seed
-        As of :func:`pendmap.parameter_map`.
-
-    Raises
-    ------
-    InputError
-        If a value is outside its range.
-    """
+    """Where the search for attractors begins in each of many pendulums, checked."""
 
     starts: int
     box: Grid | None
-    tol: float
-    max_periods: int | None
-    threads: int | None
-    seed: int
+    numerics: Numerics
 
     def __post_init__(self) -> None:
         check_whole("starts", self.starts, 1, MOST_CELLS)
-        check_whole("seed", self.seed, 0, MOST_SEED)
-        check_number("tol", self.tol)
-        if self.threads is not None:
-            check_whole("threads", self.threads, 1, MOST_THREADS)
-        if self.max_periods is not None:
-            check_whole("max_periods", self.max_periods, 1, MOST_PERIODS)
         if self.box is not None:
             check_type("box", self.box, Grid, "Grid.square(100)")
 
     def within(self, units: Units) -> Grid:
-        """Return the box, in these units."""
-        if self.box is not None:
-            return self.box
-        reach = units.given(FASTEST, VELOCITY)
-        return Grid(Axis(-math.pi, math.pi, _SPREAD), Axis(-reach, reach, _SPREAD))
+        """Return the box, in these units; by default that of :func:`pendmap.basins`."""
+        return self.box or Grid.square(_SPREAD, units.given(1.0, VELOCITY))
 
     def initial(self, units: Units) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return initial conditions without dimensions; each cell takes those after the last's."""
-        theta, velocity = spread(self.within(units), _CELLS * self.starts, self.seed)
+        theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.seed)
         return theta, units.bare(velocity, VELOCITY)
 
-    @property
-    def workers(self) -> int:
-        """Number of threads as the core takes it."""
-        return self.threads or 0
-
     def attributes(self, raw: dict[str, Any], units: Units) -> dict[str, Any]:
-        """Return what a dataset says of the search whose result is ``raw``."""
-        box = self.within(units)
+        """Return the attributes of the search whose result is ``raw``."""
         return {
+            **self.numerics.provenance(),
+            **self.within(units).attributes,
             "starts": self.starts,
-            "low_theta": box.theta.low,
-            "high_theta": box.theta.high,
-            "low_velocity": box.velocity.low,
-            "high_velocity": box.velocity.high,
-            "tol": self.tol,
-            "reached_error": raw["reached_error"],
-            "searched_again": raw["searched_again"],
             "undecided": float(raw["undecided"].mean()),
             "chaos_periods": min((int(n) for n in raw["chaos_periods"] if n), default=0),
             "failed": float(raw["failed"].mean()),
-            "seed": self.seed,
-            "threads": self.workers or _core.default_threads(),
-            "simd": raw["simd"],
         }
+
+
+def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return groups of touching cells with undecided starts, the largest first."""
+    share = dataset["undecided"]
+    groups, _ = label(share.values > 0, structure=np.ones((3,) * share.ndim))
+    found = []
+    for number, box in enumerate(find_objects(groups), 1):
+        mine = groups == number
+        ranges = {
+            str(name): (float(dataset[name].values[at][0]), float(dataset[name].values[at][-1]))
+            for name, at in zip(reversed(share.dims), reversed(box), strict=True)
+        }
+        mean = float(share.values[mine].mean())
+        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
+    return sorted(found, key=lambda one: -one["cells"])
+
+
+SEARCH = (
+    Field("starts", "1", "initial conditions of each pendulum"),
+    Field("undecided", "1", "share of the starts that nothing captured"),
+    Field("failed", "1", "share of the starts that failed or diverged"),
+    Field("chaos_periods", "periods", "least time within which nothing captured chaos; 0: none"),
+    result.SECONDS,
+    result.SIMD,
+    result.THREADS,
+    result.REACHED,
+    Field("undecided_at", "", "groups of cells with undecided starts", read=undecided_cells),
+    *result.END,
+    result.SECTION,
+    *result.BOX,
+    result.TOL.hidden,
+    Field("searched_again", "1", "cells searched for what a neighbour has", json=False),
+    result.SEED.hidden,
+    *result.UNSAID,
+)
+"""Fields of a search for attractors in many pendulums."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -11,25 +10,16 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import critical_curves
+from pendmap.analysis import critical_curves, result
 from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, part
+from pendmap.analysis.draws.tongues import fields as drawn_fields
 from pendmap.analysis.draws.tongues import tongues_over
-from pendmap.analysis.summary import of_model
+from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.result import Field, Schema, drawn_field, summarised
 from pendmap.analysis.sweep import title_without
-from pendmap.errors import (
-    MOST_THREADS,
-    InputError,
-    check_callable,
-    check_flag,
-    check_number,
-    check_whole,
-    core_errors,
-    instruction_set,
-    short_repr,
-)
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE
@@ -39,33 +29,76 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
     Floats = NDArray[np.float64]
 
 
 _Row: TypeAlias = "dict[str, Any]"
-"""What was found at one frequency."""
-
+"""Critical amplitudes, multipliers and fold at one frequency."""
 OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
 """Frequencies and largest amplitude where none are given."""
-
 MOST_P = 100.0
 """Largest amplitude that may be asked for."""
-
 _OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
-
 _NO_REST: _Row = {"p": [], "multiplier": [], "stable": [False]}
-"""What is found of a rest that is no solution."""
-
+"""Result for a rest that is no solution."""
 _TIPS = 8
-"""Without damping tongues have their tips at omega = 2/k, k = 1, 2, ...: so many are told."""
-
+"""Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping."""
 _STRIP = 1e-6
-"""Strips of stability narrower than this are not told."""
-
+"""Width in p of a strip of stability below which a summary leaves it out."""
 NEAR = 0.05
-"""An asymptotic curve that is off by less than this part is near the exact one."""
+"""Relative error below which an asymptotic curve is near the exact one."""
+
+
+def _curves(dataset: xr.Dataset, prefix: str, fold: str = "") -> list[dict[str, Any]]:
+    """Return the critical amplitudes at each frequency that was asked for, for the JSON object."""
+    index = dataset[f"{prefix}index"].values
+    curves = []
+    for k in np.flatnonzero(dataset["asked"].values):
+        mine = index == k
+        curve: dict[str, Any] = {
+            "omega": float(dataset["omega"].values[k]),
+            "p": dataset[f"{prefix}p"].values[mine].tolist(),
+            "multiplier": dataset[f"{prefix}multiplier"].values[mine].tolist(),
+        }
+        if f"{prefix}stable_above" in dataset:
+            stable = dataset[f"{prefix}stable_above"].values[mine]
+            curve["stable_above"] = stable.astype(bool).tolist()
+        if fold:
+            curve["fold"] = float(dataset[fold].values[k])
+        curves.append(curve)
+    return curves
+
+
+def _asymptotic_curves(dataset: xr.Dataset) -> dict[str, list[float]]:
+    """Return the asymptotic curves by name for the JSON object."""
+    asked = dataset["asked"].values.astype(bool)
+    rows = zip(dataset["curve"].values, dataset["asymptotic"].values, strict=True)
+    return {str(name): p[asked].tolist() for name, p in rows}
+
+
+SCHEMA = Schema(
+    "tongues",
+    result.UNITS,
+    Field(
+        "curves", "1", "critical amplitudes of hanging rest", read=lambda d: _curves(d, "", "fold")
+    ),
+    Field("inverted", "", "the same of inverted rest", read=lambda d: _curves(d, "inverted_")),
+    Field("undamped", "", "the same without damping", read=lambda d: _curves(d, "undamped_")),
+    Field("asymptotic", "1", "critical amplitudes by perturbation", read=_asymptotic_curves),
+    Field("p_max", "1", "largest amplitude that was looked at"),
+    result.SECONDS,
+    result.SIMD,
+    result.THREADS,
+    *result.END,
+    drawn_field(drawn_fields),
+    Field("plane", "", "plane of the figure: omega-p or e-alpha2", json=False),
+    Field("moved", "", "1 where a torque makes an orbit of rest", json=False),
+    *result.OWN,
+    *result.UNSAID,
+)
 
 
 def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -79,7 +112,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     threads: int | None = None,
     draws: int | None = None,
     seed: int = 0,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Return the critical curves of rest, exact, with folds and asymptotic curves.
 
@@ -118,15 +151,12 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     refine : bool
         Whether to add frequencies where curves begin, end, turn or bend between two of those asked
         for, so that a figure shows them as they are.
-    threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
     draws : int, optional
-        How many models are drawn from the model's ``[covariance]``, each computed too: the band in
-        which each critical amplitude lies (:func:`pendmap.analysis.draws.tongues.tongues_over`).
-    seed : int
-        Draws them.
-    progress : callable, optional
-        Called now and then with what is done and in all.
+        Number of models drawn from the model's ``[covariance]`` with ``seed``, each computed too:
+        the band of each critical amplitude
+        (:func:`pendmap.analysis.draws.tongues.tongues_over`).
+    threads, seed, progress
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
@@ -155,22 +185,26 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
-    frequencies = grids.frequencies(_usual(plane) if omega is None else omega)
+    asked = grids.frequencies(_usual(plane) if omega is None else omega)
     p_max = check_number("p_max", p_max)
-    check_callable("progress", progress)
+    numerics = Numerics(threads=threads, seed=seed, progress=progress)
     if plane not in PLANES:
         raise InputError(f"plane must be one of {', '.join(PLANES)}, got {short_repr(plane)}")
-    workers = 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS)
     refine, inverted = check_flag("refine", refine), check_flag("inverted", inverted)
-    _check_free(pendulum)
-    several = None if draws is None else drawn(model, draws, seed)
-    whole, progress = progress, progress if several is None else part(progress, 0, len(several) + 1)
-    began = time.perf_counter()
-
-    solved = _solved(
-        pendulum, frequencies, p_max, workers, progress, inverted=inverted, refine=refine
+    if pendulum.theta_r > 0:
+        raise InputError(
+            f"theta_r must be 0, got {pendulum.theta_r:g}: friction holds hanging rest whatever "
+            "the drive, and it never loses its stability"
+        )
+    if draws is not None:
+        several = drawn(model, draws, seed)
+        same = partial(tongues, p_max=p_max, inverted=inverted, threads=threads)
+        first = part(progress, 0, len(several) + 1)
+        own = same(model, asked, plane=plane, refine=refine, progress=first)
+        return tongues_over(own, several, partial(same, omega=own["omega"]), progress)
+    frequencies, looked, (found, undamped, upright) = _solved(
+        pendulum, asked, p_max, numerics, inverted=inverted, refine=refine
     )
-    asked, frequencies, looked, (found, undamped, upright) = frequencies, *solved
     moved = bool(found[0]["moved"])
     if moved:
         undamped = [_NO_REST] * len(found)
@@ -192,51 +226,36 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         given = units.given(frequencies, RATE)
         coords["Omega"] = ("omega", given, {"units": "rad/s"})
     dataset = xr.Dataset(variables, coords=coords)
-    dataset.attrs = {
-        "kind": "tongues",
-        "title": title_without(model, "p", "omega", "phase"),
-        **model.attributes,
+    values = {
+        **numerics.provenance(),
         "plane": plane,
         "p_max": p_max,
         "moved": int(moved),
         "inverted": int(upright[0] is not _NO_REST),
         "own_p": pendulum.p,
         "own_omega": pendulum.omega,
-        "seconds": time.perf_counter() - began,
-        "simd": instruction_set(),
-        "threads": workers or _core.default_threads(),
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    lines = [*_summary(dataset), *of_model(model, "curves are")]
-    dataset.attrs["summary"] = "\n".join(lines)
-    if several is None:
-        return dataset
-
-    def again(one: Pendulum | Rig, report: Callable[[int, int], object] | None) -> xr.Dataset:
-        return tongues(one, frequencies, p_max, inverted=inverted, threads=threads, progress=report)
-
-    return tongues_over(dataset, several, again, whole)
+    SCHEMA.complete(dataset, model, values)
+    dataset.attrs["title"] = title_without(model, "p", "omega", "phase")
+    summarised(dataset, _summary(dataset), model, "curves are")
+    return dataset
 
 
 def _solved(  # noqa: PLR0913 (as for tongues)
     pendulum: Pendulum,
     asked: Floats,
     p_max: float,
-    workers: int,
-    progress: Callable[[int, int], object] | None,
+    numerics: Numerics,
     *,
     inverted: bool,
     refine: bool,
 ) -> tuple[Floats, NDArray[np.bool_], tuple[list[_Row], list[_Row], list[_Row]]]:
-    """Return frequencies, at which of them folds were looked for, and what was found there.
-
-    That is of hanging rest, of it without damping, and of inverted rest.
-    """
+    """Return frequencies, where folds were sought, and rows: hanging, undamped, inverted rest."""
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
     def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
-        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, workers, progress)
+        run = numerics.workers, numerics.progress
+        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, *run)
         return [_NO_REST] * at.size if found is None else found
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
@@ -263,26 +282,13 @@ def _solved(  # noqa: PLR0913 (as for tongues)
     return frequencies, looked, (found, undamped, upright)
 
 
-def _check_free(pendulum: Pendulum) -> None:
-    """Refuse friction, under which no stability is lost."""
-    if pendulum.theta_r > 0:
-        raise InputError(
-            f"theta_r must be 0, got {pendulum.theta_r:g}: friction holds hanging rest whatever "
-            "the drive, and it never loses its stability"
-        )
-
-
 def _folds_to_their_ends(
     omega: Floats,
     found: list[_Row],
     looked: NDArray[np.bool_],
     solve: Callable[[Floats], list[_Row]],
 ) -> NDArray[np.bool_]:
-    """Find where folds begin and end among frequencies that were added; tell where was looked.
-
-    Between two frequencies looked at, of which one alone has a fold, the middle one is looked at
-    until the two are neighbours.
-    """
+    """Bisect for the ends of folds among frequencies that were added; tell where was looked."""
     looked = looked.copy()
     while True:
         places = np.flatnonzero(looked)
@@ -408,7 +414,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
-    """Say where inverted rest is stable."""
+    """Return a line on where inverted rest is stable."""
     rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
     if not dataset.attrs["inverted"]:
         return []

@@ -9,21 +9,20 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
+from pendmap.analysis import result
 from pendmap.analysis.grid import starts
-from pendmap.analysis.summary import of_model
+from pendmap.analysis.numerics import Numerics, optional_whole
+from pendmap.analysis.result import Field, Schema, summarised
 from pendmap.errors import (
     MOST_PERIODS,
     MOST_SAMPLES,
-    MOST_THREADS,
     InputError,
     check_callable,
     check_flag,
     check_number,
     check_whole,
     core_errors,
-    instruction_set,
 )
-from pendmap.files.dataset import FORMAT_VERSION
 from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
     Floats = NDArray[np.float64]
@@ -40,15 +40,72 @@ if TYPE_CHECKING:
 
 
 _SAMPLES = 64
-"""Samples a period, where nothing asks for more."""
+"""Samples a period where no number is given."""
 _APART = 0.1
 """Angle between two samples, rad, that looks smooth in the phase plane."""
 _SMOOTH_SAMPLES = 200_000
 """Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
 _MOST_SAMPLES = 2_000_000
+"""Samples in all from which on a trajectory has fewer a period than ``_SAMPLES``."""
 _STRONGEST = 1e6
 """Acceleration of the pivot over gravity up to which a trajectory takes seconds."""
-_ALIGNMENT, _BATCHES = 0.1, 20  # as in the core
+_ALIGNMENT, _BATCHES = 0.1, 20
+"""Part of a trajectory before the exponent is measured, and batches of it, as in the core."""
+FORMULA = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"
+"""Formula of the energy, an attribute of datasets."""
+
+
+def _last(name: str) -> Callable[[xr.Dataset], float]:
+    """Return a function that reads the last value of a variable."""
+    return lambda dataset: float(dataset[name].values[-1])
+
+
+SCHEMA = Schema(
+    "trajectory",
+    result.UNITS,
+    Field("t", result.OF_TIME, "last time", read=lambda dataset: dataset.attrs["until"]),
+    Field("theta", "rad", "angle at the end, not wrapped", read=_last("theta")),
+    Field("velocity", result.OF_VELOCITY, "velocity at the end", read=_last("velocity")),
+    Field("stuck", "", "1 where friction holds the pendulum at the end", convert=bool),
+    Field("turns", "1", "full turns between start and end"),
+    result.TOL,
+    Field(
+        "tol_reached",
+        "",
+        "whether the tolerance was reached",
+        read=lambda dataset: bool(dataset.attrs["reached_error"] <= dataset.attrs["tol"]),
+    ),
+    result.REACHED,
+    Field("end_error", "1", "change of the end by a 16 times smaller error of each step"),
+    Field(
+        "interrupted",
+        "",
+        "1 where Ctrl-C ended it",
+        read=lambda dataset: bool(dataset.attrs.get("interrupted", 0)),
+    ),
+    Field("energy", "m g l", "energy at the end", read=_last("energy")),
+    result.SIMD,
+    Field("exponent", result.OF_RATE, "Lyapunov exponent of this stretch", when="lyapunov"),
+    Field(
+        "stderr",
+        result.OF_RATE,
+        "its standard error",
+        read=lambda dataset: dataset.attrs.get("exponent_stderr"),
+        when="lyapunov",
+    ),
+    Field("exponent_from", result.OF_TIME, "when its measurement begins", when="lyapunov"),
+    Field("exponent_to", result.OF_TIME, "when its measurement ends", when="lyapunov"),
+    result.MISSES,
+    result.SUMMARY.hidden,
+    Field("exponent_stderr", result.OF_RATE, "standard error of the exponent", json=False),
+    Field("until", result.OF_TIME, "last time", json=False),
+    Field("until_asked", result.OF_TIME, "last time that was asked for", json=False),
+    Field("theta0", "rad", "angle at the start", json=False),
+    Field("velocity0", result.OF_VELOCITY, "velocity at the start", json=False),
+    result.STEPS.hidden,
+    Field("lyapunov", "", "1 where an exponent was asked for", json=False),
+    *result.UNSAID,
+)
 
 
 def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
@@ -117,8 +174,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     model = pendulum
     pendulum, units = without_dimensions(model)
     check_callable("live", live, "three arrays, times, angles and velocities")
+    numerics = Numerics(tol)
     theta, velocity = check_number("theta", theta), check_number("velocity", velocity)
-    until, tol = check_number("until", until), check_number("tol", tol)
+    until = check_number("until", until)
     lyapunov = check_flag("lyapunov", lyapunov)
     if abs(pendulum.p) > _STRONGEST:
         raise InputError(
@@ -144,7 +202,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         start = (theta, units.bare(velocity, VELOCITY))
         end = units.bare(until, TIME)
         shown = None if live is None else _in_units(live, units)
-        raw = _core.simulate(pendulum.parameters, start, end, tol, samples, lyapunov, shown)
+        raw = _core.simulate(
+            pendulum.parameters, start, end, numerics.tol, samples, lyapunov, shown
+        )
     time, speed = units.given(raw["time"], TIME), units.given(raw["velocity"], VELOCITY)
     event_time = units.given(raw["event_time"], TIME)
     once = np.arange(0, time.size, samples)
@@ -178,38 +238,25 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         },
     )
     turns = math.trunc((float(raw["theta"][-1]) - theta) / math.tau)
-    asked = {}
-    if raw["interrupted"]:
-        asked = {"interrupted": 1, "until_asked": until}
-        until = float(time[-1])
-    dataset.attrs = {
-        "kind": "trajectory",
-        "title": model.title,
-        **model.attributes,
+    values = {
+        **numerics.provenance(),
+        **_exponent(raw, time, units),
         "theta0": theta,
         "velocity0": velocity,
-        "until": until,
-        **asked,
-        "tol": tol,
-        "reached_error": raw["reached_error"],
-        "end_error": raw["end_error"],
-        "steps_per_period": raw["steps_per_period"],
+        "until": float(time[-1]) if raw["interrupted"] else until,
         "turns": turns,
         "stuck": int(raw["stuck"]),
         "lyapunov": int(lyapunov),
-        **_exponent(raw, time, units),
-        "simd": instruction_set(),
-        "pendmap_version": _core.__version__,
-        "format_version": FORMAT_VERSION,
     }
-    dataset.attrs["summary"] = "\n".join(
-        [_summary(dataset, units), *of_model(model, "angle and velocity here are")]
-    )
+    if raw["interrupted"]:
+        values |= {"interrupted": 1, "until_asked": until}
+    SCHEMA.complete(dataset, model, values, raw)
+    summarised(dataset, [_summary(dataset, units)], model, "angle and velocity here are")
     return dataset
 
 
 def _in_units(live: Live, units: Units) -> Live:
-    """Return what hands samples over in these units."""
+    """Return a function that passes samples on in these units."""
 
     def shown(times: Floats, theta: Floats, velocity: Floats) -> None:
         live(units.given(times, TIME), theta, units.given(velocity, VELOCITY))
@@ -218,7 +265,7 @@ def _in_units(live: Live, units: Units) -> Live:
 
 
 def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
-    """Samples a period that show the motion as a curve, from a guess of its greatest speed."""
+    """Return samples a period that show the motion as a curve, from its guessed greatest speed."""
     periods = max(until / pendulum.period, 1.0)
     pulled = abs(velocity) + abs(pendulum.torque) * until
     if pendulum.gamma > 0:
@@ -228,10 +275,10 @@ def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
     return int(min(math.ceil(wanted), _SMOOTH_SAMPLES // periods))
 
 
-def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> dict[str, float]:
-    """The exponent with its standard error, and from when to when it was measured."""
+def _exponent(raw: dict[str, Any], time: Floats, units: Units) -> dict[str, float | None]:
+    """Return the exponent with its standard error, and the times between which it was measured."""
     if raw["exponent"] is None:
-        return {}
+        return {"exponent": None}
     first = int(_ALIGNMENT * time.size)
     size = max(1, (time.size - first) // _BATCHES)
     last = first + (time.size - first) // size * size - 1
@@ -243,17 +290,13 @@ def _exponent(raw: dict[str, Any], time: NDArray[np.float64], units: Units) -> d
     }
 
 
-def _since_start(turns: int) -> str:
-    """Say how many full turns lie between start and end; nothing where there are none."""
-    if turns == 0:
-        return ""
-    return f" ({counted(abs(turns), 'full turn')} {'forward' if turns > 0 else 'backward'})"
-
-
 def _summary(dataset: xr.Dataset, units: Units) -> str:
     a = dataset.attrs
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
-    lines = []
+    turns, lines = "", []
+    if a["turns"]:
+        way = "forward" if a["turns"] > 0 else "backward"
+        turns = f" ({counted(abs(a['turns']), 'full turn')} {way})"
     if a.get("interrupted"):
         asked = units.at(format(a["until_asked"], "g"))
         lines.append(f"INTERRUPTED before {asked}: this is what was computed until then.")
@@ -262,7 +305,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
     lines += [
         (
             f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad"
-            f"{_since_start(a['turns'])}, velocity = {units.spoken(format(velocity, '.9g'))}."
+            f"{turns}, velocity = {units.spoken(format(velocity, '.9g'))}."
         ),
         (
             f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
@@ -308,7 +351,7 @@ def advance(  # noqa: PLR0913
     tol: float = 1e-6,
     steps_per_period: int | None = None,
     threads: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Advance many starts by the same number of periods, and nothing else.
 
@@ -320,14 +363,10 @@ def advance(  # noqa: PLR0913
         Angles in rad and velocities at ``tau = 0``.
     periods : int
         Forcing periods (of ``2 pi`` where p = 0); 0 or more.
-    tol : float
-        As for :func:`pendmap.basins`; chooses the steps where ``steps_per_period`` is not given.
     steps_per_period : int, optional
-        Steps a period.
-    threads : int, optional
-        Number of threads; by default one a processor.
-    progress : callable, optional
-        Called now and then with the number of starts done and in all.
+        Steps a period; by default as ``tol`` asks.
+    tol, threads, progress
+        As for :func:`pendmap.basins`.
 
     Returns
     -------
@@ -342,46 +381,24 @@ def advance(  # noqa: PLR0913
         If the lengths differ, a start is not finite, or a value is outside its range.
     """
     pendulum, units = without_dimensions(pendulum)
-    check_callable("progress", progress)
+    numerics = Numerics(tol, threads=threads, progress=progress)
     angles, speeds = starts(theta, velocity)
     speeds = units.bare(speeds, VELOCITY)
     periods = check_whole("periods", periods, 0, MOST_PERIODS)
-    workers = 0 if threads is None else check_whole("threads", threads, 1, MOST_THREADS)
-    tol = check_number("tol", tol)
-    if steps_per_period is not None:
-        steps_per_period = check_whole("steps_per_period", steps_per_period, 1, _MOST_SAMPLES)
+    steps = optional_whole("steps_per_period", steps_per_period, 1, _MOST_SAMPLES)
     with core_errors():
-        if steps_per_period is None:
-            step = max(1, angles.size // 400)
-            sample = angles[::step].copy(), speeds[::step].copy()
-            steps_per_period, _ = _core.choose_steps(pendulum.parameters, *sample, tol)
+        if steps is None:
+            every = max(1, angles.size // 400)
+            sample = angles[::every].copy(), speeds[::every].copy()
+            steps, _ = _core.choose_steps(pendulum.parameters, *sample, numerics.tol)
         end, speed, turns = _core.advance(
-            pendulum.parameters, angles, speeds, periods, steps_per_period, workers, progress
+            pendulum.parameters, angles, speeds, periods, steps, numerics.workers, progress
         )
     return end, units.given(speed, VELOCITY), turns
 
 
-# The mechanical energy of the pendulum.
-
-
-FORMULA = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"
-"""As attributes of datasets say it."""
-
-
 def energy(theta: Floats, velocity: Floats, attributes: Any) -> Floats:  # noqa: ANN401 (a mapping)
-    """Return ``E / (m g l) = v^2 / 2 + 1 - cos theta``, ``v = d theta / d tau``.
-
-    Kinetic energy about the pivot, seen from it, and potential energy at rest gravity: 0 hanging at
-    rest, 2 at rest upside down. Without drive, damping and torque it stays what it is; drive and
-    effects change it. ``m g l = m l^2 w0^2`` is its unit in all units.
-
-    Parameters
-    ----------
-    theta, velocity : ndarray, shape (N,)
-        Angle in rad, velocity in the units of the dataset.
-    attributes : mapping
-        The attributes of the dataset, which tell its units.
-    """
+    """Return ``E / (m g l) = v^2 / 2 + 1 - cos theta``, ``v = d theta / d tau`` about the pivot."""
     speed = Units.of(attributes).bare(velocity, VELOCITY)
     found: Floats = 0.5 * speed**2 + 1.0 - np.cos(theta)
     return found

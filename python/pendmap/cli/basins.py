@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from pendmap.cli import price
-from pendmap.cli.model_options import model_from, model_options
+from pendmap.cli.model_options import begin, model_options
 from pendmap.cli.options import (
-    Outputs,
     draws_option,
+    max_periods_option,
     output_options,
     progress_options,
     seed_option,
+    tol_option,
 )
 from pendmap.cli.show import progress_bar, show
-from pendmap.cli.types import AXIS, NUMBER, Whole
+from pendmap.cli.types import AXIS, Whole
 from pendmap.errors import MOST_CELLS, MOST_PERIODS
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @click.command("basins")
@@ -32,12 +30,10 @@ if TYPE_CHECKING:
     help="Initial velocities, in SI rad/s.  [default: -3:3:1000, in SI times w0]",
 )
 @click.option("--grid", type=Whole(1, MOST_CELLS), help="Cells on each side of the window.")
-@click.option("--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]")
-@click.option(
-    "--max-periods",
-    type=Whole(1, MOST_PERIODS),
-    help="Bound after which a start is undecided.  [default: 4000; more where damping"
-    " is small, less beside chaos]",
+@tol_option
+@max_periods_option(
+    "Bound after which a start is undecided.  [default: 4000; more where damping"
+    " is small, less beside chaos]"
 )
 @click.option(
     "--layer-periods", type=Whole(1, MOST_PERIODS), help="Periods of the finite-time layers."
@@ -52,9 +48,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     Writes basins.nc, basins.png and basins.rrd if no output is named. --json alone writes no file.
     --view writes the recording it opens: basins.rrd, or what --rerun names.
     """
-    file = given["model"]
-    model = model_from(given)
-    outputs = Outputs.take(given, "basins", reads=[file])
+    model, outputs = begin(given, "basins")
     theta, velocity, count = (given.pop(name) for name in ("theta", "velocity", "grid"))
     if count is not None and (theta is not None or velocity is not None):
         raise click.UsageError(
@@ -62,7 +56,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
         )
 
     from pendmap import _core
-    from pendmap.analysis.basins import DEFAULT_CELLS, basins
+    from pendmap.analysis.basins import DEFAULT_CELLS, SCHEMA, basins
     from pendmap.analysis.grid import Axis, Grid
     from pendmap.analysis.summary import unlimited_rotation
     from pendmap.charts.basins import BYTES_OF_CELL
@@ -83,73 +77,4 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
         price.say(model, cells, tol=given["tol"], threads=given["threads"])
     with progress_bar("basins", shown=outputs.shows_progress) as progress:
         dataset = basins(model, grid, progress=progress, **given)
-    show(dataset, outputs, fields)
-
-
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the JSON object of a basin map."""
-    a = dataset.attrs
-    names = [
-        "undecided",
-        "failed",
-        "cells",
-        "mean_periods",
-        "seconds",
-        "reached_error",
-        "basin_entropy",
-        "boundary_basin_entropy",
-        "boundary_basin_entropy_stderr",
-        "unreliable",
-        "labels_sampled",
-        "unreliable_half_step",
-        "unreliable_mirror",
-        "neighbours_agree",
-        "neighbours_chance",
-        "chaos_bound",
-        "searched_starts",
-        "plane",
-        "layer_periods",
-        "steps_per_period",
-        "max_periods",
-        "tol",
-        "simd",
-        "threads",
-        "seed",
-        "pendmap_version",
-        "format_version",
-    ]
-    settled = a["longest_settle"] >= 0
-    return {
-        "units": a["units"],
-        "attractors": [_attractor(dataset, k) for k in range(dataset.sizes["attractor"])],
-        **{name: a.get(name) for name in names},
-        "log2_criterion": bool(a["log2_criterion"]) if "log2_criterion" in a else None,
-        "uncertainty_exponent": _exponent(a),
-        "mean_settle": a["mean_settle"] if settled else None,
-        "longest_settle": a["longest_settle"] if settled else None,
-        "summary": a["summary"].split("\n"),
-    }
-
-
-def _exponent(attrs: dict[Any, Any]) -> dict[str, Any] | None:
-    """Of the boundary, with its dimension; none where no boundary was met."""
-    if "uncertainty_exponent" not in attrs:
-        return None
-    value = attrs["uncertainty_exponent"]
-    low, high = (attrs[f"uncertainty_exponent_{end}"] for end in ("low", "high"))
-    return {
-        "value": value,
-        "stderr": attrs["uncertainty_exponent_stderr"],
-        "ci95": [low, high],
-        "dimension": 2 - value,
-        "dimension_ci95": [2 - high, 2 - low],
-        "eps": [attrs["uncertainty_eps_low"], attrs["uncertainty_eps_high"]],
-    }
-
-
-def _attractor(dataset: xr.Dataset, k: int) -> dict[str, Any]:
-    from pendmap.analysis.orbit_table import row
-
-    own = dataset.isel(attractor=k)
-    shares = {name: float(own[name]) for name in ("fraction", "stderr")}
-    return row(dataset, "attractor", k) | shares
+    show(dataset, outputs, SCHEMA)

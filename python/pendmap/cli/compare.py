@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import functools
-import json
 import sys
 from pathlib import Path
 
 import click
 
-from pendmap.cli.inputs import keep_inputs
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import rate_option, simd_option
-from pendmap.cli.show import Written, plain, progress_bar, write_all, write_table
-from pendmap.cli.types import NUMBER, OutputFile, Whole
-from pendmap.errors import MOST_SEED, MOST_THREADS, instruction_set
+from pendmap.cli.options import (
+    json_option,
+    keep_inputs,
+    plot_option,
+    quiet_option,
+    rate_option,
+    seed_option,
+    simd_option,
+    threads_option,
+)
+from pendmap.cli.show import Written, progress_bar, write_all, write_json, write_table
+from pendmap.cli.types import NUMBER, Whole, default_file
+from pendmap.errors import instruction_set
 
 
 @click.command("compare")
 @click.argument("model", type=click.Path(path_type=Path), metavar="MODEL")
 @click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
-@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@plot_option
 @click.option(
     "--members",
     type=Whole(20, 100_000),
@@ -33,12 +40,12 @@ from pendmap.errors import MOST_SEED, MOST_THREADS, instruction_set
     default=0.01,
     help="Of these about the measured start, rad, and over w0.  [default: 0.01]",
 )
-@click.option("--seed", type=Whole(0, MOST_SEED), default=0, help="Draws them.  [default: 0]")
-@click.option("--threads", type=Whole(1, MOST_THREADS), help="Threads.  [default: one a processor]")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout; alone, no files.")
+@seed_option("Draws them.")
+@threads_option
+@json_option("; alone, no files")
 @rate_option
 @simd_option
-@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@quiet_option
 def command(  # noqa: PLR0913 (an option each)
     *,
     model: Path,
@@ -62,7 +69,7 @@ def command(  # noqa: PLR0913 (an option each)
     state that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
     if plot is None and not as_json:
-        plot = OutputFile([".png"]).convert("compare.png", None, None)
+        plot = default_file("compare.png")
     from pendmap.comparison import Ensemble, compare
     from pendmap.comparison.free import as_json as fields
     from pendmap.comparison.free import as_text, tables
@@ -83,7 +90,7 @@ def command(  # noqa: PLR0913 (an option each)
         written = write_all([(draw, plot)], keep=True)
     if as_json:
         more = {"model": str(model), "simd": instruction_set()}
-        click.echo(json.dumps(plain(fields(comparison) | more), allow_nan=False))
+        write_json(fields(comparison) | more)
     elif not quiet:
         doubts = list(doubts_said(experiment, *(one.run for one in comparison.every)))
         for line in doubts:

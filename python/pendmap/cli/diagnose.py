@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import json
 import os
 import shlex
 import sys
@@ -13,18 +12,26 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.inputs import keep_inputs, report_files
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import check_view, rate_option, simd_option
-from pendmap.cli.show import open_recording, plain, progress_bar, write_all, write_table
-from pendmap.cli.types import OutputFile, ReportFile, Whole
+from pendmap.cli.options import (
+    check_view,
+    json_option,
+    keep_inputs,
+    plot_option,
+    quiet_option,
+    rate_option,
+    rerun_option,
+    simd_option,
+    view_option,
+)
+from pendmap.cli.show import open_recording, progress_bar, write_all, write_json, write_table
+from pendmap.cli.types import OutputFile, ReportFile, Whole, default_file
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
     from pendmap.diagnosis import Discrepancy
-    from pendmap.model import Formula
 
 
 NAME = "diagnose"
@@ -58,24 +65,19 @@ NAME = "diagnose"
 @click.option(
     "--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}.toml]"
 )
-@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@plot_option
 @click.option(
     "--report",
     type=ReportFile(),
     metavar="FILE|DIR",
     help="Report: .html with its figures in it, .md with them beside it, or a folder with both.",
 )
-@click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd.")
-@click.option("--view", is_flag=True, help="Write the recording and open the viewer on it.")
-@click.option(
-    "--json",
-    "as_json",
-    is_flag=True,
-    help="One JSON object on stdout; alone, no file but the model.",
-)
+@rerun_option
+@view_option
+@json_option("; alone, no file but the model")
 @rate_option
 @simd_option
-@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@quiet_option
 def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,
@@ -103,26 +105,31 @@ def command(  # noqa: PLR0913 (an option each)
     # The matrices are tall and narrow: threads for them cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.diagnosis import diagnose
+    from pendmap.diagnosis.candidates import checked_own
     from pendmap.model import load_formulas
+    from pendmap.model.effects import definition
     from pendmap.records import files_of, read_experiment
 
     own = [] if effects_path is None else load_formulas(effects_path)
     with _named(str(effects_path)):
-        _check_candidates(own)
+        checked_own(own)
     with _named("--without"):
-        _check_known(without, own)
+        named = {formula.name for formula in own}
+        for name in without:
+            if name not in named:
+                definition(name)
     if not (out or plot or report or rerun or view or as_json):
-        plot, report, rerun = (_own(suffix) for suffix in (".png", ".html", ".rrd"))
+        plot, report, rerun = (default_file(f"{NAME}{end}") for end in (".png", ".html", ".rrd"))
     if view:
         check_view()
-        rerun = rerun or _own(".rrd")
-    outputs = (out or _own(".toml"), plot, report, rerun)
+        rerun = rerun or default_file(f"{NAME}.rrd")
+    outputs = (out or default_file(f"{NAME}.toml"), plot, report, rerun)
     keep_inputs(
         [*files_of(path), model_path, effects_path],
         {
             "--out": [outputs[0]],
             "--plot": [plot],
-            "--report": report_files(report),
+            "--report": _report_files(report),
             "--rerun": [rerun],
         },
     )
@@ -146,7 +153,7 @@ def command(  # noqa: PLR0913 (an option each)
         from pendmap.diagnosis.summary import as_json as fields
 
         more = {"model": written.name(outputs[0]), "simd": instruction_set()}
-        click.echo(json.dumps(plain(fields(found) | more), allow_nan=False))
+        write_json(fields(found) | more)
     elif not quiet:
         _say(found)
         written.say()
@@ -157,30 +164,19 @@ def command(  # noqa: PLR0913 (an option each)
 
 @contextlib.contextmanager
 def _named(where: str) -> Iterator[None]:
-    """Say where it was that something is not allowed."""
+    """Name the file or option in a message of refusal."""
     try:
         yield
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
 
-def _check_candidates(own: Sequence[Formula]) -> None:
-    from pendmap.diagnosis.candidates import checked_own
-
-    checked_own(own)
-
-
-def _check_known(names: Sequence[str], own: Sequence[Formula]) -> None:
-    from pendmap.model.effects import definition
-
-    for name in names:
-        if name not in {formula.name for formula in own}:
-            definition(name)
-
-
-def _own(suffix: str) -> Path:
-    """Return a file under the command's own name, where one can be written."""
-    return OutputFile([suffix]).convert(f"{NAME}{suffix}", None, None)
+def _report_files(report: Path | None) -> list[Path]:
+    """Return the files of a report without its figures; a folder holds one of either kind."""
+    if report is None:
+        return []
+    in_folder = report.is_dir() or not report.suffix
+    return [report / "report.html", report / "report.md"] if in_folder else [report]
 
 
 def _files(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import sys
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.cli.options import json_option
 from pendmap.files import toml_text
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Show those of a file instead, its [[formula]]; they are checked.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option()
 def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 
@@ -35,7 +35,7 @@ def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None
     dimensions, and what makes them those of a model file in SI. With NAMEs those effects alone, and
     how they stand in a model file.
     """
-    from pendmap.cli.show import plain
+    from pendmap.cli.show import write_json
     from pendmap.model import load_formulas
     from pendmap.model.effects import definition
     from pendmap.model.library import effects, of_formulas
@@ -46,8 +46,7 @@ def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None
     listed = effects() if path is None else of_formulas(own)
     shown = [effect for effect in listed if not wanted or effect.name in wanted]
     if as_json:
-        table = [plain(dataclasses.asdict(effect)) for effect in shown]
-        click.echo(json.dumps({"effects": table}, allow_nan=False))
+        write_json({"effects": [dataclasses.asdict(effect) for effect in shown]})
     elif sys.stdout.isatty():
         _draw(shown)
     else:
@@ -85,7 +84,7 @@ def _write(effect: EffectDefinition) -> None:
 
 
 def _maps(effect: EffectDefinition) -> str:
-    """What maps do with an effect, with the word maps before it."""
+    """Return how maps treat an effect, the predicate of a sentence about maps."""
     if effect.group == "reading":
         return "do not see it"
     return {"frozen": "hold it at lab_time", "no": "refuse it"}.get(effect.mappable, "have it")
@@ -106,13 +105,10 @@ def _parameter(parameter: EffectParameter) -> str:
 
 
 def _example(effect: EffectDefinition) -> dict[str, Any]:
-    """An effect as a table of a model file, its parameters of a usual size."""
-    return {
-        "name": effect.name,
-        "parameters": {p.name: _usual(*p.typical) for p in effect.parameters},
-    }
-
-
-def _usual(low: float, high: float) -> float:
-    """A round value between two."""
-    return float(f"{math.sqrt(low * high) if low > 0 else high / 2:.1g}")
+    """Return an effect of usual size as a table of a model file."""
+    sizes = {}
+    for parameter in effect.parameters:
+        low, high = parameter.typical
+        middle = math.sqrt(low * high) if low > 0 else high / 2
+        sizes[parameter.name] = float(f"{middle:.1g}")
+    return {"name": effect.name, "parameters": sizes}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 import shlex
 import sys
 from pathlib import Path
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import Outputs, output_options, rate_option, simd_option
-from pendmap.cli.show import open_viewer, plain, progress_bar, write_all, write_table
+from pendmap.cli.options import Outputs, output_options, quiet_option, rate_option, simd_option
+from pendmap.cli.show import open_viewer, progress_bar, write_all, write_json, write_table
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ SUFFIX = ".toml"
 )
 @rate_option
 @simd_option
-@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@quiet_option
 @output_options((SUFFIX,), "Model")
 def command(
     *,
@@ -103,7 +102,7 @@ def _show(report: IdentificationReport, outputs: Outputs, model: str | None = No
         from pendmap.identification.report import as_json
 
         fields = as_json(report) | {"model": model, "simd": instruction_set()}
-        click.echo(json.dumps(plain(fields), allow_nan=False))
+        write_json(fields)
     elif not outputs.quiet:
         _say(report)
 

@@ -8,6 +8,8 @@ import platform
 
 import click
 
+from pendmap.cli.options import json_option
+
 _LEANS_ON = (
     "numpy",
     "scipy",
@@ -22,7 +24,7 @@ _LEANS_ON = (
 
 
 @click.command("info")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option()
 def command(*, as_json: bool) -> None:
     """Show the version, the instruction set used, the threads."""
     from pendmap import _core

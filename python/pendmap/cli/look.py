@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import functools
-import json
 import sys
 from pathlib import Path
 
 import click
 
-from pendmap.cli.inputs import keep_inputs
-from pendmap.cli.options import rate_option
-from pendmap.cli.show import Written, plain, progress_bar, write_all
-from pendmap.cli.types import OutputFile
+from pendmap.cli.options import (
+    json_option,
+    keep_inputs,
+    plot_option,
+    quiet_option,
+    rate_option,
+)
+from pendmap.cli.show import Written, progress_bar, write_all, write_json
 
 
 @click.command("look")
 @click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
-@click.option("--plot", type=OutputFile([".png", ".svg", ".pdf"]), help="Figure: .png .svg .pdf.")
+@plot_option
 @rate_option
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
-@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@json_option()
+@quiet_option
 def command(
     *, path: Path, plot: Path | None, rate_hz: float | None, as_json: bool, quiet: bool
 ) -> None:
@@ -44,7 +47,7 @@ def command(
 
         written = write_all([(functools.partial(figures.draw_record, experiment), plot)])
     if as_json:
-        click.echo(json.dumps(plain(fields(experiment)), allow_nan=False))
+        write_json(fields(experiment))
     elif not quiet:
         click.echo(as_text(experiment))
         written.say()

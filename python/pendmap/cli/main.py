@@ -1,4 +1,4 @@
-"""The group of commands, and what becomes of errors."""
+"""The group of commands, and the exit code of each error."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap import ANALYSES
 from pendmap.errors import FitDiverged, InputError, NotWrittenError, one_line
 from pendmap.files import COMPLETE, STOPS
 
@@ -27,20 +28,12 @@ FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
 _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
-"""What a disk says that was asked for nothing wrong."""
+"""Error numbers of a full disk: the request itself was valid."""
 
 _COMMANDS = {
     "info": "Show the version, the instruction set used, the threads.",
     "effects": "Show the library of effects: formula, parameters, which data reveal each.",
-    "simulate": "Integrate one trajectory: time history, phase plane, Poincaré section.",
-    "basins": "Map the basins of attraction.",
-    "map": "Map which attractors exist over two parameters.",
-    "bifurcation": "Draw stroboscopic points against a parameter, with hysteresis.",
-    "orbit": "Find all periodic orbits of one period and winding, stable and unstable.",
-    "lyapunov": "Find the largest Lyapunov exponent of the attractor that a start reaches.",
-    "lifetime": "Measure how long transient chaos lives, or find that it persists.",
-    "tongues": "Find where rest loses its stability: critical curves in two planes.",
-    "melnikov": "Compute the homoclinic threshold by Melnikov's criterion.",
+    **{name: text for name, _, text in ANALYSES.values()},
     "look": "Say what a record holds: channels, rate, noise, releases, what is odd about it.",
     "identify": "Find natural frequency, damping and friction in a free decay, by every method.",
     "compare": "Compare a model with records that it was not fitted to.",
@@ -50,16 +43,15 @@ _COMMANDS = {
     "plot": "Draw a result again, without computing.",
     "view": "Open a recording in the Rerun viewer.",
 }
-
-
+"""Commands with what each does, in the order of --help."""
 _NAMED = re.compile(
     r"(?P<name>\w+) (?:is (?=[^:]+: )|(?=must (?:be|have|hold) ))(?P<rest>.*)", re.DOTALL
 )
-"""How everything below names what it refuses: ``gamma must be 0 or more, got -1``."""
+"""Form of messages that refuse a value: ``gamma must be 0 or more, got -1``."""
 
 
 class _ReaderGone(Exception):  # noqa: N818 (nothing is wrong)
-    """Whoever reads stdout has seen enough; click would make a failed check of it, exit 1."""
+    """The reader of stdout has closed it; click alone would exit with 1."""
 
 
 class _Commands(click.Group):
@@ -76,7 +68,7 @@ class _Commands(click.Group):
         return loaded
 
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 (what the command returns)
-        """Run the command; what it refuses is named as it was typed, by its option."""
+        """Run the command; a refused value is named by its option."""
         try:
             return super().invoke(ctx)
         except BrokenPipeError:
@@ -132,7 +124,7 @@ def run() -> None:
 
 
 def _flushed(code: int) -> int:
-    """Write what stdout still holds; where it cannot, Python says nothing more of it at its end."""
+    """Flush stdout; where that fails, keep Python from reporting it again at its end."""
     try:
         if sys.stdout is not None:  # it may be closed
             sys.stdout.flush()
@@ -145,13 +137,13 @@ def _flushed(code: int) -> int:
 
 
 def _silence() -> None:
-    """Let stdout take all that is still written to it."""
+    """Discard all that is still written to stdout."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager
 def _stoppable(stops: list[int]) -> Iterator[None]:
-    """Make every signal that asks to stop a KeyboardInterrupt, and list it."""
+    """Turn every signal that asks to stop into a KeyboardInterrupt, and list it."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

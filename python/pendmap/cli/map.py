@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from pendmap.cli.model_options import model_from, varied_model_options
-from pendmap.cli.options import (
-    Outputs,
-    draws_option,
-    output_options,
-    progress_options,
-    search_options,
-)
-from pendmap.cli.show import progress_bar, searched, show
-
-if TYPE_CHECKING:
-    import xarray as xr
+from pendmap.cli.model_options import begin, varied_model_options
+from pendmap.cli.options import draws_option, output_options, progress_options, search_options
+from pendmap.cli.show import progress_bar, show
 
 
 @click.command("map")
@@ -38,33 +28,12 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     --vary quadratic_drag.q 0:0.1:50. Writes map.nc, map.png and map.rrd if no output is named.
     --json alone writes no file.
     """
-    file = given["model"]
     ranges = given.pop("ranges")
-    model = model_from(given)
-    outputs = Outputs.take(given, "map", reads=[file])
+    model, outputs = begin(given, "map")
 
-    from pendmap.analysis.parameter_map import parameter_map
+    from pendmap.analysis.parameter_map import SCHEMA, parameter_map
 
     outputs.check_room(math.prod(span.cells for span in ranges.values()))
     with progress_bar("map", shown=outputs.shows_progress) as progress:
         dataset = parameter_map(model, ranges, progress=progress, **given)
-    show(dataset, outputs, fields)
-
-
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the JSON object of a map over two parameters."""
-    a = dataset.attrs
-    regimes = [
-        {"kinds": json.loads(str(kinds)), "share": float(share)}
-        for kinds, share in zip(
-            dataset["regime_kinds"].values, dataset["regime_share"].values, strict=True
-        )
-    ]
-    return {
-        "units": a["units"],
-        "columns": a["columns"],
-        "rows": a["rows"],
-        "regimes": regimes,
-        "cells": a["cells"],
-        **searched(dataset),
-    }
+    show(dataset, outputs, SCHEMA)

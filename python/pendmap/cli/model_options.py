@@ -1,4 +1,4 @@
-"""The options that say which model: its parameters, a preset, a model file."""
+"""Options of the model: its parameters, a preset, a model file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.cli.options import Outputs
 from pendmap.cli.types import NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
@@ -36,7 +37,7 @@ _SAME = {"stroke_mm": "p", "frequency_hz": "omega"}
 
 
 def varied_model_options(function: Command) -> Command:
-    """Add the same, where parameters may be ranges: ``ranges`` holds those, in the order typed."""
+    """Add the options of the model; ranges among them become ``ranges``, in the order typed."""
 
     @functools.wraps(function)
     def with_ranges(**given: Any) -> Any:  # noqa: ANN401 (as the command)
@@ -81,7 +82,7 @@ def model_options(function: Command) -> Command:
 
 
 def model_options_without(*left_out: str) -> Callable[[Command], Command]:
-    """Return what adds them but those ``left_out``, which the command takes otherwise."""
+    """Return what adds the model's options without those that the command takes otherwise."""
     return functools.partial(_options, kind=NUMBER, left_out=left_out)
 
 
@@ -137,8 +138,15 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     return base if model is None else load_model(model, typed)
 
 
+def begin(given: dict[str, Any], name: str) -> tuple[Pendulum | Rig, Outputs]:
+    """Take the options of model and outputs out of ``given``; the model's file is no output."""
+    file = given["model"]
+    model = model_from(given)
+    return model, Outputs.take(given, name, reads=[file])
+
+
 def rig_from(path: Path) -> Rig:
-    """Read a model file that must be in SI; refuse another with what makes it one."""
+    """Read a model file that must be in SI; the message of a refusal says what it lacks."""
     model = load_model(path)
     if not isinstance(model, Rig):
         raise InputError(

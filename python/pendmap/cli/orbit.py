@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from pendmap.cli.model_options import model_from, model_options
-from pendmap.cli.options import (
-    Outputs,
-    draws_option,
-    output_options,
-    progress_options,
-    seed_option,
-)
+from pendmap.cli.model_options import begin, model_options
+from pendmap.cli.options import draws_option, output_options, progress_options, seed_option
 from pendmap.cli.show import progress_bar, show
 from pendmap.cli.types import AXIS, Whole
 from pendmap.errors import MOST_CELLS
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 _LONGEST = 64
 
@@ -52,14 +42,12 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
     Writes orbit.nc, orbit.png and orbit.rrd if no output is named. --json alone writes no file.
     """
-    file = given["model"]
-    model = model_from(given)
-    outputs = Outputs.take(given, "orbit", reads=[file])
+    model, outputs = begin(given, "orbit")
     n, w = given.pop("n"), given.pop("w")
     theta, velocity, count = (given.pop(name) for name in ("theta", "velocity", "grid"))
 
     from pendmap.analysis.grid import Axis, Grid
-    from pendmap.analysis.orbits import orbit, window
+    from pendmap.analysis.orbits import SCHEMA, orbit, window
 
     usual = window(model, n, w)
     low, high, cells = usual.velocity.as_tuple
@@ -70,22 +58,4 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     )
     with progress_bar("orbit", shown=outputs.shows_progress) as progress:
         dataset = orbit(model, n, w, grid, progress=progress, **given)
-    show(dataset, outputs, fields)
-
-
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the JSON object of a search for orbits."""
-    from pendmap.analysis.orbit_table import row
-
-    a = dataset.attrs
-    found = [
-        row(dataset, "orbit", k)
-        | {"stable": bool(dataset["stable"][k]), "residual": float(dataset["residual"][k])}
-        for k in range(dataset.sizes["orbit"])
-    ]
-    return {
-        "units": a["units"],
-        "orbits": found,
-        **{name: a[name] for name in ("n", "w", "cells", "begun", "seconds", "simd", "threads")},
-        "summary": a["summary"].split("\n"),
-    }
+    show(dataset, outputs, SCHEMA)

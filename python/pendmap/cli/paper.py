@@ -9,18 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.options import simd_option
+from pendmap.cli.options import json_option, seed_option, simd_option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import OutputFile, Whole
-from pendmap.errors import MOST_SEED
+from pendmap.cli.types import PICTURES, OutputFile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from pendmap.identification import IdentificationReport
-
-
-_PICTURES = (".png", ".svg", ".pdf")
 
 
 @click.command("paper")
@@ -34,13 +30,11 @@ _PICTURES = (".png", ".svg", ".pdf")
 )
 @click.option(
     "--plot",
-    type=OutputFile(_PICTURES),
+    type=OutputFile(PICTURES),
     help="File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
 )
-@click.option(
-    "--seed", type=Whole(0, MOST_SEED), default=0, help="Of the rig's noise.  [default: 0]"
-)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@seed_option("Of the rig's noise.")
+@json_option()
 @simd_option
 @click.option("--quiet", is_flag=True, help="Do not say what was written.")
 def command(  # noqa: PLR0913 (an option each)
@@ -92,13 +86,8 @@ def _files(
         if path.suffix != ".csv":
             yield functools.partial(figures.draw, key, seed=seed), path
         if key == figures.TABLE:
-            yield functools.partial(_write_table, seed), path.with_suffix(".csv")
-
-
-def _write_table(seed: int, path: Path) -> Path:
-    from pendmap.paper import figures
-
-    return figures.write_table(figures.report(seed), path)
+            table = path.with_suffix(".csv")
+            yield lambda to: figures.write_table(figures.report(seed), to), table
 
 
 def _say(found: IdentificationReport) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from pendmap.cli.show import write_all
-from pendmap.cli.types import OutputFile
+from pendmap.cli.types import PICTURES, OutputFile, default_file
 from pendmap.errors import InputError
 
 
@@ -18,7 +18,7 @@ from pendmap.errors import InputError
     "--out",
     "--plot",
     "out",
-    type=OutputFile([".png", ".svg", ".pdf"]),
+    type=OutputFile(PICTURES),
     help="Figure to write: .png .svg .pdf.  [default: FILE with .png]",
 )
 @click.option(
@@ -46,7 +46,7 @@ def command(  # noqa: PLR0913 (the options above)
     inches = _size(size)
     if not file.name:
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
-    target = out or OutputFile([".png"]).convert(file.with_suffix(".png"), None, None)
+    target = out or default_file(file.with_suffix(".png"))
 
     from pendmap import figures
     from pendmap.files.dataset import load

@@ -1,4 +1,4 @@
-"""What a computation costs where damping is small, said on stderr before it begins."""
+"""Estimated cost of a computation with small damping, on stderr before it begins."""
 
 from __future__ import annotations
 
@@ -14,20 +14,17 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
 _TYPICAL: Final = 20
-"""A start settles after about this part of its bound: 1/60 to 1/8 for gamma .01 to .0003."""
+"""Bound over typical settling time: 60 to 8 for gamma 0.01 to 0.0003."""
 _BESIDE: Final = 5000
-"""Starts that the search for attractors and the checks are worth."""
+"""Cost of the search for attractors and of the checks, in starts."""
 _SAMPLE: Final = 960
 """Starts of the measurement of speed."""
 _LEAST_SECONDS: Final = 0.05
-"""Time, s, from which a measurement of speed is good enough."""
+"""Least time of a measurement of speed, s."""
 
 
 def say(model: Pendulum | Rig, starts: int, *, tol: float, threads: int | None) -> None:
-    """Say the periods and roughly the time of ``starts`` starts, where damping raises the bound.
-
-    Nothing of a model that cannot be computed: the computation itself says why.
-    """
+    """Say periods and time of ``starts`` starts where damping raises the bound."""
     from pendmap import _core
     from pendmap.model import without_dimensions
 
@@ -50,7 +47,7 @@ def say(model: Pendulum | Rig, starts: int, *, tol: float, threads: int | None) 
 
 
 def _speed(parameters: _core._Parameters, tol: float, threads: int) -> float:
-    """Return how many periods of single trajectories are computed in a second."""
+    """Return the periods of single trajectories that are computed in a second."""
     import numpy as np
 
     from pendmap import _core

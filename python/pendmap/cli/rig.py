@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.cli.options import json_option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import NUMBER, OutputFile
+from pendmap.cli.types import NUMBER, PICTURES, OutputFile
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
@@ -62,12 +63,12 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--plot",
-    type=OutputFile([".png", ".svg", ".pdf"]),
+    type=OutputFile(PICTURES),
     help="Figure of the records: .png .svg .pdf.",
 )
 @click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
 @click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+@json_option()
 @click.option("--quiet", is_flag=True, help="Do not say what was written.")
 def command(  # noqa: PLR0913 (an option each)
     *,
@@ -133,7 +134,7 @@ def _names(where: virtual_rig.Places) -> str:
 
 
 def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
-    """Draw the records, with what the folder says about them and nothing that it hides."""
+    """Draw the records with their public description, not what is hidden."""
     from pendmap import figures, virtual_rig
 
     held = virtual_rig.held_out(experiment)

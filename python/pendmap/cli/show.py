@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from pendmap.analysis.result import Schema
     from pendmap.cli.options import Outputs
 
 
 @contextlib.contextmanager
 def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], None] | None]:
-    """A bar with the time left, on stderr; ``None`` where it is not shown."""
+    """Show a bar with the time left on stderr; give its callback, or None."""
     if not shown:
         yield None
         return
@@ -47,36 +48,23 @@ def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], Non
         yield report
 
 
-_SEARCHED = (
-    *("starts", "undecided", "failed", "chaos_periods", "seconds", "simd", "threads"),
-    "reached_error",
-)
-
-
-def searched(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON of a search over many pendulums says of the search."""
-    from pendmap.analysis.parameter_map import undecided_cells
-
-    a = dataset.attrs
-    places = {"undecided_at": undecided_cells(dataset)}
-    return {name: a[name] for name in _SEARCHED} | places | {"summary": a["summary"].split("\n")}
-
-
-def show(dataset: xr.Dataset, outputs: Outputs, as_json: Callable[[xr.Dataset], Any]) -> None:
+def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema) -> None:
     """Write the files asked for, then JSON or the summary to stdout."""
     files = ((functools.partial(write, dataset), path) for write, path in _files(outputs))
     written = write_all(files)
     if outputs.as_json:
-        from pendmap.analysis.draws.summary import fields
-
-        said = {"misses_record": dataset.attrs.get("misses_record"), **fields(dataset)}
-        click.echo(json.dumps(plain(as_json(dataset) | said), allow_nan=False))
+        write_json(schema.json(dataset))
     elif not outputs.quiet:
         click.echo(dataset.attrs["title"])
         click.echo(dataset.attrs["summary"])
         written.say()
     written.check()
     open_viewer(outputs)
+
+
+def write_json(fields: dict[str, Any]) -> None:
+    """Write one JSON object to stdout."""
+    click.echo(json.dumps(plain(fields), allow_nan=False))
 
 
 class Written(list[str]):
@@ -97,15 +85,7 @@ class Written(list[str]):
             click.echo("Written: " + ", ".join(map(one_line, self)))
 
     def check(self) -> None:
-        """End the command, after all else is said, where a file could not be written.
-
-        Raises
-        ------
-        InputError
-            If something cannot be put into a file of that kind.
-        NotWrittenError
-            If the disk did not take a file.
-        """
+        """End the command with an error where a file was refused, or not taken by the disk."""
         if self.refused:
             raise self.refused[0]
         if self.missed:
@@ -116,11 +96,10 @@ class Written(list[str]):
 def write_all(
     files: Iterable[tuple[Callable[[Path], Path | str], Path]], *, keep: bool = False
 ) -> Written:
-    """Write files one after the other and return their names.
+    """Write files one after the other, an interrupt between two of them; return their names.
 
     Where the disk does not take one, the others are tried all the same (:meth:`Written.check`).
     What cannot be put into a file is refused and leaves none, unless ``keep`` asks for the others.
-    An interrupt takes effect between two files; what is complete stands in ``files.COMPLETE``.
     """
     written = Written()
     for write, path in files:
@@ -141,7 +120,7 @@ def write_all(
 
 
 def open_viewer(outputs: Outputs) -> None:
-    """Open the viewer on the recording, where that was asked for."""
+    """Open the viewer on the recording where --view asks for it."""
     if outputs.view and outputs.rerun is not None:
         open_recording(outputs.rerun)
 
@@ -179,7 +158,7 @@ def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)
-    """Numbers of numpy as Python's own; what is not finite as null."""
+    """Return numbers of numpy as Python's own, and numbers that are not finite as null."""
     if isinstance(value, dict):
         return {str(key): plain(part) for key, part in value.items()}
     if isinstance(value, list | tuple):

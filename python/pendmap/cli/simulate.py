@@ -6,12 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.model_options import model_from, model_options
-from pendmap.cli.options import (
-    Outputs,
-    output_options,
-    simd_option,
-)
+from pendmap.cli.model_options import begin, model_options
+from pendmap.cli.options import output_options, simd_option, start_options
 from pendmap.cli.show import show
 from pendmap.cli.types import NUMBER, Whole
 from pendmap.errors import MOST_SAMPLES, InputError
@@ -28,10 +24,7 @@ _VIEWER = "127.0.0.1:9876"
 
 @click.command("simulate")
 @model_options
-@click.option("--theta", type=NUMBER, default=1.0, help="Angle at the start, rad.  [default: 1]")
-@click.option(
-    "--velocity", type=NUMBER, default=0.0, help="Velocity at the start, in SI rad/s.  [default: 0]"
-)
+@start_options
 @click.option(
     "--until", type=NUMBER, default=100.0, help="Last time, in 1/w0, in SI s.  [default: 100]"
 )
@@ -58,17 +51,16 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     viewer that runs (rerun --bind 127.0.0.1); Ctrl-C then ends the trajectory where it is, and what
     was computed is written.
     """
-    file, address = given["model"], given.pop("live")
-    model = model_from(given)
-    outputs = Outputs.take(given, "simulate", reads=[file])
+    address = given.pop("live")
+    model, outputs = begin(given, "simulate")
     start = (given.pop("theta"), given.pop("velocity"))
     live = None if address is None else _sender(model, start, address)
 
-    from pendmap.analysis.trajectory import simulate
+    from pendmap.analysis.trajectory import SCHEMA, simulate
 
     dataset = simulate(model, *start, given.pop("until"), live=live, **given)
     gone = None if live is None else _finished(live, dataset)
-    show(dataset, outputs, fields)
+    show(dataset, outputs, SCHEMA)
     if gone is not None:
         raise click.ClickException(f"--live: {gone}")
     if dataset.attrs.get("interrupted"):
@@ -86,7 +78,7 @@ def _sender(model: Pendulum | Rig, start: tuple[float, float], address: str) -> 
 
 
 def _finished(live: Live, dataset: xr.Dataset) -> Exception | None:
-    """Send the rest; return why that was not possible, for what was computed is written first."""
+    """Send the last samples; return the error, to be raised after the files are written."""
     from pendmap import viewer
 
     try:
@@ -94,28 +86,3 @@ def _finished(live: Live, dataset: xr.Dataset) -> Exception | None:
     except viewer.ViewerError as error:
         return error
     return None
-
-
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the JSON object of a trajectory: its end, unwrapped."""
-    a = dataset.attrs
-    result: dict[str, Any] = {
-        "units": a["units"],
-        "t": a["until"],
-        "theta": float(dataset["theta"].values[-1]),
-        "velocity": float(dataset["velocity"].values[-1]),
-        "stuck": bool(a["stuck"]),
-        "turns": a["turns"],
-        "tol": a["tol"],
-        "tol_reached": bool(a["reached_error"] <= a["tol"]),
-        "reached_error": a["reached_error"],
-        "end_error": a["end_error"],
-        "interrupted": bool(a.get("interrupted", 0)),
-        "energy": float(dataset["energy"].values[-1]),
-        "simd": a["simd"],
-    }
-    if a["lyapunov"]:
-        names = {"exponent": "exponent", "stderr": "exponent_stderr"}
-        names |= {name: name for name in ("exponent_from", "exponent_to")}
-        result |= {key: a.get(name) for key, name in names.items()}
-    return result

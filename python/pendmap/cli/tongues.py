@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from pendmap.cli.model_options import model_from, model_options_without
-from pendmap.cli.options import (
-    Outputs,
-    draws_option,
-    output_options,
-    progress_options,
-    seed_option,
-)
+from pendmap.cli.model_options import begin, model_options_without
+from pendmap.cli.options import draws_option, output_options, progress_options, seed_option
 from pendmap.cli.show import progress_bar, show
 from pendmap.cli.types import NUMBER, VALUES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @click.command("tongues")
@@ -49,48 +40,11 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     Writes tongues.nc, tongues.png and tongues.rrd if no output is named. --json alone writes no
     file.
     """
-    file = given["model"]
-    model = model_from(given)
-    outputs = Outputs.take(given, "tongues", reads=[file])
+    model, outputs = begin(given, "tongues")
     omegas = given.pop("omegas")
 
-    from pendmap.analysis.tongues import tongues
+    from pendmap.analysis.tongues import SCHEMA, tongues
 
     with progress_bar("tongues", shown=outputs.shows_progress) as progress:
         dataset = tongues(model, omegas, refine=outputs.draws, progress=progress, **given)
-    show(dataset, outputs, fields)
-
-
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the JSON object of critical curves."""
-    from pendmap.charts.tongues import by_frequency
-
-    a = dataset.attrs
-    omega = [float(w) for w in dataset["omega"].values]
-    curves, undamped, inverted = (
-        [
-            {"omega": w, "p": [p for p, _ in row], "multiplier": [m for _, m in row]}
-            for w, row in zip(omega, by_frequency(dataset, prefix, len(omega)), strict=True)
-        ]
-        for prefix in ("", "undamped_", "inverted_")
-    )
-    asked = dataset["asked"].values.astype(bool)
-    for prefix, rest in (("", curves), ("inverted_", inverted)):
-        stable = dataset[f"{prefix}stable_above"].values
-        for k, curve in enumerate(rest):
-            mine = dataset[f"{prefix}index"].values == k
-            curve["stable_above"] = [bool(s) for s in stable[mine]]
-    for k, curve in enumerate(curves):
-        curve["fold"] = float(dataset["fold"].values[k])
-    return {
-        "units": a["units"],
-        "curves": [curve for curve, mine in zip(curves, asked, strict=True) if mine],
-        "inverted": [curve for curve, mine in zip(inverted, asked, strict=True) if mine],
-        "undamped": [curve for curve, mine in zip(undamped, asked, strict=True) if mine],
-        "asymptotic": {
-            str(name): dataset["asymptotic"].values[k][asked].tolist()
-            for k, name in enumerate(dataset["curve"].values)
-        },
-        **{name: a[name] for name in ("p_max", "seconds", "simd", "threads")},
-        "summary": a["summary"].split("\n"),
-    }
+    show(dataset, outputs, SCHEMA)

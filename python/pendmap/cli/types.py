@@ -1,4 +1,4 @@
-"""Numbers, axes and files as they are typed."""
+"""Types of options: numbers, axes and files."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from pendmap.files import check_room
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+PICTURES = (".png", ".svg", ".pdf")
+"""Suffixes of figures."""
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
 
@@ -55,7 +57,7 @@ class Whole(click.ParamType[int]):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> int:
-        """Refuse what is no whole number, or outside the bounds."""
+        """Refuse anything but a whole number within the bounds."""
         try:
             number = int(str(value))
         except ValueError:
@@ -155,7 +157,7 @@ class InstructionSet(click.ParamType[str]):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> str:
-        """Refuse what this processor lacks."""
+        """Refuse an instruction set that this processor lacks."""
         from pendmap import _core
 
         available = _core.simd_available()
@@ -176,7 +178,7 @@ class OutputFile(click.ParamType[Path]):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Path:
-        """Refuse what cannot be written."""
+        """Refuse a file that cannot be written."""
         path = Path(str(value))
         if not path.name:
             self.fail(f"{str(value)!r}: is a folder, or no file's name", param, ctx)
@@ -198,6 +200,11 @@ class OutputFile(click.ParamType[Path]):
         return path
 
 
+def default_file(name: str | Path) -> Path:
+    """Return a file that no option names, where it can be written."""
+    return OutputFile([Path(name).suffix]).convert(name, None, None)
+
+
 class ReportFile(OutputFile):
     """A report to write: a file, or a folder that is made where it does not exist."""
 
@@ -207,7 +214,7 @@ class ReportFile(OutputFile):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Path:
-        """Refuse what cannot be written."""
+        """Refuse a file that cannot be written."""
         path = Path(str(value))
         if path.suffix and not path.is_dir():
             return super().convert(value, param, ctx)
@@ -221,15 +228,7 @@ class ReportFile(OutputFile):
 
 
 def _library(path: Path) -> None:
-    """Refuse a file that needs what is not installed, or cannot be imported.
-
-    Raises
-    ------
-    InputError
-        If that is so, or a .zarr stands there that may not be replaced.
-    OSError
-        If that cannot be read.
-    """
+    """Refuse a file that needs a library that is not installed, or a .zarr of something else."""
     suffix = path.suffix.lower()
     module, extra = _LIBRARIES.get(suffix, ("pendmap.files", ""))
     try:
@@ -251,7 +250,7 @@ _LIBRARIES = {
     ".nc": ("netCDF4", "netcdf4"),
     ".zarr": ("zarr", "the extra pendmap[zarr]"),
 }
-"""What is imported before anything is computed, by suffix, and what brings it."""
+"""Module that a suffix needs, imported before anything is computed, and its package."""
 
 
 NUMBER = _Number()

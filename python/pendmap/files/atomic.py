@@ -38,13 +38,13 @@ _STAGE: Final = re.compile(r"\.pendmap-[0-9a-f]{32}\.part")
 """Name of a folder in which files are written before they take their places."""
 
 _OWNER: Final = "owner"
-"""File in a stage that its run holds locked as long as it lives."""
+"""File in a stage that its run keeps locked while it lives."""
 
 _PROBE: Final = 2**20
-"""Bytes that a disk takes unless it is the reason why a library could not write."""
+"""Bytes written on trial after a library failed to write: a full disk refuses them."""
 
 _LEAST: Final = 4096
-"""Bytes that are written on trial before anything is computed: one block of most disks."""
+"""Bytes written on trial before anything is computed: one block of most disks."""
 
 
 @contextlib.contextmanager
@@ -234,7 +234,7 @@ def check_room(path: str | os.PathLike[str], size: int = 0) -> None:
 
 @contextlib.contextmanager
 def _named(target: Path) -> Iterator[None]:
-    """Let errors of the disk name the file that was asked for, not the place where it is made."""
+    """Let errors of the disk name the file that was asked for, not its temporary place."""
     if not target.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "the folder does not exist", str(target.parent))
     try:
@@ -247,7 +247,7 @@ def _named(target: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _disk_faults(part: Path) -> Iterator[None]:
-    """Raise the disk's error in the place of a library's that only says that it failed."""
+    """Raise the disk's own error in place of an unspecific one of a library."""
     try:
         yield
     except (InputError, MemoryError, OSError):
@@ -260,7 +260,7 @@ def _disk_faults(part: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _stage(folder: Path) -> Iterator[Path]:
-    """Give a hidden folder that is gone at the end, with those that killed runs left beside it."""
+    """Give a hidden folder, removed at the end together with stages of runs that were killed."""
     with held_interrupts():
         _sweep(folder)
         stage, owner = _made(folder)
@@ -316,14 +316,14 @@ def _sweep(folder: Path) -> None:
 
 
 def _put_back(stage: Path) -> None:
-    """Put a folder that was on its way out back where nothing took its place."""
+    """Restore a folder that was to be replaced where nothing took its place."""
     for old in (stage / "old").glob("*"):
         if not (stage.parent / old.name).exists():
             old.rename(stage.parent / old.name)
 
 
 def _remove(stage: Path) -> None:
-    """Remove a stage; its lock goes last, so that whatever stays can be swept."""
+    """Remove a stage, its lock last, so that a partial removal can be swept later."""
     for entry in stage.iterdir():
         if entry.is_dir() and not entry.is_symlink():
             shutil.rmtree(entry, ignore_errors=True)

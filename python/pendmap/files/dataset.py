@@ -12,28 +12,20 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
+from pendmap import ANALYSES
 from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
 FORMAT_VERSION: Final = 1
 """Version of the layout of the datasets, in their attribute ``format_version``."""
 SUFFIXES: Final = (".nc", ".zarr")
-"""The kinds of file a result is stored in."""
+"""Suffixes of the files that a result is stored in."""
 _MARKS: Final = frozenset(("format_version", "kind"))
-"""Attributes by which a dataset says that it is a result."""
-KINDS: Final = {
-    "basins": ("basins", "basins_of"),
-    "bifurcation": ("bifurcation",),
-    "lifetime": ("lifetime",),
-    "lyapunov": ("lyapunov",),
-    "melnikov": ("melnikov",),
-    "orbits": ("orbit",),
-    "parameter_map": ("parameter_map",),
-    "tongues": ("tongues",),
-    "trajectory": ("simulate",),
-}
-"""The kinds of result, and the functions that return each."""
+"""Attributes that mark a dataset as a result."""
+KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
+"""Kinds of result, and the functions that return each."""
 _LARGE: Final = 4096
+"""Values from which on a variable is compressed."""
 _ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
 """Names of the files of a stored result: descriptions and chunks."""
 
@@ -99,22 +91,7 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
 
 
 def check_replaceable(path: str | os.PathLike[str]) -> None:
-    """Refuse to replace what is not a stored result and nothing else.
-
-    A folder is a result if it says so and each file in it has a name that :func:`save` gives.
-
-    Parameters
-    ----------
-    path : str or path
-        Where a result shall be stored as .zarr; it need not exist.
-
-    Raises
-    ------
-    InputError
-        If it is a file, or a folder with anything else in it.
-    OSError
-        If it cannot be read.
-    """
+    """Refuse to replace a folder that is not a stored result, with the files of one alone."""
     target = Path(path)
     wanted = "must be a new folder, or a result of pendmap, which is replaced"
     if target.exists() and not target.is_dir():

@@ -1,4 +1,4 @@
-"""TOML: read with bounds, written a line a key."""
+"""TOML: read within bounds, written one key on a line."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _tables(value: object) -> bool:
 
 
 def _entry(name: str, table: Mapping[str, Any]) -> str:
-    """One ``[[name]]``; what is too long for a line is a table of its own after the others."""
+    """Return one ``[[name]]``; values too long for a line follow as tables of their own."""
     lines = {key: f"{_value({key: value})[2:-2]}\n" for key, value in table.items()}
     long = {
         key: value
@@ -85,7 +85,7 @@ def _entry(name: str, table: Mapping[str, Any]) -> str:
 
 
 def _value(value: object) -> str:
-    """A value on one line."""
+    """Return a value on one line."""
     if isinstance(value, Mapping):
         keys = {key: tomli_w.dumps({key: 0}).removesuffix(" = 0\n") for key in value}
         inside = ", ".join(f"{keys[key]} = {_value(part)}" for key, part in value.items())

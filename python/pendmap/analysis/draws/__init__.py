@@ -1,10 +1,9 @@
-"""Models drawn from what a fit knows of its parameters, and what becomes of maps over them.
+"""Models drawn from what a fit knows of its parameters, and results over all draws.
 
-``sample`` draws the models, ``match`` finds an attractor or orbit again in each of them;
-``basins``, ``planes``, ``orbits``, ``lifetimes`` and ``curves`` gather what a map says over all
-draws, ``said`` puts it in words.
+``sample`` draws the models, ``match`` finds an attractor or orbit again in each of them; the other
+modules, one for each analysis, gather what its results say over all draws.
 """
 
-from pendmap.analysis.draws.sample import Draws, Progress, drawn, part
+from pendmap.analysis.draws.sample import Draws, drawn, part
 
-__all__ = ["Draws", "Progress", "drawn", "part"]
+__all__ = ["Draws", "drawn", "part"]

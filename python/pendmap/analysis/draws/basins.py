@@ -1,4 +1,4 @@
-"""Basins over draws: how probable each end of a start is, and where the doubt comes from.
+"""Basins over draws: the probability of each end of a start, and the sources of its doubt.
 
 In a box of 5 x 5 cells let ``p_d(a)`` be the share of the cells that end on attractor ``a`` in draw
 ``d``, and ``H(p) = -sum p ln p``. Then
@@ -20,73 +20,62 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.draws.match import matched, names_of, plain, points_of
-from pendmap.analysis.draws.sample import interval
-from pendmap.analysis.draws.summary import draws_line
+from pendmap.analysis.draws.sample import interval, rows
 from pendmap.analysis.fractality import BOX
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pendmap.analysis.draws.sample import Draws, Progress
-    from pendmap.model import Pendulum, Rig
+    from pendmap.analysis.draws.sample import Draws, Run
+    from pendmap.analysis.numerics import Progress
 
     Floats = NDArray[np.float64]
 
 
 SURE: Final = 0.95
-"""The probability from which the end of a start counts as sure."""
+"""Probability of an end from which a cell counts as sure."""
 
 _UNKNOWN: Final = ("undecided", "failed")
 """The ends of labels 0 and -1."""
 
 
 def basins_over(
-    dataset: xr.Dataset,
-    draws: Draws,
-    run: Callable[[Pendulum | Rig, Progress | None], xr.Dataset],
-    progress: Progress | None,
+    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
 ) -> xr.Dataset:
-    """Return a basin map with what it becomes over draws of its parameters.
+    """Return a basin map of M x N cells with those of D draws.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        The map of the model's own values, M x N cells.
-    draws : Draws
-        The models, D.
-    run : callable
-        Computes the map of one of them over the same cells.
-    progress : callable, optional
-        As of :func:`pendmap.basins`; the map of the own values is one more.
-
-    Returns
-    -------
-    xarray.Dataset
-        The map with, over ``outcome``, all ends of starts by name: ``probability`` (outcome, M, N),
-        ``drawn_share`` (outcome, D), ``exists`` (the share of the draws that have it),
-        ``share_mean``, ``share_low``, ``share_high`` (the 95 % interval over the draws); over the
-        cells ``certainty``, the probability of the most likely end, and ``label_entropy``, in nat;
-        over boxes ``doubt_start`` and ``doubt_parameters``, in nat, whose means are attributes;
-        ``drawn`` (D, parameter). Attribute ``sure_cells``: the share of the cells with a certainty
-        of 95 % or more.
+    Adds, over ``outcome``, all ends of starts by name: ``probability`` (outcome, M, N),
+    ``drawn_share`` (outcome, D), ``exists`` (the share of the draws that have it), ``share_mean``,
+    ``share_low``, ``share_high`` (the 95 % interval over the draws); over the cells ``certainty``,
+    the probability of the most likely end, and ``label_entropy``, in nat; over boxes
+    ``doubt_start`` and ``doubt_parameters``, in nat, whose means are attributes; ``drawn``
+    (D, parameter). Attribute ``sure_cells``: the share of the cells with a certainty of 95 % or
+    more.
     """
     tally = _Tally(dataset)
-    for model, report in draws.each(progress):
-        tally.add(run(model, report))
+    for one in draws.each(run, progress):
+        tally.add(one)
     found = dataset.assign(tally.variables()).assign(draws.variables)
     start, by = (found[f"doubt_{name}"].values for name in ("start", "parameters"))
-    found.attrs = {
-        **dataset.attrs,
-        **draws.attributes,
+    found.attrs |= {
         "sure_cells": float((found["certainty"].values >= SURE).mean()),
         "doubt_start": float(start.mean()),
         "doubt_parameters": float(by.mean()),
     }
-    found.attrs["summary"] = "\n".join([dataset.attrs["summary"], *_said(found)])
+    draws.complete(found, _summary(found))
     return found
+
+
+def fields(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return what the JSON object of a basin map says of draws."""
+    names = ("outcome", "share_mean", "share_low", "share_high", "exists")
+    outcomes = [
+        {"name": str(name), "fraction": mean, "ci95": [low, high], "exists": exists}
+        for name, mean, low, high, exists in rows(dataset, *names)
+    ]
+    doubt = ("sure_cells", "doubt_start", "doubt_parameters")
+    return {"attractors": outcomes} | {name: dataset.attrs[name] for name in doubt}
 
 
 class _Tally:
@@ -130,7 +119,7 @@ class _Tally:
         self.exists.append(set(places) | set(shares))
 
     def variables(self) -> dict[str, Any]:
-        """Return all that was counted as variables."""
+        """Return the counts as variables of a dataset."""
         draws, dims = len(self.shares), self.cells.dims
         kept = [k for k, name in enumerate(self.names) if name not in _UNKNOWN]
         kept += [k for k, name in enumerate(self.names) if name in _UNKNOWN]
@@ -184,7 +173,7 @@ class _Tally:
         return len(self.names) - 1
 
     def _boxed(self, cells: NDArray[np.bool_]) -> Floats:
-        """Return how many cells of each whole box are so."""
+        """Return the number of true cells in each whole box."""
         (rows, columns), (high, wide) = self.boxes, self.side
         whole = cells[: rows * high, : columns * wide].reshape(rows, high, columns, wide)
         return np.asarray(whole.sum(axis=(1, 3)), dtype=np.float64)
@@ -199,14 +188,10 @@ def _entropy(part: NDArray[Any]) -> NDArray[Any]:
     return -part * np.log(np.where(part > 0, part, 1))
 
 
-def _said(found: xr.Dataset) -> list[str]:
-    a = found.attrs
-    lines = [draws_line(found)]
-    for name, mean, low, high, exists in zip(
-        found["outcome"].values,
-        *(found[key].values for key in ("share_mean", "share_low", "share_high", "exists")),
-        strict=True,
-    ):
+def _summary(found: xr.Dataset) -> list[str]:
+    a, lines = found.attrs, []
+    names = ("outcome", "share_mean", "share_low", "share_high", "exists")
+    for name, mean, low, high, exists in rows(found, *names):
         there = "" if exists == 1 or name in _UNKNOWN else f", in {100 * exists:.3g} % of them"
         lines.append(
             f"{name}: {100 * mean:.2f} % of the starts, 95 % of the draws in "

@@ -14,14 +14,11 @@ if TYPE_CHECKING:
 
 
 _APART = math.pi
-"""How far apart those are of which one has no points."""
+"""Distance from an attractor without points, rad."""
 
 
 def plain(name: str) -> str:
-    """Return a name without the angle that tells it from others of the same name.
-
-    That angle (``oscillation 2:0 at +0.1234``) moves with the parameters.
-    """
+    """Return a name without its angle (``... at +0.1234``), which moves with the parameters."""
     return name.partition(" at ")[0]
 
 
@@ -43,17 +40,7 @@ def matched(
     others: list[str],
     theirs: list[NDArray[np.float64]],
 ) -> list[int]:
-    """Return for each of the others which of the known ones it is, or -1.
-
-    Those of one :func:`plain` name are paired, so that the sum of the distances of pairs is least.
-
-    Parameters
-    ----------
-    names, others : list of str
-        Names of what is known, and of what is to be found again.
-    points, theirs : list of ndarray of float, shape (M, 2)
-        Their points, angle and velocity.
-    """
+    """Pair those of one :func:`plain` name by least distance; return places, or -1."""
     found = [-1] * len(others)
     for name in dict.fromkeys(map(plain, others)):
         mine = [k for k, own in enumerate(names) if plain(own) == name]

@@ -1,61 +1,39 @@
-"""Closed orbits over draws: how far each moves, how often it is there, and how often stable."""
+"""Closed orbits over draws: how far each moves, how often it exists, and how often stable."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pendmap.analysis.draws.match import matched, names_of, points_of
-from pendmap.analysis.draws.sample import interval
-from pendmap.analysis.draws.summary import draws_line
+from pendmap.analysis.draws.sample import interval, rows
 from pendmap.formatting import counted, with_error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pendmap.analysis.draws.sample import Draws, Progress
-    from pendmap.model import Pendulum, Rig
+    from pendmap.analysis.draws.sample import Draws, Run
+    from pendmap.analysis.numerics import Progress
 
     Floats = NDArray[np.float64]
 
 
 def orbits_over(
-    dataset: xr.Dataset,
-    draws: Draws,
-    run: Callable[[Pendulum | Rig, Progress | None], xr.Dataset],
-    progress: Progress | None,
+    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
 ) -> xr.Dataset:
-    """Return closed orbits with what becomes of each over draws of the parameters.
+    """Return K closed orbits with those of D draws.
 
     An orbit is found again by its name, and among those of one name by its points. Its point is
-    the one next to that of the model's own orbit; of its multipliers each is the one next to that
-    of the own orbit.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        The orbits of the model's own values, K.
-    draws : Draws
-        The models, D.
-    run : callable
-        Finds the orbits of one of them in the same box.
-    progress : callable, optional
-        As of :func:`pendmap.orbit`; the search for the own orbits is one more.
-
-    Returns
-    -------
-    xarray.Dataset
-        The orbits with ``drawn_theta``, ``drawn_velocity`` (K, D) and ``drawn_multipliers``
-        (K, eigenvalue, part, D), nan where a draw has no such orbit; ``theta_spread``,
-        ``velocity_spread`` and ``multipliers_spread``, their standard deviations over the draws;
-        ``exists`` and ``stable_share``, the shares of the draws in which it is there, and there and
-        stable; ``drawn`` (D, parameter). Attribute ``drawn_others``: orbits of the draws that the
-        own model has not, a draw on average.
+    the one next to that of the model's own orbit, and so is each of its multipliers. Adds
+    ``drawn_theta``, ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D),
+    nan where a draw has no such orbit; ``theta_spread``, ``velocity_spread`` and
+    ``multipliers_spread``, their standard deviations over the draws; ``exists`` and
+    ``stable_share``, the shares of the draws in which it exists, and exists and is stable;
+    ``drawn`` (D, parameter). Attribute ``drawn_others``: mean number of orbits of a draw that the
+    own model lacks.
     """
     names, points = names_of(dataset, "orbit"), points_of(dataset, "orbit")
     count, total = len(names), len(draws)
@@ -63,8 +41,7 @@ def orbits_over(
     multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
     there, stable = np.zeros((count, total), bool), np.zeros((count, total), bool)
     others = 0
-    for d, (model, report) in enumerate(draws.each(progress)):
-        one = run(model, report)
+    for d, one in enumerate(draws.each(run, progress)):
         theirs = points_of(one, "orbit")
         for j, k in enumerate(matched(names, points, names_of(one, "orbit"), theirs)):
             if k < 0:
@@ -91,9 +68,22 @@ def orbits_over(
             **draws.variables,
         }
     )
-    found.attrs = {**dataset.attrs, **draws.attributes, "drawn_others": others / total}
-    found.attrs["summary"] = "\n".join([dataset.attrs["summary"], *_said(found)])
+    found.attrs["drawn_others"] = others / total
+    draws.complete(found, _summary(found, others))
     return found
+
+
+def fields(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return what the JSON object of closed orbits says of draws."""
+    spreads = ("theta_spread", "velocity_spread", "multipliers_spread")
+    orbits = [
+        {"name": str(name), "exists": there, "stable": stable}
+        | dict(zip(spreads, (theta, velocity, spread.tolist()), strict=True))
+        for name, there, stable, theta, velocity, spread in rows(
+            dataset, "orbit", "exists", "stable_share", *spreads
+        )
+    ]
+    return {"orbits": orbits, "others": dataset.attrs["drawn_others"]}
 
 
 def _next_to(own: Floats, points: Floats) -> Floats:
@@ -111,8 +101,8 @@ def _paired(own: Floats, pairs: Floats) -> Floats:
     return swapped if nearer else pairs
 
 
-def _said(found: xr.Dataset) -> list[str]:
-    lines = [draws_line(found)]
+def _summary(found: xr.Dataset, others: int) -> list[str]:
+    lines = []
     for k, name in enumerate(found["orbit"].values):
         theta, velocity = (
             with_error(float(found[f"{what}_point"][k]), float(found[f"{what}_spread"][k]))
@@ -126,7 +116,7 @@ def _said(found: xr.Dataset) -> list[str]:
             f"{100 * float(found['stable_share'][k]):.3g} %; theta = {theta}, velocity = {velocity}"
             f"{largest if math.isfinite(mean) else ''}."
         )
-    if found.attrs["drawn_others"]:
-        more = counted(round(found.attrs["drawn_others"] * found.attrs["draws"]), "orbit")
+    if others:
+        more = counted(others, "orbit")
         lines.append(f"All draws together have {more} more, which the own model has not.")
     return lines

@@ -1,31 +1,34 @@
-"""Models drawn from the covariance that a model file holds."""
+"""Models drawn from the covariance of a model file."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap.errors import MOST_DRAWS, MOST_SEED, InputError, check_whole, short_repr
+from pendmap.formatting import counted
 from pendmap.model.covariance import covariance_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
+    import xarray as xr
     from numpy.typing import NDArray
 
+    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
+    Run = Callable[..., xr.Dataset]
+    """Computes the result of a model, reporting to the keyword ``progress``."""
 
-Progress = Callable[[int, int], object]
 
 _TRIES: Final = 1000
-"""Draws in a row that may all be outside what is allowed."""
+"""Draws in a row that may all be outside the allowed values."""
 
 _LEVELS: Final = (0.025, 0.975)
-"""The ends of a 95 % interval."""
+"""Probabilities at the ends of a 95 % interval."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,13 +38,13 @@ class Draws:
     Parameters
     ----------
     names : tuple of str
-        The parameters that vary.
+        The parameters that vary, K.
     values : ndarray of float, shape (N, K)
         Their values, in the model's own units.
     models : tuple of Pendulum or Rig
         The models, N.
     seed : int
-        What they were drawn with.
+        Seed with which they were drawn.
     """
 
     names: tuple[str, ...]
@@ -54,22 +57,24 @@ class Draws:
 
     @property
     def variables(self) -> dict[str, Any]:
-        """The values as a variable ``drawn`` over (draw, parameter), with the names."""
+        """The variable ``drawn`` over (draw, parameter), and the names of the parameters."""
         comment = {"comment": "parameters of each draw, in the units of the model"}
         return {
             "drawn": (("draw", "parameter"), self.values, comment),
             "parameter": ("parameter", np.array(self.names, dtype=str)),
         }
 
-    @property
-    def attributes(self) -> dict[str, int]:
-        """``draws`` and ``draws_seed`` of a dataset."""
-        return {"draws": len(self), "draws_seed": self.seed}
-
-    def each(self, progress: Progress | None) -> Iterator[tuple[Pendulum | Rig, Progress | None]]:
-        """Give each model, and what its own computation reports its progress to."""
+    def each(self, run: Run, progress: Progress | None) -> Iterator[xr.Dataset]:
+        """Give the result of each drawn model; progress counts the own model as the first part."""
         for k, model in enumerate(self.models):
-            yield model, part(progress, k + 1, len(self) + 1)
+            yield run(model, progress=part(progress, k + 1, len(self) + 1))
+
+    def complete(self, found: xr.Dataset, lines: Iterable[str]) -> None:
+        """Add attributes of the draws, and lines about them, to a result."""
+        names = ", ".join(self.names)
+        head = f"{counted(len(self), 'draw')} of {names} from the covariance of the fit."
+        found.attrs |= {"draws": len(self), "draws_seed": self.seed}
+        found.attrs["summary"] = "\n".join([found.attrs["summary"], head, *lines])
 
 
 def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
@@ -135,10 +140,7 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
 
 
 def interval(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-    """Return mean, standard deviation and the ends of the 95 % interval over the last axis.
-
-    Values that are no numbers are left out; where there is none, nothing is a number.
-    """
+    """Return mean, standard deviation and ends of the 95 % interval of the finite values."""
     known = np.isfinite(values)
     count = known.sum(axis=-1)
     filled = np.where(known, values, 0.0)
@@ -154,7 +156,7 @@ def interval(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
 
 
 def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
-    """Return what one of so many equal parts of a computation reports its progress to."""
+    """Return the progress of one of ``parts`` equal parts of a computation."""
     if progress is None:
         return None
 
@@ -177,10 +179,7 @@ def _value(model: Pendulum | Rig, name: str) -> float:
 def _signs(
     model: Pendulum | Rig, names: tuple[str, ...], middle: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return 1 or -1 where a parameter keeps its sign: the sizes of effects of damping; else 0.
-
-    What the model itself refuses below 0 needs no mention.
-    """
+    """Return 1 or -1 where a parameter keeps its sign (sizes of effects of damping), else 0."""
     sizes = {
         f"{effect.name}.{entry['name']}"
         for effect in model.effects
@@ -207,3 +206,8 @@ def _with(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:
     )
     changed: dict[str, Any] = {**own, "effects": effects}
     return dataclasses.replace(model, **changed)
+
+
+def rows(dataset: xr.Dataset, *names: str) -> Iterator[tuple[Any, ...]]:
+    """Give the values of variables of one dimension, place by place."""
+    return zip(*(dataset[name].values for name in names), strict=True)

@@ -2,62 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.draws.sample import interval
-from pendmap.analysis.draws.summary import draws_line
+from pendmap.analysis.draws.sample import interval, rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pendmap.analysis.draws.sample import Draws, Progress
-    from pendmap.model import Pendulum, Rig
+    from pendmap.analysis.draws.sample import Draws, Run
+    from pendmap.analysis.numerics import Progress
 
     Floats = NDArray[np.float64]
 
 
 _TABLES: Final = (("critical", ""), ("inverted", "inverted_"))
-"""Tables of critical amplitudes, and the beginnings of the names of their variables."""
+"""Tables of critical amplitudes, and the prefixes of the names of their variables."""
 
 
 def tongues_over(
-    dataset: xr.Dataset,
-    draws: Draws,
-    run: Callable[[Pendulum | Rig, Progress | None], xr.Dataset],
-    progress: Progress | None,
+    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
 ) -> xr.Dataset:
-    """Return critical curves with the bands in which they lie over draws of the parameters.
+    """Return K critical amplitudes with the bands in which they lie over D draws.
 
     At each frequency ``Omega/w0`` the critical amplitudes of one multiplier are counted from the
-    lowest, and each is found again by its number.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        The curves of the model's own values, K critical amplitudes.
-    draws : Draws
-        The models, D.
-    run : callable
-        Finds the curves of one of them at the same frequencies.
-    progress : callable, optional
-        As of :func:`pendmap.tongues`; the curves of the own values are one more.
-
-    Returns
-    -------
-    xarray.Dataset
-        The curves with ``drawn_p`` (K, D), nan where a draw has no such amplitude, ``p_low`` and
-        ``p_high``, the 95 % interval over the draws, and ``exists``, the share of the draws that
-        have it; the same of inverted rest with the beginning ``inverted_``; ``drawn``
-        (D, parameter).
+    lowest, and each is found again by its number. Adds ``drawn_p`` (K, D), nan where a draw has no
+    such amplitude, ``p_low`` and ``p_high``, the 95 % interval over the draws, and ``exists``, the
+    share of the draws that have it; the same of inverted rest with the beginning ``inverted_``;
+    ``drawn`` (D, parameter).
     """
     columns: dict[str, list[Floats]] = {table: [] for table, _ in _TABLES}
-    for model, report in draws.each(progress):
-        one = run(model, report)
+    for one in draws.each(run, progress):
         for table, prefix in _TABLES:
             theirs = _numbered(one, prefix)
             mine = _numbered(dataset, prefix)
@@ -74,33 +51,53 @@ def tongues_over(
                 f"{prefix}exists": (table, np.isfinite(p).mean(axis=1)),
             }
         )
-    found.attrs = {**dataset.attrs, **draws.attributes}
-    found.attrs["summary"] = "\n".join([dataset.attrs["summary"], *_said(found)])
+    draws.complete(found, _lowest(found))
+    return found
+
+
+def fields(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return what the JSON object of critical curves says of draws."""
+    asked = dataset["asked"].values.astype(bool)
+    found = {}
+    for prefix, key in (("", "curves"), ("inverted_", "inverted")):
+        names = ("index", "multiplier", "p", "p_low", "p_high", "exists")
+        found[key] = [
+            {
+                "omega": float(dataset["omega"].values[index]),
+                "multiplier": multiplier,
+                "p": p,
+                "ci95": [low, high],
+                "exists": exists,
+            }
+            for index, multiplier, p, low, high, exists in rows(
+                dataset, *(f"{prefix}{name}" for name in names)
+            )
+            if asked[index]
+        ]
     return found
 
 
 def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], float]:
-    """Return critical amplitudes by place of the frequency, multiplier and number."""
+    """Return critical amplitudes by index of the frequency, multiplier and number."""
     seen: dict[tuple[int, int], int] = {}
     numbered = {}
-    for index, multiplier, p in zip(
-        *(dataset[f"{prefix}{name}"].values for name in ("index", "multiplier", "p")), strict=True
-    ):
+    names = (f"{prefix}{name}" for name in ("index", "multiplier", "p"))
+    for index, multiplier, p in rows(dataset, *names):
         which = (int(index), int(multiplier))
         seen[which] = seen.get(which, -1) + 1
         numbered[*which, seen[which]] = float(p)
     return numbered
 
 
-def _said(found: xr.Dataset) -> list[str]:
-    lines = [draws_line(found)]
+def _lowest(found: xr.Dataset) -> list[str]:
     p, low, high = (found[name].values for name in ("p", "p_low", "p_high"))
     asked = found["asked"].values.astype(bool)[found["index"].values]
-    if asked.any():
-        k = int(np.argmin(np.where(asked, p, np.inf)))
-        omega = float(found["omega"].values[found["index"].values[k]])
-        lines.append(
-            f"The lowest critical amplitude, p = {p[k]:.6g} at omega = {omega:.6g}: 95 % of the "
-            f"draws in [{low[k]:.6g}, {high[k]:.6g}]."
-        )
-    return lines
+    if not asked.any():
+        return []
+    k = int(np.argmin(np.where(asked, p, np.inf)))
+    omega = float(found["omega"].values[found["index"].values[k]])
+    line = (
+        f"The lowest critical amplitude, p = {p[k]:.6g} at omega = {omega:.6g}: 95 % of the "
+        f"draws in [{low[k]:.6g}, {high[k]:.6g}]."
+    )
+    return [line]

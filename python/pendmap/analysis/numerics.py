@@ -1,0 +1,103 @@
+"""Numerical choices that analyses share: checks, the core's arguments, attributes of results."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Any, TypedDict
+
+from pendmap import _core
+from pendmap.errors import (
+    MOST_PERIODS,
+    MOST_SEED,
+    MOST_THREADS,
+    check_callable,
+    check_number,
+    check_whole,
+    instruction_set,
+)
+from pendmap.files.dataset import FORMAT_VERSION
+
+Progress = Callable[[int, int], object]
+"""Takes the number of units of work done, and in all."""
+
+TOL = 1e-6
+"""Error of a state after 5 periods, where none is given; chooses the step."""
+
+
+class Choices(TypedDict):
+    """Numerical choices as the core takes them; 0 threads are one a processor."""
+
+    tol: float
+    max_periods: int | None
+    threads: int
+    seed: int
+
+
+class Options(TypedDict):
+    """Numerical choices as the analyses take them."""
+
+    tol: float
+    max_periods: int | None
+    threads: int | None
+    seed: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Numerics:
+    """Numerical choices of an analysis, checked as they are made."""
+
+    tol: float = TOL
+    max_periods: int | None = None
+    threads: int | None = None
+    seed: int = 0
+    progress: Progress | None = None
+    began: float = dataclasses.field(default_factory=time.perf_counter, init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tol", check_number("tol", self.tol))
+        for name, least, most in (
+            ("max_periods", 1, MOST_PERIODS),
+            ("threads", 1, MOST_THREADS),
+            ("seed", 0, MOST_SEED),
+        ):
+            object.__setattr__(self, name, optional_whole(name, getattr(self, name), least, most))
+        check_callable("progress", self.progress)
+
+    @property
+    def workers(self) -> int:
+        """Number of threads as the core takes it: 0 for one a processor."""
+        return self.threads or 0
+
+    @property
+    def options(self) -> Options:
+        """The choices as keyword arguments of another analysis."""
+        return {
+            "tol": self.tol,
+            "max_periods": self.max_periods,
+            "threads": self.threads,
+            "seed": self.seed,
+        }
+
+    @property
+    def core(self) -> Choices:
+        """The choices as the core takes them."""
+        return {**self.options, "threads": self.workers}
+
+    def provenance(self) -> dict[str, Any]:
+        """Return the attributes that say how a result was computed, from ``began`` until now."""
+        return {
+            "tol": self.tol,
+            "seconds": time.perf_counter() - self.began,
+            "simd": instruction_set(),
+            "threads": self.workers or _core.default_threads(),
+            "seed": self.seed,
+            "pendmap_version": _core.__version__,
+            "format_version": FORMAT_VERSION,
+        }
+
+
+def optional_whole(name: str, value: int | None, least: int, most: int) -> int | None:
+    """Return a whole number between two bounds, or None where none is given."""
+    return None if value is None else check_whole(name, value, least, most)

@@ -1,0 +1,157 @@
+"""Schema of a result: attributes of its dataset and keys of its JSON object, from one table."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, Final
+
+from pendmap.analysis.summary import of_model
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterable, Mapping
+
+    import xarray as xr
+
+    from pendmap.model import Pendulum, Rig
+
+OF_TIME: Final = "1/w0 or s"
+"""Unit of times: without dimensions or in SI, as the model is."""
+OF_RATE: Final = "1/tau or 1/s"
+"""Unit of exponents, likewise."""
+OF_VELOCITY: Final = "1 or rad/s"
+"""Unit of velocities, likewise."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Field:
+    """An attribute of a dataset and the key of its JSON object, or one of the two alone."""
+
+    name: str
+    unit: str
+    meaning: str
+    core: str = ""
+    """Name of the value in the core's result, where that is another one."""
+    json: bool = True
+    """Whether the JSON object holds it."""
+    convert: Callable[[Any], Any] | None = None
+    """Makes the JSON value from the attribute."""
+    read: Callable[[xr.Dataset], Any] | None = None
+    """Makes the JSON value from the dataset, where the attribute does not hold it."""
+    when: str = ""
+    """Attribute that must be true for the JSON object to have the key."""
+
+    @property
+    def hidden(self) -> Field:
+        """The attribute alone, which the JSON object leaves out."""
+        return dataclasses.replace(self, json=False)
+
+    def value(self, dataset: xr.Dataset) -> Any:  # noqa: ANN401 (any part of a JSON object)
+        """Return the JSON value; null where the attribute is absent."""
+        if self.read is not None:
+            return self.read(dataset)
+        value = dataset.attrs.get(self.name)
+        return value if value is None or self.convert is None else self.convert(value)
+
+
+class Schema:
+    """The fields of one kind of dataset, in the order of the JSON object."""
+
+    def __init__(self, kind: str, *fields: Field) -> None:
+        self.kind = kind
+        self.fields = fields
+
+    def complete(
+        self,
+        dataset: xr.Dataset,
+        model: Pendulum | Rig,
+        values: Mapping[str, Any],
+        raw: object = None,
+    ) -> None:
+        """Set the attributes of a dataset: values given, else those of the core's result."""
+        values = {"section": model.units.section, **values}
+        dataset.attrs = {"kind": self.kind, "title": model.title, **model.attributes}
+        for field in self.fields:
+            if field.name in values or field.read is not None:
+                value = values.get(field.name)
+            else:
+                key = field.core or field.name
+                value = raw.get(key) if isinstance(raw, dict) else getattr(raw, key, None)
+            if value is not None:
+                dataset.attrs[field.name] = value
+
+    def json(self, dataset: xr.Dataset) -> dict[str, Any]:
+        """Return the JSON object of a dataset."""
+        return {
+            field.name: field.value(dataset)
+            for field in self.fields
+            if field.json and (not field.when or dataset.attrs[field.when])
+        }
+
+
+def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig, what: str) -> None:
+    """Set the summary of a dataset; effects on a reading leave ``what`` the motion's own."""
+    dataset.attrs["summary"] = "\n".join([*lines, *of_model(model, what)])
+
+
+def variable(
+    dims: str | tuple[Hashable, ...],
+    values: Any,  # noqa: ANN401 (an array)
+    units: str = "",
+    long_name: str = "",
+    comment: str = "",
+) -> tuple[str | tuple[Hashable, ...], Any, dict[str, str]]:
+    """Return a variable of a dataset with the attributes that are given."""
+    attributes = {"units": units, "long_name": long_name, "comment": comment}
+    return dims, values, {key: text for key, text in attributes.items() if text}
+
+
+def none_below_0(value: float) -> float | None:
+    """Return a number, None where it is -1: an event that never happened."""
+    return None if value < 0 else value
+
+
+def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
+    """Return the JSON key ``draws``: the drawn models and their results, null without draws."""
+
+    def read(dataset: xr.Dataset) -> dict[str, Any] | None:
+        a = dataset.attrs
+        if "draws" not in a:
+            return None
+        names = [str(name) for name in dataset["parameter"].values]
+        common = {"count": a["draws"], "seed": a["draws_seed"], "parameters": names}
+        return common | own(dataset)
+
+    return Field("draws", "", "models drawn from the covariance and what they say", read=read)
+
+
+UNITS: Final = Field("units", "", "SI or nondimensional")
+SECTION: Final = Field("section", "", "where the stroboscopic section lies", json=False)
+TOL: Final = Field("tol", "1", "error after 5 periods that was asked for")
+REACHED: Final = Field("reached_error", "1", "error after 5 periods that was reached")
+STEPS: Final = Field("steps_per_period", "1", "steps of the integrator in a forcing period")
+BOUND: Final = Field("max_periods", "periods", "bound after which a start is undecided", "bound")
+CHAOS_BOUND: Final = Field("chaos_bound", "periods", "bound within which chaos was watched")
+SECONDS: Final = Field("seconds", "s", "time of the computation")
+SIMD: Final = Field("simd", "", "instruction set of the computation")
+THREADS: Final = Field("threads", "1", "threads of the computation")
+SEED: Final = Field("seed", "1", "seed of the samples")
+VERSION: Final = Field("pendmap_version", "", "version of pendmap")
+FORMAT: Final = Field("format_version", "1", "version of the dataset's layout")
+BOX: Final = (
+    Field("low_theta", "rad", "lower end of the angles of the box", json=False),
+    Field("high_theta", "rad", "upper end of its angles", json=False),
+    Field("low_velocity", OF_VELOCITY, "lower end of its velocities", json=False),
+    Field("high_velocity", OF_VELOCITY, "upper end of its velocities", json=False),
+)
+OWN: Final = (
+    Field("own_p", "1", "amplitude of the model itself", json=False),
+    Field("own_omega", "1", "frequency of the model itself", json=False),
+)
+RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
+UNSAID: Final = (VERSION.hidden, FORMAT.hidden)
+"""Versions as attributes alone."""
+SUMMARY: Final = Field(
+    "summary", "", "findings, a sentence a line", convert=lambda text: text.split("\n")
+)
+MISSES: Final = Field("misses_record", "1", "residual over noise of a model that misses its record")
+END: Final = (SUMMARY, MISSES)
