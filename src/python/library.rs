@@ -36,7 +36,7 @@ fn entry(py: Python<'_>, kind: Kind) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("name", definition.name)?;
     dict.set_item("group", definition.group.word())?;
-    dict.set_item("family", kind.family().words())?;
+    dict.set_item("family", definition.family.words())?;
     dict.set_item("formula", definition.formula)?;
     dict.set_item("revealed_by", definition.revealed_by)?;
     dict.set_item("mappable", definition.mappable.word())?;
