@@ -4,6 +4,9 @@ from typing import Any, TypeAlias, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from pendmap.model import Pendulum
+from pendmap.model.effects import FormulaKey
+
 __all__ = [
     "Diverged",
     "__version__",
@@ -41,26 +44,12 @@ class Diverged(ValueError): ...  # noqa: N818
 
 __version__: str
 
-_FormulaParameter: TypeAlias = tuple[
-    str, float, int | None, str, tuple[float, float], tuple[float, float], str, str | None
-]
-_Formula: TypeAlias = tuple[str, str, str, Sequence[_FormulaParameter]]
-_Parameters: TypeAlias = tuple[
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    Sequence[tuple[str | _Formula, Sequence[float]]],
-]
 _Axis: TypeAlias = tuple[float, float, int]
-_Range: TypeAlias = tuple[int, Sequence[float]]
+_Range: TypeAlias = tuple[str, Sequence[float]]
 _Floats: TypeAlias = NDArray[np.float64]
 _Progress: TypeAlias = Callable[[int, int], object]
 
-_Free: TypeAlias = tuple[Sequence[tuple[int, int]], float]
+_Free: TypeAlias = tuple[Sequence[tuple[int, str]], float]
 _Window: TypeAlias = tuple[int, int, int, float, float]
 
 class _Choices(TypedDict):
@@ -84,12 +73,12 @@ def reckon(what: str, count: int, each: int) -> None: ...
 def default_threads() -> int: ...
 def roles() -> list[str]: ...
 def effects() -> list[dict[str, Any]]: ...
-def formula(given: _Formula) -> tuple[dict[str, Any], bool]: ...
-def period(parameters: _Parameters) -> float: ...
-def counts_turns(parameters: _Parameters) -> bool: ...
-def bounds(parameters: _Parameters) -> tuple[int, int, int]: ...
+def formula(given: FormulaKey) -> tuple[dict[str, Any], bool]: ...
+def period(model: Pendulum) -> float: ...
+def counts_turns(model: Pendulum) -> bool: ...
+def bounds(model: Pendulum) -> tuple[int, int, int]: ...
 def advance(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Floats,
     velocity: _Floats,
     periods: int,
@@ -98,13 +87,11 @@ def advance(
     progress: _Progress | None = None,
 ) -> tuple[_Floats, _Floats, NDArray[np.int64]]: ...
 def choose_steps(
-    parameters: _Parameters, theta: _Floats, velocity: _Floats, tol: float
+    model: Pendulum, theta: _Floats, velocity: _Floats, tol: float
 ) -> tuple[int, float]: ...
-def acceleration(
-    parameters: _Parameters, tau: _Floats, theta: _Floats, velocity: _Floats
-) -> _Floats: ...
+def acceleration(model: Pendulum, tau: _Floats, theta: _Floats, velocity: _Floats) -> _Floats: ...
 def simulate(
-    parameters: _Parameters,
+    model: Pendulum,
     start: tuple[float, float],
     until: float,
     tol: float,
@@ -113,14 +100,14 @@ def simulate(
     live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
 ) -> dict[str, Any]: ...
 def basins_grid(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Axis,
     velocity: _Axis,
     choices: _Choices,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def basins_list(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Floats,
     velocity: _Floats,
     choices: _Choices,
@@ -128,16 +115,16 @@ def basins_list(
 ) -> dict[str, Any]: ...
 def texture(labels: NDArray[np.int16], columns: int) -> dict[str, Any]: ...
 def orbits(
-    parameters: _Parameters,
+    model: Pendulum,
     winding: tuple[int, int],
     theta: _Axis,
     velocity: _Axis,
     threads: int,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
-def parameter_names(parameters: _Parameters) -> list[str]: ...
+def parameter_names(model: Pendulum) -> list[str]: ...
 def parameter_map(
-    parameters: _Parameters,
+    model: Pendulum,
     axes: tuple[_Range, _Range],
     theta: _Floats,
     velocity: _Floats,
@@ -148,7 +135,7 @@ def parameter_map(
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def bifurcation(
-    parameters: _Parameters,
+    model: Pendulum,
     axis: _Range,
     theta: _Floats,
     velocity: _Floats,
@@ -160,13 +147,13 @@ def bifurcation(
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def lyapunov(
-    parameters: _Parameters,
+    model: Pendulum,
     start: tuple[float, float],
     choices: _ExponentChoices,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def growth(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Floats,
     velocity: _Floats,
     windows: int,
@@ -176,7 +163,7 @@ def growth(
     progress: _Progress | None = None,
 ) -> _Floats: ...
 def tongues(
-    parameters: _Parameters,
+    model: Pendulum,
     inverted: bool,
     omegas: Sequence[float],
     p_max: float,

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::convert::attractor_dict;
+use super::model::Model;
 use super::watch::watched;
-use super::{Parameters, pendulum};
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::lanes::Path;
@@ -29,15 +29,15 @@ pub struct ExponentChoices {
 
 /// The largest exponent of the attractor that a start reaches.
 #[pyfunction]
-#[pyo3(signature = (parameters, start, choices, progress=None))]
+#[pyo3(signature = (model, start, choices, progress=None))]
 pub fn lyapunov<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     start: (f64, f64),
     choices: ExponentChoices,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let ExponentChoices { precision, tol, max_periods, threads, seed } = choices;
     let start = [start.0, start.1];
     let request = Request { start, precision, tol, max_periods, threads, seed };
@@ -73,11 +73,11 @@ pub fn lyapunov<'py>(
 
 /// Logarithms of the growth of a tangent along each start, `windows` times over `window` periods.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, windows, window, steps_per_period, threads, progress=None))]
+#[pyo3(signature = (model, theta, velocity, windows, window, steps_per_period, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn growth<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
     windows: usize,
@@ -86,7 +86,7 @@ pub fn growth<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     pendulum.check_mappable()?;
     if steps_per_period == 0 {
         let allowed = "1 or more";

@@ -8,8 +8,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use super::model::Model;
 use super::watch::pooled;
-use super::{Parameters, pendulum};
 use crate::error::Error;
 use crate::fit::descent::Point;
 use crate::fit::normal::linearised;
@@ -27,9 +27,9 @@ const EACH_READING: usize = 40;
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
-/// `([(record, place), ...], start)`: which place in the list of parameters it is in which records,
-/// -1 for gravity, -2 and -3 for bias and tilt of a sensor on the rod; where the search starts.
-type FreeTuple = (Vec<(usize, isize)>, f64);
+/// `([(record, name), ...], start)`: the name of the number in each of its records, a parameter of the
+/// pendulum, `gravity`, or `bias` or `tilt` of a sensor on the rod; where the search starts.
+type FreeTuple = (Vec<(usize, String)>, f64);
 
 /// `(record, first sample, one after the last, angle, velocity)`.
 type WindowTuple = (usize, usize, usize, f64, f64);
@@ -76,7 +76,7 @@ pub struct Sensor<'py> {
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Run<'py> {
-    parameters: Parameters,
+    model: Model,
     time: Floats<'py>,
     reading: Floats<'py>,
     weight: Floats<'py>,
@@ -103,7 +103,7 @@ impl Run<'_> {
         let weights = self.weight.as_slice()?.to_vec();
         let counts = self.count.map(|step| Counts::new(step, &weights)).transpose()?;
         Ok(Record {
-            pendulum: pendulum(self.parameters)?,
+            pendulum: self.model.pendulum()?,
             recorded: recorded.map(Arc::new),
             times: self.time.as_slice()?.to_vec(),
             readings: self.reading.as_slice()?.to_vec(),
@@ -133,17 +133,23 @@ pub struct FitChoices {
 }
 
 fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<Problem> {
-    let records = runs.into_iter().map(Run::record).collect::<PyResult<_>>()?;
-    let place = |index: isize| match index {
-        -2 => Slot::Bias,
-        -3 => Slot::Tilt,
-        other => usize::try_from(other).map_or(Slot::Gravity, Slot::Parameter),
+    let records = runs.into_iter().map(Run::record).collect::<PyResult<Vec<_>>>()?;
+    let slot = |(record, name): &(usize, String)| {
+        let pendulum = records.get(*record).map(|record| &record.pendulum);
+        let slot = match (name.as_str(), pendulum) {
+            ("bias", _) => Slot::Bias,
+            ("tilt", _) => Slot::Tilt,
+            (name, Some(pendulum)) if name != "gravity" => Slot::Parameter(pendulum.place(name)?),
+            _ => Slot::Gravity,
+        };
+        Ok((*record, slot))
     };
     let free = free.iter().map(|(places, start)| {
-        let places = places.iter().map(|(record, index)| (*record, place(*index))).collect();
-        Free { places, start: *start }
+        let places = places.iter().map(slot).collect::<Result<_, Error>>()?;
+        Ok(Free { places, start: *start })
     });
-    Ok(Problem::new(records, free.collect(), tolerance)?)
+    let free = free.collect::<Result<_, Error>>()?;
+    Ok(Problem::new(records, free, tolerance)?)
 }
 
 fn windows(given: Vec<WindowTuple>, problem: &Problem) -> PyResult<Vec<Window>> {

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use super::{FormulaTuple, formula_of};
+use super::model::GivenFormula;
 use crate::model::Kind;
 use crate::model::effects::{Power, Role};
 
@@ -26,8 +26,8 @@ pub fn roles() -> Vec<&'static str> {
 /// The same of a user's own effect, which is checked; and whether it is proportional to its first
 /// parameter.
 #[pyfunction]
-pub fn formula(py: Python<'_>, given: FormulaTuple) -> PyResult<(Bound<'_, PyDict>, bool)> {
-    let formula = formula_of(given)?;
+pub fn formula(py: Python<'_>, given: GivenFormula) -> PyResult<(Bound<'_, PyDict>, bool)> {
+    let formula = given.formula()?;
     Ok((entry(py, Kind::Formula(formula))?, formula.is_proportional()))
 }
 

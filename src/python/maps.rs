@@ -4,8 +4,9 @@ use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::convert;
+use super::model::Model;
 use super::watch::watched;
-use super::{Parameters, convert, pendulum};
 use crate::error::Error;
 use crate::maps::basins::{Options, basins};
 use crate::maps::control::pool;
@@ -37,10 +38,10 @@ impl From<Choices> for Options {
 
 /// Basins over a grid.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, choices, progress=None))]
+#[pyo3(signature = (model, theta, velocity, choices, progress=None))]
 pub fn basins_grid<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     theta: AxisTuple,
     velocity: AxisTuple,
     choices: Choices,
@@ -48,15 +49,15 @@ pub fn basins_grid<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let theta = Axis::new("theta", theta.0, theta.1, theta.2)?;
     let velocity = Axis::new("velocity", velocity.0, velocity.1, velocity.2)?;
-    run(py, parameters, Starts::Grid { theta, velocity }, choices, progress)
+    run(py, model, Starts::Grid { theta, velocity }, choices, progress)
 }
 
 /// Basins of a list of starts.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, choices, progress=None))]
+#[pyo3(signature = (model, theta, velocity, choices, progress=None))]
 pub fn basins_list<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
     choices: Choices,
@@ -74,7 +75,7 @@ pub fn basins_list<'py>(
     // Angle and velocity, and all that a map and its dataset have of a start.
     memory::reckon("starts", theta.len(), 100)?;
     let states = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
-    run(py, parameters, Starts::List(states), choices, progress)
+    run(py, model, Starts::List(states), choices, progress)
 }
 
 /// Texture of labels in rows of so many columns.
@@ -93,12 +94,12 @@ pub fn texture<'py>(
 
 fn run<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     starts: Starts,
     choices: Choices,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let options = Options::from(choices);
     let map =
         watched(py, progress.as_ref(), |control| basins(&pendulum, &starts, &options, control))?;

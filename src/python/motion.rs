@@ -8,8 +8,9 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
+use super::convert;
+use super::model::Model;
 use super::watch::{stopped, watched};
-use super::{Parameters, convert, pendulum};
 use crate::error::Error;
 use crate::integrate::trajectory::{self, Request};
 use crate::integrate::{State, Strobe, accuracy};
@@ -24,12 +25,12 @@ type Advanced<'py> =
 #[pyfunction]
 pub fn acceleration<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     tau: PyReadonlyArray1<'py, f64>,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let (tau, theta, velocity) = (tau.as_slice()?, theta.as_slice()?, velocity.as_slice()?);
     let states = tau.iter().zip(theta).zip(velocity);
     let all: Vec<f64> = states.map(|((t, x), v)| pendulum.acceleration(*t, *x, *v)).collect();
@@ -38,11 +39,11 @@ pub fn acceleration<'py>(
 
 /// Many starts, the same number of forcing periods on.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, periods, steps_per_period, threads, progress=None))]
+#[pyo3(signature = (model, theta, velocity, periods, steps_per_period, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn advance<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
     periods: usize,
@@ -50,7 +51,7 @@ pub fn advance<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Advanced<'py>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     if steps_per_period == 0 {
         let allowed = "1 or more";
         return Err(Error::Range { name: "steps_per_period", value: 0.0, allowed }.into());
@@ -68,12 +69,12 @@ pub fn advance<'py>(
 /// The fewest steps a period that reach `tol` on these starts, and the error reached.
 #[pyfunction]
 pub fn choose_steps(
-    parameters: Parameters,
+    model: Model,
     theta: PyReadonlyArray1<'_, f64>,
     velocity: PyReadonlyArray1<'_, f64>,
     tol: f64,
 ) -> PyResult<(usize, f64)> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     pendulum.check_mappable()?;
     let states: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
@@ -84,11 +85,11 @@ pub fn choose_steps(
 /// One trajectory. With `live` its samples are handed over as they come, `live(times, angles,
 /// velocities)`, and an interrupt ends it with the last one.
 #[pyfunction]
-#[pyo3(signature = (parameters, start, until, tol, samples, lyapunov, live=None))]
+#[pyo3(signature = (model, start, until, tol, samples, lyapunov, live=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn simulate<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     start: (f64, f64),
     until: f64,
     tol: f64,
@@ -96,7 +97,7 @@ pub fn simulate<'py>(
     lyapunov: bool,
     live: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let request = Request { start: [start.0, start.1], until, tol, samples, lyapunov };
     let Some(live) = live else {
         let run =

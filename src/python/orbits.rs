@@ -5,8 +5,8 @@ use pyo3::types::{PyDict, PyList};
 
 use super::convert::attractor_dict;
 use super::maps::AxisTuple;
+use super::model::Model;
 use super::watch::watched;
-use super::{Parameters, pendulum};
 use crate::attractor::Attractor;
 use crate::attractor::catalogue::arrange;
 use crate::maps::orbits::{Request, orbits as search};
@@ -14,17 +14,17 @@ use crate::maps::starts::Axis;
 
 /// All closed orbits of period `n` and winding `w` in a box, with where the search began.
 #[pyfunction]
-#[pyo3(signature = (parameters, winding, theta, velocity, threads, progress=None))]
+#[pyo3(signature = (model, winding, theta, velocity, threads, progress=None))]
 pub fn orbits<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     winding: (usize, i64),
     theta: AxisTuple,
     velocity: AxisTuple,
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let request = Request {
         n: winding.0,
         w: winding.1,

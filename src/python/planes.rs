@@ -4,29 +4,29 @@ use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::model::{Model, range};
 use super::watch::watched;
-use super::{Parameters, pendulum};
 use crate::integrate::State;
 use crate::maps::bifurcation as diagram;
 use crate::maps::cell::{Cell, Found, HINTED};
-use crate::maps::parameter_map::{Range, Request, parameter_map as search};
+use crate::maps::parameter_map::{Request, parameter_map as search};
 
-/// `(place in the list of parameters, values)`.
-type RangeTuple = (usize, Vec<f64>);
+/// `(name of a parameter, values)`.
+type RangeTuple = (String, Vec<f64>);
 
 /// The names of a model's parameters, in the order of their places.
 #[pyfunction]
-pub fn parameter_names(parameters: Parameters) -> PyResult<Vec<String>> {
-    Ok(pendulum(parameters)?.parameters().into_iter().map(|(name, _)| name).collect())
+pub fn parameter_names(model: Model) -> PyResult<Vec<String>> {
+    Ok(model.pendulum()?.parameters().into_iter().map(|(name, _)| name).collect())
 }
 
 /// The attractors over a plane of two parameters: columns over all attractors of all cells, and over cells.
 #[pyfunction]
-#[pyo3(signature = (parameters, axes, theta, velocity, each, tol, bound, threads, progress=None))]
+#[pyo3(signature = (model, axes, theta, velocity, each, tol, bound, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn parameter_map<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     axes: (RangeTuple, RangeTuple),
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
@@ -36,12 +36,11 @@ pub fn parameter_map<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
-    let range = |(index, values): RangeTuple| Range { index, values };
+    let pendulum = model.pendulum()?;
     let starts: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
     let request = Request {
-        axes: [range(axes.0), range(axes.1)],
+        axes: [range(&pendulum, axes.0)?, range(&pendulum, axes.1)?],
         starts,
         each,
         tol,
@@ -59,11 +58,11 @@ pub fn parameter_map<'py>(
 
 /// The attractors along one parameter, their points, and what is followed up and down.
 #[pyfunction]
-#[pyo3(signature = (parameters, axis, theta, velocity, each, first, tol, bound, threads, progress=None))]
+#[pyo3(signature = (model, axis, theta, velocity, each, first, tol, bound, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn bifurcation<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     axis: RangeTuple,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
@@ -74,11 +73,11 @@ pub fn bifurcation<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let starts: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
     let request = diagram::Request {
-        axis: Range { index: axis.0, values: axis.1 },
+        axis: range(&pendulum, axis)?,
         starts,
         each,
         first: first.map(|(theta, velocity)| [theta, velocity]),

@@ -3,19 +3,19 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use super::model::Model;
 use super::watch::watched;
-use super::{Parameters, pendulum};
 use crate::error::Error;
 use crate::maps::tongues::{Balance, tongues as search};
 
 /// Critical amplitudes of the drive at each frequency, up to `p_max`, of hanging or `inverted` rest;
 /// `None` where inverted rest is no solution.
 #[pyfunction]
-#[pyo3(signature = (parameters, inverted, omegas, p_max, folds, threads, progress=None))]
+#[pyo3(signature = (model, inverted, omegas, p_max, folds, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn tongues<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     inverted: bool,
     omegas: Vec<f64>,
     p_max: f64,
@@ -23,7 +23,7 @@ pub fn tongues<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Option<Bound<'py, PyList>>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let balance = if inverted { Balance::Inverted } else { Balance::Hanging };
     let found = watched(py, progress.as_ref(), |control| {
         match search(&pendulum, balance, &omegas, p_max, folds, threads, control) {

@@ -150,7 +150,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     low, high, count = grid.velocity.as_tuple
     slow, fast = units.bare(low, VELOCITY), units.bare(high, VELOCITY)
     axes = grid.theta.as_tuple, (slow, fast, count)
-    raw = _call(_core.basins_grid, pendulum.parameters, *axes, choices, progress)
+    raw = _call(_core.basins_grid, pendulum, *axes, choices, progress)
     seconds = time.perf_counter() - began
     shape = (grid.velocity.count, grid.theta.count)
     dims = ("velocity", "theta")
@@ -224,7 +224,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     bare = units.bare(speeds, VELOCITY)
     choices = _choices(tol, max_periods, layer_periods, threads, seed, check=check)
     began = time.perf_counter()
-    raw = _call(_core.basins_list, pendulum.parameters, angles, bare, choices, progress)
+    raw = _call(_core.basins_list, pendulum, angles, bare, choices, progress)
     seconds = time.perf_counter() - began
     dataset = xr.Dataset(
         cells(raw, ("start",), angles.shape, units)

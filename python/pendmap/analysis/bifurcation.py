@@ -106,7 +106,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     began = time.perf_counter()
     with core_errors():
         raw = _core.bifurcation(
-            pendulum.parameters,
+            pendulum,
             axis.kernel,
             theta,
             velocity,

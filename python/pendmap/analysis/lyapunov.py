@@ -141,7 +141,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     began = time.perf_counter()
     with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
-        raw = _core.lyapunov(pendulum.parameters, start, choices, progress)
+        raw = _core.lyapunov(pendulum, start, choices, progress)
     found = raw["attractor"]
     exponent, stderr = _value(raw)
     regular = _regular(raw, pendulum.period)

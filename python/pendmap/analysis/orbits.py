@@ -149,7 +149,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     low, high, count = grid.velocity.as_tuple
     box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.orbits(pendulum.parameters, (n, w), grid.theta.as_tuple, box, workers, progress)
+        raw = _core.orbits(pendulum, (n, w), grid.theta.as_tuple, box, workers, progress)
         paths = _paths(pendulum, raw["orbits"], units)
     found = raw["orbits"]
     dataset = xr.Dataset(
@@ -204,7 +204,7 @@ def _paths(pendulum: Pendulum, found: list[dict[str, Any]], units: Units) -> dic
             continue
         for k, point in enumerate(orbit["points"]):
             run = _core.simulate(
-                pendulum.parameters, tuple(point), length, _TOLERANCE, samples, lyapunov=False
+                pendulum, tuple(point), length, _TOLERANCE, samples, lyapunov=False
             )
             own = (np.full(run["time"].size, x, dtype=np.int32) for x in (number, k))
             pieces.append((*own, run["theta"], units.given(run["velocity"], VELOCITY)))

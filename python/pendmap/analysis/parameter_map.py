@@ -152,7 +152,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     began = time.perf_counter()
     with core_errors():
         raw = _core.parameter_map(
-            pendulum.parameters,
+            pendulum,
             (columns.kernel, rows.kernel),
             theta,
             velocity,

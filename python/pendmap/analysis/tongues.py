@@ -236,7 +236,7 @@ def _solved(  # noqa: PLR0913 (as for tongues)
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
     def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
-        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, workers, progress)
+        found = _core.tongues(one, upright, at.tolist(), p_max, folds, workers, progress)
         return [_NO_REST] * at.size if found is None else found
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:

@@ -144,7 +144,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         start = (theta, units.bare(velocity, VELOCITY))
         end = units.bare(until, TIME)
         shown = None if live is None else _in_units(live, units)
-        raw = _core.simulate(pendulum.parameters, start, end, tol, samples, lyapunov, shown)
+        raw = _core.simulate(pendulum, start, end, tol, samples, lyapunov, shown)
     time, speed = units.given(raw["time"], TIME), units.given(raw["velocity"], VELOCITY)
     event_time = units.given(raw["event_time"], TIME)
     once = np.arange(0, time.size, samples)
@@ -354,9 +354,9 @@ def advance(  # noqa: PLR0913
         if steps_per_period is None:
             step = max(1, angles.size // 400)
             sample = angles[::step].copy(), speeds[::step].copy()
-            steps_per_period, _ = _core.choose_steps(pendulum.parameters, *sample, tol)
+            steps_per_period, _ = _core.choose_steps(pendulum, *sample, tol)
         end, speed, turns = _core.advance(
-            pendulum.parameters, angles, speeds, periods, steps_per_period, workers, progress
+            pendulum, angles, speeds, periods, steps_per_period, workers, progress
         )
     return end, units.given(speed, VELOCITY), turns
 
