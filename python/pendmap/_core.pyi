@@ -1,5 +1,5 @@
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, TypedDict
+from typing import Any, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,23 @@ from pendmap.model import Pendulum
 from pendmap.model.effects import FormulaKey
 
 __all__ = [
+    "Attractor",
+    "BasinMap",
+    "Bifurcation",
+    "CriticalAmplitudes",
     "Diverged",
+    "Ensemble",
+    "Fit",
+    "FitPoint",
+    "FittedRun",
+    "Followed",
+    "Lyapunov",
+    "Orbit",
+    "OrbitSearch",
+    "ParameterMap",
+    "Texture",
+    "Trajectory",
+    "WindowRows",
     "__version__",
     "acceleration",
     "advance",
@@ -47,6 +63,7 @@ __version__: str
 _Axis: TypeAlias = tuple[float, float, int]
 _Range: TypeAlias = tuple[str, Sequence[float]]
 _Floats: TypeAlias = NDArray[np.float64]
+_Places: TypeAlias = NDArray[np.int32]
 _Progress: TypeAlias = Callable[[int, int], object]
 
 _Free: TypeAlias = tuple[Sequence[tuple[int, str]], float]
@@ -66,6 +83,183 @@ class _ExponentChoices(TypedDict):
     max_periods: int | None
     threads: int
     seed: int
+
+_Pair: TypeAlias = tuple[float, float]
+
+class Attractor:
+    name: str
+    kind: str
+    n: int | None
+    w: int | None
+    points: list[_Pair]
+    multipliers: list[_Pair]
+    exponent: float
+    exponent_stderr: float
+    period: float | None
+    twin: int | None
+    fraction: float
+
+@final
+class Orbit(Attractor):
+    residual: float
+    stable: bool
+
+@final
+class OrbitSearch:
+    orbits: list[Orbit]
+    begun: int
+    friction: bool
+
+@final
+class Texture:
+    basin_entropy: float
+    boundary_basin_entropy: float
+    boundary_stderr: float
+    boxes: int
+    boundary_boxes: int
+    neighbours_agree: float
+    chance: float
+
+@final
+class BasinMap:
+    attractors: list[Attractor]
+    undecided: float
+    failed: float
+    mean_periods: float
+    plane: str
+    chaos_bound: int
+    searched_starts: int
+    layer_periods: int
+    bound: int
+    steps_per_period: int
+    reached_error: float
+    simd: str
+    texture: Texture
+    uncertainty_eps: _Floats
+    uncertain: NDArray[np.uint64]
+    uncertainty_tried: NDArray[np.uint64]
+    unreliable: float
+    unreliable_half_step: float
+    unreliable_mirror: float | None
+    labels_sampled: int
+    label: NDArray[np.int16]
+    settle: NDArray[np.int32]
+    turns: NDArray[np.int32]
+    finite_time_exponent: NDArray[np.float32] | None
+
+@final
+class Trajectory:
+    time: _Floats
+    theta: _Floats
+    velocity: _Floats
+    reached_error: float
+    end_error: float
+    steps_per_period: int
+    exponent: _Pair | None
+    stuck: bool
+    interrupted: bool
+    event_time: _Floats
+    event_theta: _Floats
+    event_kind: list[str]
+
+class ParameterMap:
+    cell: _Places
+    kind: list[str]
+    n: _Places
+    w: _Places
+    theta: _Floats
+    velocity: _Floats
+    exponent: _Floats
+    exponent_stderr: _Floats
+    share: _Floats
+    undecided: _Floats
+    failed: _Floats
+    chaos_periods: NDArray[np.uint32]
+    reached_error: float
+    searched_again: int
+    simd: str
+
+@final
+class Followed:
+    on: _Places
+    value: _Places
+    theta: _Floats
+    velocity: _Floats
+
+@final
+class Bifurcation(ParameterMap):
+    point_entry: _Places
+    point_theta: _Floats
+    point_velocity: _Floats
+    up: Followed
+    down: Followed
+
+@final
+class Lyapunov:
+    end: str
+    attractor: Attractor | None
+    transient: int | None
+    lost: int
+    course: _Floats
+    bound: int
+    chaos_bound: int
+    steps_per_period: int
+    reached_error: float
+    simd: str
+    window: int
+    ensemble: Ensemble | None
+
+@final
+class Ensemble:
+    growth: _Floats
+    dropped: int
+    exponent: _Pair
+    sum: _Pair
+
+@final
+class CriticalAmplitudes:
+    rest: bool
+    p: list[float]
+    multiplier: list[float]
+    stable: list[bool]
+    moved: bool
+    fold: tuple[float, float, float] | None
+    @staticmethod
+    def no_rest() -> CriticalAmplitudes: ...
+
+class FitPoint:
+    values: _Floats
+    chi2: float
+    samples: int
+    degrees: int
+    information: _Floats
+    pull: _Floats
+    windows: list[_Window]
+    runs: list[FittedRun]
+
+@final
+class Fit(FitPoint):
+    covariance: _Floats
+    intervals: list[_Pair]
+    widening: float
+    steps: int
+    stages: int
+    converged: bool
+    given_up: bool
+
+@final
+class FittedRun:
+    theta: _Floats
+    velocity: _Floats
+    residual: _Floats
+    white: _Floats
+
+@final
+class WindowRows:
+    free: list[int]
+    rows: _Floats
+    residuals: _Floats
+    weights: _Floats
 
 def simd() -> str: ...
 def simd_available() -> list[str]: ...
@@ -98,22 +292,22 @@ def simulate(
     samples: int,
     lyapunov: bool,
     live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
-) -> dict[str, Any]: ...
+) -> Trajectory: ...
 def basins_grid(
     model: Pendulum,
     theta: _Axis,
     velocity: _Axis,
     choices: _Choices,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> BasinMap: ...
 def basins_list(
     model: Pendulum,
     theta: _Floats,
     velocity: _Floats,
     choices: _Choices,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
-def texture(labels: NDArray[np.int16], columns: int) -> dict[str, Any]: ...
+) -> BasinMap: ...
+def texture(labels: NDArray[np.int16], columns: int) -> Texture: ...
 def orbits(
     model: Pendulum,
     winding: tuple[int, int],
@@ -121,7 +315,7 @@ def orbits(
     velocity: _Axis,
     threads: int,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> OrbitSearch: ...
 def parameter_names(model: Pendulum) -> list[str]: ...
 def parameter_map(
     model: Pendulum,
@@ -133,7 +327,7 @@ def parameter_map(
     bound: int | None,
     threads: int,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> ParameterMap: ...
 def bifurcation(
     model: Pendulum,
     axis: _Range,
@@ -145,13 +339,13 @@ def bifurcation(
     bound: int | None,
     threads: int,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> Bifurcation: ...
 def lyapunov(
     model: Pendulum,
     start: tuple[float, float],
     choices: _ExponentChoices,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> Lyapunov: ...
 def growth(
     model: Pendulum,
     theta: _Floats,
@@ -170,25 +364,25 @@ def tongues(
     folds: bool,
     threads: int,
     progress: _Progress | None = None,
-) -> list[dict[str, Any]] | None: ...
+) -> list[CriticalAmplitudes]: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],
     choices: dict[str, Any],
     windows: Sequence[_Window] | None = None,
-) -> dict[str, Any]: ...
+) -> Fit: ...
 def fit_equations(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],
     tolerance: float,
     windows: Sequence[_Window],
-) -> dict[str, Any]: ...
+) -> FitPoint: ...
 def fit_rows(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],
     tolerance: float,
     windows: Sequence[_Window],
-) -> list[tuple[list[int], _Floats, _Floats, _Floats]]: ...
+) -> list[WindowRows]: ...
 def replay(
     run: dict[str, Any],
     theta: _Floats,

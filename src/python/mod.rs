@@ -87,38 +87,32 @@ fn default_threads() -> usize {
 }
 
 #[pymodule]
-fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    // Loads numpy's functions now: later an interrupt could come in between.
-    numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add("Diverged", module.py().get_type::<Diverged>())?;
-    module.add_function(wrap_pyfunction!(simd, module)?)?;
-    module.add_function(wrap_pyfunction!(simd_available, module)?)?;
-    module.add_function(wrap_pyfunction!(reckon, module)?)?;
-    module.add_function(wrap_pyfunction!(default_threads, module)?)?;
-    module.add_function(wrap_pyfunction!(library::effects, module)?)?;
-    module.add_function(wrap_pyfunction!(library::roles, module)?)?;
-    module.add_function(wrap_pyfunction!(library::formula, module)?)?;
-    module.add_function(wrap_pyfunction!(period, module)?)?;
-    module.add_function(wrap_pyfunction!(counts_turns, module)?)?;
-    module.add_function(wrap_pyfunction!(bounds, module)?)?;
-    module.add_function(wrap_pyfunction!(motion::advance, module)?)?;
-    module.add_function(wrap_pyfunction!(motion::choose_steps, module)?)?;
-    module.add_function(wrap_pyfunction!(motion::simulate, module)?)?;
-    module.add_function(wrap_pyfunction!(maps::basins_grid, module)?)?;
-    module.add_function(wrap_pyfunction!(maps::basins_list, module)?)?;
-    module.add_function(wrap_pyfunction!(maps::texture, module)?)?;
-    module.add_function(wrap_pyfunction!(orbits::orbits, module)?)?;
-    module.add_function(wrap_pyfunction!(planes::parameter_names, module)?)?;
-    module.add_function(wrap_pyfunction!(planes::parameter_map, module)?)?;
-    module.add_function(wrap_pyfunction!(planes::bifurcation, module)?)?;
-    module.add_function(wrap_pyfunction!(exponents::lyapunov, module)?)?;
-    module.add_function(wrap_pyfunction!(exponents::growth, module)?)?;
-    module.add_function(wrap_pyfunction!(tongues::tongues, module)?)?;
-    module.add_function(wrap_pyfunction!(motion::acceleration, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::fit_runs, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::fit_equations, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::fit_rows, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::replay, module)?)?;
-    Ok(())
+mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use super::{
+        Diverged, bounds,
+        convert::Attractor,
+        counts_turns, default_threads,
+        exponents::{Ensemble, Lyapunov, growth, lyapunov},
+        fit::{Fit, FitPoint, FittedRun, WindowRows, fit_equations, fit_rows, fit_runs, replay},
+        library::{effects, formula, roles},
+        maps::{BasinMap, Texture, basins_grid, basins_list, texture},
+        motion::{Trajectory, acceleration, advance, choose_steps, simulate},
+        orbits::{Orbit, OrbitSearch, orbits},
+        period,
+        planes::{
+            Bifurcation, Followed, ParameterMap, bifurcation, parameter_map, parameter_names,
+        },
+        reckon, simd, simd_available,
+        tongues::{CriticalAmplitudes, tongues},
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        // Loads numpy's functions now: later an interrupt could come in between.
+        numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

@@ -6,9 +6,9 @@ use std::sync::Mutex;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyTuple;
 
-use super::convert;
+use super::convert::{Array, array};
 use super::model::Model;
 use super::watch::{stopped, watched};
 use crate::error::Error;
@@ -82,13 +82,51 @@ pub fn choose_steps(
     Ok((strobe.steps(), error))
 }
 
+/// A trajectory; arrays have one entry for each sample, or for each event.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Trajectory {
+    time: Array<f64>,
+    theta: Array<f64>,
+    velocity: Array<f64>,
+    reached_error: f64,
+    end_error: f64,
+    steps_per_period: usize,
+    /// The exponent and its standard error.
+    exponent: Option<(f64, f64)>,
+    stuck: bool,
+    interrupted: bool,
+    event_time: Array<f64>,
+    event_theta: Array<f64>,
+    event_kind: Vec<&'static str>,
+}
+
+impl Trajectory {
+    fn new(py: Python<'_>, run: trajectory::Trajectory) -> Self {
+        let events = &run.events;
+        Self {
+            event_time: array(py, events.iter().map(|event| event.tau).collect()),
+            event_theta: array(py, events.iter().map(|event| event.theta).collect()),
+            event_kind: events.iter().map(|event| event.kind.words()).collect(),
+            time: array(py, run.time),
+            theta: array(py, run.theta),
+            velocity: array(py, run.velocity),
+            reached_error: run.reached_error,
+            end_error: run.end_error,
+            steps_per_period: run.steps,
+            exponent: run.exponent,
+            stuck: run.stuck,
+            interrupted: run.interrupted,
+        }
+    }
+}
+
 /// One trajectory. With `live` its samples are handed over as they come, `live(times, angles,
 /// velocities)`, and an interrupt ends it with the last one.
 #[pyfunction]
 #[pyo3(signature = (model, start, until, tol, samples, lyapunov, live=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
-pub fn simulate<'py>(
-    py: Python<'py>,
+pub fn simulate(
+    py: Python<'_>,
     model: Model,
     start: (f64, f64),
     until: f64,
@@ -96,13 +134,13 @@ pub fn simulate<'py>(
     samples: usize,
     lyapunov: bool,
     live: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Trajectory> {
     let pendulum = model.pendulum()?;
     let request = Request { start: [start.0, start.1], until, tol, samples, lyapunov };
     let Some(live) = live else {
         let run =
             watched(py, None, |control| trajectory::simulate(&pendulum, &request, control.flag()))?;
-        return convert::trajectory(py, run);
+        return Ok(Trajectory::new(py, run));
     };
     let seen = Mutex::new([Vec::new(), Vec::new(), Vec::new()]);
     let hand_over = |py: Python<'_>| {
@@ -130,5 +168,5 @@ pub fn simulate<'py>(
     }
     let run = result?;
     hand_over(py)?;
-    convert::trajectory(py, run)
+    Ok(Trajectory::new(py, run))
 }
